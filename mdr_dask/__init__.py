@@ -1,0 +1,1 @@
+"""A distributed parameter-study runner for tribology with the method of dimensionality reduction."""

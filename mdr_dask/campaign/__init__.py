@@ -1,0 +1,1 @@
+"""The campaign file: text to checked, frozen data."""

@@ -1,0 +1,30 @@
+"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home."""
+
+from __future__ import annotations
+
+
+class MdrDaskError(Exception):
+    """Base of every error that mdr_dask raises on purpose."""
+
+
+class CampaignError(MdrDaskError):
+    """A campaign file that cannot be run; its arguments are all problems found, one sentence each."""
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.args)
+
+
+class StoreError(MdrDaskError):
+    """A store that cannot be read, written or extended as asked."""
+
+
+class StoreBusyError(StoreError):
+    """Another runner is at work on the store."""
+
+
+class DataError(MdrDaskError):
+    """A table, profile or selection that does not hold what was asked of it."""
+
+
+class FitError(MdrDaskError):
+    """A law that cannot be fitted to the data given."""

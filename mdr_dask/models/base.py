@@ -1,0 +1,275 @@
+"""What a campaign can name: a model is data about a computation and one pure function from a block to arrays."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import reduce
+from pathlib import Path
+from typing import Annotated, Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
+
+from mdr_dask.errors import DataError
+
+FloatArray = NDArray[np.float64]
+
+
+class Status(IntEnum):
+    """What became of one case in one realisation; the values of the ``status`` array of a store."""
+
+    MISSING = 0
+    DONE = 1
+    NOT_CONVERGED = 2
+    FAILED = 3
+    NOT_NEEDED = 4
+
+
+class Parameters(BaseModel):
+    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _to_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Convert ``'20 mm'`` to SI with the converter of the campaign layer; leave names such as ``auto`` alone."""
+        if info.context is None or info.field_name is None:
+            return value
+        unit = unit_of(cls, info.field_name)
+        if unit is None:
+            return value
+        convert = info.context["to_si"]
+        if isinstance(value, list | tuple):
+            return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
+        return convert(value, unit) if _looks_numeric(value) else value
+
+
+def _looks_numeric(value: Any) -> bool:
+    return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
+
+
+def quantity(unit: str, description: str, **bounds: Any) -> Any:
+    """Declare a physical parameter.
+
+    Parameters
+    ----------
+    unit : str
+        The coherent SI unit in which the value is held, ``"1"`` for a pure number.
+    description : str
+        One line that tells a user what it is.
+    **bounds
+        ``default``, ``gt``, ``ge``, ``lt``, ``le`` and whatever else :func:`pydantic.Field` takes.
+
+    Returns
+    -------
+    pydantic field
+        Used as ``length: float = quantity("m", "length of the line", gt=0)``.
+    """
+    return Field(description=description, json_schema_extra={"unit": unit}, **bounds)
+
+
+def unit_of(parameters: type[BaseModel], name: str) -> str | None:
+    """Return the SI unit that a field was declared with, or None for a field that is not a quantity."""
+    extra = parameters.model_fields[name].json_schema_extra
+    return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
+
+
+class DataFile(BaseModel):
+    """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    name: str
+    path: str
+    sha256: str
+
+    def read_text(self) -> str:
+        """Return the file's text.
+
+        Raises
+        ------
+        DataError
+            If the file has changed since the campaign was read.
+        """
+        content = Path(self.path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != self.sha256:
+            raise DataError(f"{self.path}: changed since the campaign was read")
+        return content.decode("utf-8-sig")
+
+
+def _find_file(value: Any, info: ValidationInfo) -> Any:
+    if not isinstance(value, str):
+        return value
+    directory = info.context["directory"] if info.context else "."
+    path = Path(directory, value).resolve()
+    if not path.is_file():
+        raise ValueError(f"no such file: {path}")
+    return DataFile(name=value, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+#: A parameter that names a file, relative to the campaign file.
+NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]
+
+P = TypeVar("P", bound=Parameters)
+
+
+@dataclass(frozen=True)
+class Output:
+    """One array that a model can compute.
+
+    Parameters
+    ----------
+    name, unit, long_name : str
+        As they stand in the store; a pure number has the unit ``"1"``.
+    dims : tuple of str
+        Dimensions that every single case has (``("radius",)``); their coordinates come from ``Model.coordinates``.
+    default : bool
+        Whether it is computed when the campaign names no outputs.
+    """
+
+    name: str
+    unit: str
+    long_name: str
+    dims: tuple[str, ...] = ()
+    default: bool = True
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """Values along a dimension of an output, with unit and meaning."""
+
+    values: FloatArray
+    unit: str
+    long_name: str
+
+
+@dataclass(frozen=True)
+class Block(Generic[P]):
+    """A rectangle of cases and realisations: one Dask task, one chunk of every array, one atomic write.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        The parameters that all cases share; a varied one holds the value of some case, so read those by `column`.
+    columns : mapping of str to array, shape (cases,)
+        The varied parameters by dotted path (``velocity``, ``indenter.angle``), one entry a case, SI.
+    cases : int
+        Number of cases.
+    realisations : tuple of int
+        Indices of the realisations; with `seed` they key every random number.
+    seed : int
+        Seed of the campaign.
+    outputs : tuple of str
+        Names of the arrays wanted; nothing else need be computed.
+    accuracy : float or None
+        Relative error allowed for the outputs, discretisation and statistics together.
+    """
+
+    parameters: P
+    columns: Mapping[str, NDArray[Any]]
+    cases: int
+    realisations: tuple[int, ...]
+    seed: int
+    outputs: tuple[str, ...]
+    accuracy: float | None = None
+
+    def column(self, path: str) -> NDArray[Any]:
+        """Return one parameter for every case, shape (cases,), whether it varies or not."""
+        if path in self.columns:
+            return self.columns[path]
+        value = reduce(getattr, path.split("."), self.parameters)
+        if isinstance(value, bool | int | float):
+            return np.full(self.cases, value)
+        column = np.empty(self.cases, dtype=object)
+        column[:] = [value] * self.cases
+        return column
+
+    def case(self, index: int) -> P:
+        """Return the whole parameter set of one case."""
+        case = self.parameters
+        for path, column in self.columns.items():
+            value = column[index]
+            case = _replace(case, path.split("."), value.item() if isinstance(value, np.generic) else value)
+        return case
+
+    def part(self, index: int, realisation: int) -> Block[P]:
+        """Return the block that holds one case in one realisation only."""
+        columns = {path: column[index : index + 1] for path, column in self.columns.items()}
+        return Block(self.parameters, columns, 1, (realisation,), self.seed, self.outputs, self.accuracy)
+
+
+def _replace(parameters: Any, path: list[str], value: Any) -> Any:
+    if len(path) > 1:
+        value = _replace(getattr(parameters, path[0]), path[1:], value)
+    return parameters.model_copy(update={path[0]: value})
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a model returns for a block.
+
+    Parameters
+    ----------
+    values : dict of str to array, shape (cases, realisations, ...)
+        The arrays asked for, NaN where a case failed.
+    status : int8 array, shape (cases, realisations)
+        Values of `Status`.
+    messages : dict of (case, realisation position) to str
+        One sentence for every case that failed or needs a warning.
+    solves : int
+        Number of solutions really computed; the rest shared one.
+    """
+
+    values: dict[str, FloatArray]
+    status: NDArray[np.int8]
+    messages: dict[tuple[int, int], str] = field(default_factory=dict)
+    solves: int = 0
+
+
+@dataclass(frozen=True)
+class Model(Generic[P]):
+    """A computation that a campaign can name.
+
+    Parameters
+    ----------
+    name : str
+        As in ``model:`` of a campaign file.
+    version : int
+        Raised whenever a change of code changes a number; part of the identity of a store.
+    summary : str
+        One line for ``mdr-dask models``.
+    parameters : type
+        Its parameter set.
+    outputs : tuple of Output
+        All arrays it can compute. ``status`` is implied.
+    compute : callable, Block -> Result
+        Pure: the value of a case depends on its parameters, the seed and its realisation, never on its neighbours in
+        the block. It does not raise for a case that fails.
+    seconds : callable, Block -> float
+        Estimated time of `compute`; cheap, vectorised over the cases.
+    whole : tuple of str
+        Parameters whose axes stay whole inside a block, because cases share work along them.
+    coordinates : callable, Parameters -> dict of str to Coordinate
+        Coordinates of the dimensions that outputs have beyond case and realisation.
+    distinct : callable, Block -> int, optional
+        Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
+    """
+
+    name: str
+    version: int
+    summary: str
+    parameters: type[P]
+    outputs: tuple[Output, ...]
+    compute: Callable[[Block[P]], Result]
+    seconds: Callable[[Block[P]], float]
+    whole: tuple[str, ...] = ()
+    coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
+    distinct: Callable[[Block[P]], int] | None = None
+
+    def output(self, name: str) -> Output:
+        """Return the declared output of that name; KeyError if there is none."""
+        return {output.name: output for output in self.outputs}[name]
