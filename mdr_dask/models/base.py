@@ -181,7 +181,7 @@ class Block(Generic[P]):
         """Return one parameter for every case, shape (cases,), whether it varies or not."""
         if path in self.columns:
             return self.columns[path]
-        value = reduce(getattr, path.split("."), self.parameters)
+        value: Any = reduce(getattr, path.split("."), self.parameters)
         if isinstance(value, bool | int | float):
             return np.full(self.cases, value)
         column = np.empty(self.cases, dtype=object)
