@@ -1,0 +1,1 @@
+"""Laws fitted to a store, with intervals and goodness of fit."""
