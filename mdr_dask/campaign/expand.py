@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Any
@@ -66,7 +66,7 @@ class _Expansion:
     def series(self, name: str) -> Series | None:
         """Return the series of that name, or None if something is wrong with it."""
         variations = self._variations()
-        broken = {found.path for found in variations if not found.items}
+        broken: set[Path] = {found.path for found in variations if not found.items}
         variations = tuple(found for found in variations if found.items)
         base = self._validate(self.data, variations, 0, broken)
         if self.spec.sampling == "grid":
@@ -91,9 +91,8 @@ class _Expansion:
             )
         if drawn and not found:
             self._complain(origin, "expected at least one range among the parameters, got none")
-        if drawn and found and all(one.spread for one in found):
-            kind, number = next(iter(design.model_dump().items()))
-            return sampling.drawn(kind, number, self.spec.seed, found)
+        if isinstance(design, SobolSpec | LatinHypercubeSpec) and found and all(one.spread for one in found):
+            return sampling.drawn(design, self.spec.seed, found)
         if design == "zip":
             self._check_lengths(found)
         return found
@@ -137,7 +136,7 @@ class _Expansion:
         try:
             return self.parameters.model_validate(tree, context={"to_si": to_si, "directory": self.directory})
         except ValidationError as error:
-            origins = {one.path: one.items[position].origin for one in variations}
+            origins: dict[Path, Origin] = {one.path: one.items[position].origin for one in variations}
 
             def report(path: Path, key: bool, what: str) -> None:
                 if not any(path[: len(start)] == start for start in broken):

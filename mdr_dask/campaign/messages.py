@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
+from mdr_dask.campaign.problems import Path, did_you_mean, shown
 from mdr_dask.campaign.units import expected
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
@@ -59,9 +59,8 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
-        if isinstance(data, Mapping) and part in data:
-            path, data = (*path, part), data[part]
-        elif isinstance(data, list | tuple) and isinstance(part, int) and part < len(data):
+        inside_list = isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+        if inside_list or (isinstance(data, Mapping) and part in data):
             path, data = (*path, part), data[part]
         elif details["type"] == "missing" and depth == len(location) - 1:
             path = (*path, part)
@@ -148,12 +147,3 @@ def _known(path: Path, kind: type[BaseModel], data: Any) -> list[str]:
             continue
         inner = fields.structure(info, value_at(data, path[: depth + 1])) if info else None
     return list(inner.model_fields) if inner else []
-
-
-def validation_reporter(problems: Problems, place: Callable[[Path, bool], Any], name: Callable[[Path], Path]) -> Report:
-    """Return a `Report` that files problems under the place and name of their path."""
-
-    def report(path: Path, key: bool, what: str) -> None:
-        problems.add(place(path, key), dotted(name(path)), what)
-
-    return report

@@ -10,6 +10,7 @@ from typing import Any
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Place, Problems, did_you_mean, dotted
+from mdr_dask.campaign.spec import LatinHypercubeSpec, SobolSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
 from mdr_dask.models.base import Parameters
 
@@ -17,31 +18,32 @@ _HEADING = re.compile(r"\s*(?P<path>[A-Za-z_][\w.]*)\s*(?:\[(?P<unit>[^\]]*)\])?
 _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brackets, such as velocity [mm/s]"
 
 
-def drawn(kind: str, number: int, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
+def drawn(design: SobolSpec | LatinHypercubeSpec, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
     """Draw values for parameters that vary over intervals.
 
     Parameters
     ----------
-    kind : {"sobol", "latin_hypercube"}
-        The design. Sobol points keep their order: a larger number adds points and moves none.
-    number, seed : int
-        Number of points, and the seed of their scrambling.
+    design : SobolSpec or LatinHypercubeSpec
+        The design and its number of points. Sobol points keep their order: a larger number adds some and moves none.
+    seed : int
+        Seed of the scrambling.
     variations : sequence of Variation
         Each with an interval.
 
     Returns
     -------
     tuple of Variation
-        The same, each with `number` values.
+        The same, each with one value a point.
     """
     import numpy as np
     from scipy.stats import qmc
 
     generator = np.random.Generator(np.random.Philox(seed))
-    if kind == "sobol":
+    if isinstance(design, SobolSpec):
+        number = design.sobol
         points = qmc.Sobol(len(variations), seed=generator).random_base2((number - 1).bit_length())[:number]
     else:
-        points = qmc.LatinHypercube(len(variations), seed=generator).random(number)
+        points = qmc.LatinHypercube(len(variations), seed=generator).random(design.latin_hypercube)
     return tuple(variation.drawn(column) for variation, column in zip(variations, points.T, strict=True))
 
 

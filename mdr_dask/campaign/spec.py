@@ -60,7 +60,7 @@ class TableSpec(Parameters):
 def _sampling_kind(value: Any) -> str:
     if isinstance(value, dict) and len(value) == 1:
         return str(next(iter(value)))
-    return {SobolSpec: "sobol", LatinHypercubeSpec: "latin_hypercube", TableSpec: "table"}.get(type(value), "name")
+    return "name"
 
 
 Sampling = Annotated[

@@ -171,8 +171,7 @@ def _conversion(given: str, unit: str) -> tuple[float, float]:
         source, target = (units.parse_units(_spelling(text)) for text in (given, unit))
         zero, one = (units.Quantity(size, source).to(target).magnitude for size in (0.0, 1.0))
     except UndefinedUnitError as error:
-        names = error.unit_names
-        word = names if isinstance(names, str) else next(iter(names))
+        word = error.args[0] if isinstance(error.args[0], str) else next(iter(error.args[0]))
         raise ValueError(f"unknown unit {word!r}{_nearest(word)}") from None
     except DimensionalityError:
         raise ValueError(f"expected {expected(unit)}") from None

@@ -100,7 +100,7 @@ def find(
     return tuple(found for name, value in data.items() for found in search.top(name, value, paths[name]))
 
 
-class _Malformed(Exception):
+class _MalformedError(Exception):
     """A range that has been reported."""
 
 
@@ -136,7 +136,7 @@ class _Search:
         origin = self._origin(at, at)
         try:
             content = read()
-        except _Malformed:
+        except _MalformedError:
             return Variation(path, origin)
         if isinstance(content, Spread):
             return Variation(path, origin, spread=content)
@@ -215,7 +215,7 @@ class _Search:
 
     def _complain(self, at: Path, what: str, name: Path) -> NoReturn:
         self.problems.add(self.document.place(at), dotted(name), what)
-        raise _Malformed
+        raise _MalformedError
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
