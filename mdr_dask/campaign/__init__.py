@@ -1,1 +1,5 @@
 """The campaign file: text to checked, frozen data."""
+
+from mdr_dask.campaign.definition import Axis, Campaign, Replication, Series, Tolerance
+
+__all__ = ["Axis", "Campaign", "Replication", "Series", "Tolerance"]
