@@ -152,7 +152,7 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
 
 
 def _quietly(array: xr.DataArray) -> xr.DataArray:
-    """Add a second failed realisation to a single one: the scatter of one number is NaN, and no reason for a warning."""
+    """Add a failed realisation to a single one: the scatter of one number is NaN, and no reason for a warning."""
     if array.sizes["realisation"] > 1:
         return array
     return xr.concat([array, array * np.nan], "realisation")

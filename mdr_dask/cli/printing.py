@@ -74,9 +74,8 @@ def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
 
 
 def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
-    values: list[Any] = column.broadcast_like(column.expand_dims({d: shape[d] for d in dims if d not in column.dims}))
-    full = column.expand_dims({d: shape[d] for d in dims if d not in column.dims}).transpose(*dims)
-    values = full.to_numpy().ravel().tolist()
+    missing = {dim: shape[dim] for dim in dims if dim not in column.dims}
+    values: list[Any] = column.expand_dims(missing).transpose(*dims).to_numpy().ravel().tolist()
     return values
 
 
