@@ -30,10 +30,23 @@ def count(array: xr.DataArray) -> xr.DataArray:
     return array.notnull().sum("realisation")
 
 
+def mean(array: xr.DataArray) -> xr.DataArray:
+    """Return the mean of the realisations that succeeded; NaN where none did."""
+    number = count(array)
+    return array.sum("realisation") / number.where(number > 0)
+
+
+def standard_deviation(array: xr.DataArray) -> xr.DataArray:
+    """Return the standard deviation of one realisation; NaN below two of them."""
+    spare = count(array) - 1
+    squares: xr.DataArray = (array - mean(array)) ** 2
+    return np.sqrt(squares.sum("realisation") / spare.where(spare > 0))
+
+
 def standard_error(array: xr.DataArray) -> xr.DataArray:
     """Return the standard deviation of the mean; NaN below two realisations."""
     number = count(array)
-    return array.std("realisation", ddof=1).where(number > 1) / np.sqrt(number)
+    return standard_deviation(array) / np.sqrt(number.where(number > 0))
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
@@ -112,8 +125,8 @@ def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> 
 
 
 STATISTICS = (
-    Statistic("mean", "mean over realisations", lambda array: array.mean("realisation")),
-    Statistic("standard_deviation", "standard deviation over realisations", lambda a: a.std("realisation", ddof=1)),
+    Statistic("mean", "mean over realisations", mean),
+    Statistic("standard_deviation", "standard deviation over realisations", standard_deviation),
     Statistic("standard_error", "standard error of the mean over realisations", standard_error),
     Statistic("quantile", "quantiles over realisations", quantiles),
     Statistic("interval", "95 % bootstrap interval of the mean over realisations", bootstrap_interval),
@@ -143,16 +156,9 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
         if name == "status" or "realisation" not in array.dims:
             continue
         for statistic in wanted:
-            result = statistic.compute(_quietly(array))
+            result = statistic.compute(array)
             units = "1" if statistic.name == "count" else array.attrs.get("units", "1")
             meaning = f"{array.attrs.get('long_name', name)}, {statistic.meaning}"
             reduced[f"{name}_{statistic.name}"] = result.assign_attrs(units=units, long_name=meaning)
     coordinates = {name: value for name, value in dataset.coords.items() if "realisation" not in value.dims}
     return xr.Dataset(reduced, attrs=dataset.attrs).assign_coords(coordinates)
-
-
-def _quietly(array: xr.DataArray) -> xr.DataArray:
-    """Add a failed realisation to a single one: the scatter of one number is NaN, and no reason for a warning."""
-    if array.sizes["realisation"] > 1:
-        return array
-    return xr.concat([array, array * np.nan], "realisation")
