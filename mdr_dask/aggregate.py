@@ -40,13 +40,14 @@ def standard_deviation(array: xr.DataArray) -> xr.DataArray:
     """Return the standard deviation of one realisation; NaN below two of them."""
     spare = count(array) - 1
     squares: xr.DataArray = (array - mean(array)) ** 2
-    return np.sqrt(squares.sum("realisation") / spare.where(spare > 0))
+    variance: xr.DataArray = squares.sum("realisation") / spare.where(spare > 0)
+    return variance**0.5
 
 
 def standard_error(array: xr.DataArray) -> xr.DataArray:
     """Return the standard deviation of the mean; NaN below two realisations."""
     number = count(array)
-    return standard_deviation(array) / np.sqrt(number.where(number > 0))
+    return standard_deviation(array) / number.where(number > 0) ** 0.5
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
@@ -78,7 +79,7 @@ def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
     below = np.floor(position).astype(int)
     low = np.take_along_axis(ordered, below, axis=-1)
     high = np.take_along_axis(ordered, np.minimum(below + 1, last), axis=-1)
-    return low + (position - below) * (high - low)
+    return np.asarray(low + (position - below) * (high - low))
 
 
 def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:

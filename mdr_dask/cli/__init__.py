@@ -16,7 +16,7 @@ INTERRUPTED = 130
 @click.group(context_settings={"auto_envvar_prefix": "MDR_DASK", "help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mdr-dask")
 def cli() -> None:
-    r"""Parameter studies for tribology with the method of dimensionality reduction.
+    """Parameter studies for tribology with the method of dimensionality reduction.
 
     \b
     mdr-dask check campaigns/quickstart.yaml     is the file right, and what will it cost?

@@ -21,7 +21,7 @@ CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 @click.argument("name", required=False)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def models(name: str | None, form: str | None) -> None:
-    r"""List the models, or the parameters and outputs of one.
+    """List the models, or the parameters and outputs of one.
 
     \b
     mdr-dask models
@@ -59,7 +59,7 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def check(campaigns: tuple[Path, ...], form: str | None) -> None:
-    r"""Check campaign files and say what each will cost; all problems at once, exit code 2 if there are any.
+    """Check campaign files and say what each will cost; all problems at once, exit code 2 if there are any.
 
     \b
     mdr-dask check campaigns/*.yaml
@@ -105,7 +105,7 @@ def _costs(estimate: Estimate) -> dict[str, Any]:
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
 def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options: Any) -> int:
-    r"""Run a campaign into its store, or whatever of it is not there yet.
+    """Run a campaign into its store, or whatever of it is not there yet.
 
     Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
 
@@ -191,7 +191,7 @@ def _print_outcome(url: str, progress: Progress, resources: Resources, form: str
 @click.command()
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a file instead of stdout.")
 def schema(output: Path | None) -> None:
-    r"""Print the JSON schema of campaign files, for completion and checks in an editor.
+    """Print the JSON schema of campaign files, for completion and checks in an editor.
 
     \b
     mdr-dask schema -o campaign.schema.json

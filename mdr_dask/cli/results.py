@@ -31,7 +31,7 @@ limit_option = click.option("--limit", default=40, show_default=True, help="Most
 @click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
 @json_option
 def status(store: str, failures: bool, form: str | None) -> None:
-    r"""Say how far a store is, while it is being filled too.
+    """Say how far a store is, while it is being filled too.
 
     \b
     mdr-dask status results/quickstart.zarr
@@ -104,7 +104,7 @@ def show(
     limit: int,
     form: str | None,
 ) -> None:
-    r"""Show results as a table: means and standard errors, or every realisation.
+    """Show results as a table: means and standard errors, or every realisation.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
@@ -131,7 +131,7 @@ def show(
 def aggregate(
     store: str, series: str | None, statistic: tuple[str, ...], output: Path | None, limit: int, form: str | None
 ) -> None:
-    r"""Reduce every output over its realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+    """Reduce every output over its realisations: mean, scatter, standard error, quantiles, bootstrap interval.
 
     \b
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
@@ -168,7 +168,7 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 @json_option
 @csv_option
 def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> None:
-    r"""Fit laws to a store, each constant with its interval; without a name, say which laws there are.
+    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
 
     \b
     mdr-dask fit results/friction_force.zarr
@@ -212,7 +212,7 @@ def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
 @click.option("--format", "suffix", default="png", show_default=True, help="png, pdf or svg.")
 def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | None, suffix: str) -> None:
-    r"""Draw figures from a store; without a name, say which figures there are.
+    """Draw figures from a store; without a name, say which figures there are.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
