@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
 
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 
@@ -70,16 +72,23 @@ def parse(text: str, source: str, problems: Problems) -> Document:
         mark = error.problem_mark or error.context_mark
         what = ", ".join(part for part in (error.context, error.problem) if part)
         problems.add(Place(source, mark.line + 1, mark.column + 1), "", f"not YAML: {what}{_hint(text, mark.index)}")
-    except YAMLError as error:
-        problems.add(Place(source, 1, 1), "", f"not YAML: {str(error).splitlines()[0]}")
+    except ReaderError as error:
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        problems.add(Place(source, line, column), "", f"not YAML: {str(error).splitlines()[0]}")
     else:
         if root is not None:
-            document.data = _Reader(document, problems).read(root, ())
+            with suppress(_EndlessError):
+                document.data = _Reader(document, problems).read(root, ())
     return document
 
 
 def _hint(text: str, index: int) -> str:
     return " (indent with blanks, not with tabs)" if text[index : index + 1] == "\t" else ""
+
+
+class _EndlessError(Exception):
+    """A document that has been reported as having no end."""
 
 
 class _Reader:
@@ -93,7 +102,7 @@ class _Reader:
         """Return the plain data of a node and remember its place."""
         if len(path) > _DEEPEST or len(self.document._nodes) > _LARGEST:
             self.problems.add(self.document._at(node), "", "nested too deeply, or refers to itself")
-            return None
+            raise _EndlessError
         self.document._nodes[path] = node
         if isinstance(node, MappingNode):
             return self._mapping(node, path)

@@ -66,6 +66,8 @@ class _Expansion:
     def series(self, name: str) -> Series | None:
         """Return the series of that name, or None if something is wrong with it."""
         variations = self._variations()
+        if variations is None:
+            return None
         broken: set[Path] = {found.path for found in variations if not found.items}
         variations = tuple(found for found in variations if found.items)
         base = self._validate(self.data, variations, 0, broken)
@@ -78,7 +80,7 @@ class _Expansion:
         axes = [self._axis(found, column) for found, column in zip(variations, columns, strict=True)]
         return Series(name, base, tuple(axes))
 
-    def _variations(self) -> tuple[Variation, ...]:
+    def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
         drawn = isinstance(design, SobolSpec | LatinHypercubeSpec)
         found = variation.find(self.document, self.parameters, self.data, self.paths, drawn, self.problems)
@@ -111,7 +113,10 @@ class _Expansion:
         first = self._substituted(self.data, variations, 0)
         known = _checked(base, first, {one.path[0]})
         column, seen = [], set()
+        last = self._validate(known, [one], len(one.items) - 1, broken)
         for position, item in enumerate(one.items):
+            if item.inner and None in (base, last):
+                continue
             checked = base if position == 0 else self._validate(known, [one], position, broken)
             value = None if checked is None else _get(checked, one.path)
             column.append(value)

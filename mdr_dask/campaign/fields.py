@@ -45,21 +45,21 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
     if not isinstance(value, dict):
         return None
     candidates = structures(info)
-    fitting = [kind for kind in candidates if all(_agrees(field, value.get(key)) for key, field in fixed(kind).items())]
-    return fitting[0] if fitting else None
+    fitting = (
+        kind
+        for kind in candidates
+        if all(value.get(key, kind.model_fields[key].default) == only for key, only in fixed(kind).items())
+    )
+    return next(fitting, None)
 
 
-def fixed(kind: type[BaseModel]) -> dict[str, FieldInfo]:
-    """Return the fields of a parameter set that can have one value only."""
+def fixed(kind: type[BaseModel]) -> dict[str, Any]:
+    """Return the fields of a parameter set that can have one value only, with that value."""
     return {
-        key: info
+        key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()
         if get_origin(info.annotation) is Literal and len(get_args(info.annotation)) == 1
     }
-
-
-def _agrees(info: FieldInfo, value: Any) -> bool:
-    return value in get_args(info.annotation) or (value is None and not info.is_required())
 
 
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:

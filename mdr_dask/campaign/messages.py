@@ -65,8 +65,12 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
         elif details["type"] == "missing" and depth == len(location) - 1:
             path = (*path, part)
     if details["type"] == "union_tag_invalid":
-        path = (*path, next(key for key, value in data.items() if value == details["ctx"]["tag"]))
+        path = (*path, *_tag_key(data, details["ctx"]["tag"]))
     return path
+
+
+def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
+    return [key for key, value in data.items() if str(value) == tag][:1]
 
 
 def value_at(data: Any, path: Path) -> Any:
@@ -80,42 +84,68 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
     first = group[0]
     own = next((details for details in group if details["type"] in ("value_error", "assertion_error")), None)
     if own is not None:
-        report(path, False, str(own["ctx"]["error"]))
+        what = str(own["ctx"]["error"])
+        report((*path, *_entry(value_at(data, path), what)), False, what)
     elif first["type"] == "missing":
         report(path, False, _missing(path, kind, data))
     elif first["type"] == "extra_forbidden":
         report(path, True, f"unknown key{did_you_mean(path[-1], _known(path, kind, data))}")
     else:
-        unit = fields.unit_at(kind, path, data)
         value = value_at(data, path)
-        wanted = " or ".join(dict.fromkeys(_wanted(details, unit, value) for details in group))
-        choices = [choice for details in group for choice in _choices(details)]
-        hint = did_you_mean(value, choices) if isinstance(value, str) else ""
-        report(path, False, f"expected {wanted}, got {shown(value)}{hint if 'mean' in hint else ''}")
+        wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
+        report(path, False, f"expected {wanted}, got {shown(value)}{_hint(group, value)}")
 
 
-def _wanted(details: ErrorDetails, unit: str | None, value: Any) -> str:
-    kind, context = details["type"], details.get("ctx", {})
-    if kind in _BOUNDS:
-        key, words = _BOUNDS[kind]
+def _entry(value: Any, what: str) -> Path:
+    """Return the index of the entry of a list that a sentence quotes."""
+    entries = value if isinstance(value, list) else []
+    return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
+
+
+def _hint(group: list[ErrorDetails], value: Any) -> str:
+    types = {details["type"] for details in group}
+    if isinstance(value, str):
+        hint = did_you_mean(value, [choice for details in group for choice in _choices(details)])
+        return hint if "mean" in hint else ""
+    if isinstance(value, float) and value.is_integer() and types & {"int_type", "int_from_float"}:
+        return f" (write {value:.0f})"
+    if isinstance(value, dict) and types & {"float_type", "int_type"}:
+        return " (a range is {linear: [a, b, n]} or {geometric: [a, b, n]})"
+    return ""
+
+
+def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any) -> str:
+    error, context = details["type"], details.get("ctx", {})
+    unit = fields.unit_at(kind, path, data)
+    if error in _BOUNDS:
+        key, words = _BOUNDS[error]
         bound = context[key]
         noun = "whole number" if isinstance(bound, int) else "number"
         behind = f" {unit}" if bound and unit not in (None, "1") else ""
         return f"a {noun} {words} {bound:g}{behind}"
-    if kind == "float_type" and unit is not None:
+    if error == "float_type" and unit is not None:
         return expected(unit)
     if context.get("class_name") == "DataFile":
         return "the name of a file"
-    if kind in ("literal_error", "enum"):
+    if error in ("literal_error", "enum"):
         return str(context["expected"])
-    if kind == "union_tag_invalid":
+    if error == "union_tag_invalid":
         return _listed(_choices(details))
-    if kind == "union_tag_not_found":
-        return "a mapping that says which kind it is"
-    if kind in ("too_short", "too_long"):
-        size, words = ("min_length", "at least") if kind == "too_short" else ("max_length", "at most")
-        return f"{words} {context[size]} entries"
-    return _KINDS.get(kind) or re.sub(r"^(Input|Value) should be ", "", details["msg"])
+    if error == "union_tag_not_found":
+        return _kinds(path, kind, data)
+    if error in ("too_short", "too_long"):
+        size, words = ("min_length", "at least") if error == "too_short" else ("max_length", "at most")
+        return f"{words} {context[size]} {'entry' if context[size] == 1 else 'entries'}"
+    return _KINDS.get(error) or re.sub(r"^(Input|Value) should be ", "", details["msg"])
+
+
+def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return ``a mapping with shape: 'cone' or 'plane'`` for a parameter that has several structures."""
+    found = fields.owner(kind, path, data)
+    structures = fields.structures(found[0].model_fields[found[1]]) if found else ()
+    keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
+    name = keys[0][0] if keys else ""
+    return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
 
 
 def _choices(details: ErrorDetails) -> list[str]:

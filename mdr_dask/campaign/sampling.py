@@ -54,8 +54,8 @@ def tabled(
     parameters: type[Parameters],
     data: Mapping[str, Any],
     problems: Problems,
-) -> tuple[Variation, ...]:
-    """Return the parameters that vary along the lines of a CSV file.
+) -> tuple[Variation, ...] | None:
+    """Return the parameters that vary along the lines of a CSV file, or None if something is wrong with it.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def tabled(
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8"
         problems.add(origin.place, origin.name, f"cannot read {Path(directory, name)}: {reason}")
-        return ()
+        return None
     reader = csv.reader(text.splitlines())
     rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         problems.add(Place(name, 1, 1), "", "expected a line of headings and at least one line of values")
-        return ()
+        return None
     headings = [_heading(cell, _place(name, rows[0], index)) for index, cell in enumerate(rows[0][1])]
     malformed = [(place, _NOT_A_HEADING) for path, _, place in headings if not path]
     malformed += [(Place(name, line, 1), f"expected {len(headings)} values as in line {rows[0][0]}, got {len(row)}")
@@ -88,13 +88,12 @@ def tabled(
     for place, what in malformed:
         problems.add(place, "", what)
     if malformed:
-        return ()
+        return None
     columns = [
         Variation(path, Origin(dotted(path), place), tuple(_cell(name, row, index, path, unit) for row in rows[1:]))
         for index, (path, unit, place) in enumerate(headings)
     ]
-    _check_columns(columns, parameters, data, problems)
-    return tuple(columns)
+    return tuple(columns) if _are_sound(columns, parameters, data, problems) else None
 
 
 def _heading(cell: str, place: Place) -> tuple[tuple[str, ...], str, Place]:
@@ -123,18 +122,22 @@ def _value(text: str, unit: str) -> Any:
     return text or None
 
 
-def _check_columns(
+def _are_sound(
     columns: Sequence[Variation], parameters: type[Parameters], data: Mapping[str, Any], problems: Problems
-) -> None:
+) -> bool:
     seen: set[tuple[str, ...]] = set()
+    sound = True
     for column in columns:
         found = fields.owner(parameters, column.path, data)
         given: Any = data
         for part in column.path:
             given = given.get(part) if isinstance(given, dict) else None
+        twice = given is not None or column.path in seen
         if found is None:
             hint = did_you_mean(column.origin.name, list(parameters.model_fields))
             problems.add(column.origin.place, column.origin.name, f"no such parameter{hint}")
-        elif given is not None or column.path in seen:
+        elif twice:
             problems.add(column.origin.place, column.origin.name, "given twice (remove it from one of the two places)")
+        sound = sound and found is not None and not twice
         seen.add(column.path)
+    return sound

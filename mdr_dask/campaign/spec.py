@@ -98,7 +98,8 @@ class CampaignSpec(Parameters):
     seed: int = Field(0, ge=0, description="every random number follows from it")
     realisations: Realisations = Field(1, description="independent rough lines computed for each case")
     parameters: dict[str, Any] = Field(
-        description="of the model; a list, {linear: [a, b, n]}, {geometric: [a, b, n]} or {values: [...]} varies one"
+        description="parameters of the model, varied by a list, {linear: [a, b, n]}, {geometric: [a, b, n]} or "
+        "{values: [...]}"
     )
     series: dict[FileName, dict[str, Any]] | None = Field(
         None, min_length=1, description="groups of cases by name, each replacing some of the parameters above"

@@ -30,11 +30,12 @@ class Origin:
 
 @dataclass(frozen=True)
 class Item:
-    """One value of a varied parameter, as written or in SI."""
+    """One value of a varied parameter, as written or in SI; inner ones lie between the ends of a range."""
 
     value: Any
     label: str
     origin: Origin
+    inner: bool = False
 
 
 @dataclass(frozen=True)
@@ -146,7 +147,9 @@ class _Search:
         if not isinstance(values, list):
             self._complain(at, f"expected a list of values, got {shown(values)}", name)
         if self.drawn:
-            self._complain(at, "expected one value, {linear: [a, b]} or {geometric: [a, b]} with this sampling", name)
+            self._complain(
+                at, "expected one value, {linear: [a, b]} or {geometric: [a, b]} with this sampling, got a list", name
+            )
         if not values:
             self._complain(at, "expected at least one value, got []", name)
         places = [(*at, index) for index in range(len(values))]
@@ -183,11 +186,13 @@ class _Search:
         numbers = spaced(spread, count)
         if len(numbers) < (2 if spread.whole else count):
             self._complain(at, f"expected ends far enough apart for {count} values", name)
-        places = [(*at, 0), *[at] * (len(numbers) - 2), (*at, 1)]
-        return [
-            Item(number, f"{number:g}", self._origin(place, name))
-            for number, place in zip(numbers, places, strict=True)
+        first, last = (numbers[0], numbers[-1]) if spread.whole else content[:2]
+        inner = [Item(number, f"{number:g}", self._origin(at, name), inner=True) for number in numbers[1:-1]]
+        ends = [
+            Item(end, self.document.flow((*at, index)), self._origin((*at, index), name))
+            for index, end in enumerate((first, last))
         ]
+        return [ends[0], *inner, ends[1]]
 
     def _end(self, path: tuple[str, ...], kind: str, value: Any, at: Path) -> float:
         unit, name, number = fields.unit_at(self.parameters, path, self.data) or "1", at[:-2], np.nan
