@@ -69,9 +69,10 @@ def axis(path: str, values, dim: str | None = None) -> Axis:
     return Axis(path, path, dim or path, tuple(values), None, "m" if path == "position" else "1", path)
 
 
-def campaign(
-    *axes: Axis, name: str = "", realisations=Replication(6, 6, {}), outputs=("height",), **parameters
-) -> Campaign:
+SIX = Replication(6, 6, {})
+
+
+def campaign(*axes: Axis, name: str = "", realisations=SIX, outputs=("height",), **parameters) -> Campaign:
     first = {a.path: a.values[0] for a in axes}
     series = Series(name, ToyParameters(**{**parameters, **first}), axes)
     return Campaign("toy", "toy", 1, realisations, (series,), tuple(outputs), None, "", {}, "text", "toy.yaml")

@@ -18,7 +18,7 @@ from mdr_dask.store.blocks import (
 from mdr_dask.store.files import attributes, exists, lock
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
-from mdr_dask.store.reading import datasets
+from mdr_dask.store.reading import datasets, save
 
 __all__ = [
     "Stored",
@@ -32,6 +32,7 @@ __all__ = [
     "read_block",
     "reconcile",
     "records",
+    "save",
     "values",
     "write_record",
     "write_status",

@@ -64,7 +64,7 @@ def _is_laid_out(url: str, template: Template) -> bool:
         return False
     wanted = json.loads(json.dumps(_series_attributes(template), default=_json_default))
     shape = metadata["consolidated_metadata"]["metadata"]["status"]["shape"]
-    return shape == list(template.shape) and wanted.items() <= metadata["attributes"].items()
+    return bool(shape == list(template.shape) and wanted.items() <= metadata["attributes"].items())
 
 
 def _lay_out_group(group: zarr.Group, template: Template) -> None:

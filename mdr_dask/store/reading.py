@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import xarray as xr
 
 from mdr_dask.store.files import attributes, read_json
@@ -46,3 +49,17 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
         ):
             dataset = dataset.sortby(dim)
     return dataset
+
+
+def save(dataset: xr.Dataset, path: Path) -> None:
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``; lists in attrs become text, which is all that netCDF holds."""
+    plain = dataset.copy()
+    plain.attrs = {
+        name: value if isinstance(value, str | int | float) else json.dumps(value)
+        for name, value in dataset.attrs.items()
+        if value is not None
+    }
+    if path.suffix == ".nc":
+        plain.to_netcdf(path, engine="scipy")
+    else:
+        plain.to_zarr(path, mode="w", consolidated=False)
