@@ -105,6 +105,7 @@ def test_whole_structures_are_labelled_as_written():
         ("scheme", "[euler, exact]", ("euler", "exact"), ("euler", "exact")),
         ("oversampling", "[auto, 1, 2]", ("auto", 1, 2), ("auto", "1", "2")),
         ("oversampling", "[1, 2]", (1, 2), None),
+        ("depth", "[~, 1 mm]", (None, 0.001), ("~", "1 mm")),
         ("shift", "[true, false]", (True, False), ("true", "false")),
     ],
 )
