@@ -1,10 +1,10 @@
-"""The reference of the campaign file in Markdown, made from the same declarations that check the files."""
+"""The reference of the campaign file: ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from pathlib import Path
+import sys
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import BaseModel
@@ -12,18 +12,19 @@ from pydantic.fields import FieldInfo
 
 from mdr_dask import models
 from mdr_dask.campaign import fields
-from mdr_dask.campaign import schema as json_schema
+from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
 from mdr_dask.campaign.units import DEFINITIONS
-from mdr_dask.models.base import Model, unit_of
+from mdr_dask.models.base import DataFile, Model, unit_of
 
 _HEAD = """\
 # The campaign file
 
 A campaign file is YAML 1.2. It names a model, gives its parameters, says which of them vary, and what is wanted.
 Every problem in a file is reported at once as `file:line:column: where: what, got value (hint)`.
-This page is generated from the code; so is `campaign.schema.json`, with which editors complete and check as you type:
-put `# yaml-language-server: $schema=campaign.schema.json` in the first line.
+Made by `python -m mdr_dask.campaign.reference > docs/campaign-file.md`; do not edit. `mdr-dask schema` prints the same
+as a JSON schema, with which editors complete and check as you type: put
+`# yaml-language-server: $schema=campaign.schema.json` in the first line.
 
 ```yaml
 name: force-sweep
@@ -75,38 +76,44 @@ the points of a smaller one. The headings of a table are names of parameters and
 """
 
 
-def text() -> str:
+def reference_page() -> str:
     """Return the page as it stands in ``docs/campaign-file.md``."""
-    parts = [_HEAD, "## Keys\n", _table(CampaignSpec, "key"), _VARIATION, _units()]
+    parts = [_HEAD, "## Keys\n", _table(_rows(CampaignSpec, "key")), _VARIATION, _units()]
     parts += [_model(models.load(name)) for name in models.NAMES]
     return "\n".join(parts)
 
 
-def write(folder: str | Path) -> None:
-    """Write the reference and the JSON schema into a folder."""
-    Path(folder, "campaign-file.md").write_text(text(), encoding="utf-8")
-    Path(folder, "campaign.schema.json").write_text(json_schema.text(), encoding="utf-8")
+def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return parameter, unit, default, allowed values and meaning of every parameter of a model, nested ones too."""
+    return list(_rows(model.parameters, "parameter"))
+
+
+def output_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return output, unit, own dimensions, whether it is a default, and meaning of every output of a model."""
+    return [
+        {
+            "output": output.name,
+            "unit": output.unit,
+            "dimensions": ", ".join(output.dims),
+            "default": "yes" if output.default else "no",
+            "meaning": output.long_name,
+        }
+        for output in model.outputs
+    ]
 
 
 def _model(model: Model[Any]) -> str:
-    outputs = [
-        f"| `{output.name}` | {_unit(output.unit)} | {', '.join(f'`{dim}`' for dim in output.dims) or '—'} "
-        f"| {'yes' if output.default else 'no'} | {output.long_name} |"
-        for output in model.outputs
-    ]
-    return "\n".join(
-        [
-            f"## `{model.name}`",
-            "",
-            f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}.",
-            "",
-            _table(model.parameters),
-            "| output | unit | own dimensions | default | meaning |",
-            "|---|---|---|---|---|",
-            *outputs,
-            "",
-        ]
-    )
+    summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
+    tables = [_table(parameter_rows(model)), _table(output_rows(model))]
+    return "\n".join([f"## `{model.name}`", "", summary, "", *tables])
+
+
+def _table(rows: Iterable[dict[str, str]]) -> str:
+    rows = list(rows)
+    name = next(iter(rows[0]))
+    lines = [f"| {' | '.join(rows[0])} |", "|---" * len(rows[0]) + "|"]
+    lines += [f"| {' | '.join([f'`{row[name]}`', *list(row.values())[1:]])} |" for row in rows]
+    return "\n".join([*lines, ""])
 
 
 def _units() -> str:
@@ -133,45 +140,39 @@ def _symbols(line: str) -> str:
     return "/".join(f"`{word}`" for word in [name, *others] if word != "_")
 
 
-def _table(parameters: type[BaseModel], first: str = "parameter") -> str:
-    rows = [f"| {first} | unit | default | allowed | meaning |", "|---|---|---|---|---|"]
-    return "\n".join([*rows, *_rows(parameters, "", ""), ""])
-
-
-def _rows(parameters: type[BaseModel], before: str, condition: str) -> Iterator[str]:
+def _rows(parameters: type[BaseModel], first: str, before: str = "", condition: str = "") -> Iterator[dict[str, str]]:
     properties = parameters.model_json_schema()["properties"]
     for name, info in parameters.model_fields.items():
         if name in fields.fixed(parameters):
             continue
-        structures = fields.structures(info)
-        allowed = " or ".join(filter(None, [_allowed(properties[name]), *map(_shape, structures)]))
-        yield (
-            f"| `{before}{name}` | {_unit(unit_of(parameters, name))} | {_default(info)} | {allowed} "
-            f"| {condition}{info.description or ''} |"
-        )
+        structures = [structure for structure in fields.structures(info) if structure is not DataFile]
+        yield {
+            first: f"{before}{name}",
+            "unit": unit_of(parameters, name) or "",
+            "default": _default(info),
+            "allowed": " or ".join(filter(None, [_allowed(properties[name]), *map(_shape, structures)])),
+            "meaning": f"{condition}{info.description or ''}",
+        }
         for structure in structures:
-            if structure.__name__ != "DataFile":
-                fixed = ", ".join(f"{key}: {value}" for key, value in fields.fixed(structure).items())
-                yield from _rows(structure, f"{before}{name}.", f"({fixed}) " if fixed else "")
+            yield from _rows(structure, first, f"{before}{name}.", _condition(structure))
+
+
+def _condition(structure: type[BaseModel]) -> str:
+    fixed = ", ".join(f"{key}: {value}" for key, value in fields.fixed(structure).items())
+    return f"({fixed}) " if fixed else ""
 
 
 def _shape(structure: type[BaseModel]) -> str:
-    if structure.__name__ == "DataFile":
-        return ""
-    fixed = [f"{key}: {value}" for key, value in fields.fixed(structure).items()]
-    others = [name for name in structure.model_fields if name not in fields.fixed(structure)]
-    return f"`{{{', '.join(fixed + others)}}}`"
-
-
-def _unit(unit: str | None) -> str:
-    return "—" if unit in (None, "1") else str(unit)
+    fixed = fields.fixed(structure)
+    entries = [f"{key}: {fixed[key]}" if key in fixed else key for key in structure.model_fields]
+    return f"{{{', '.join(entries)}}}"
 
 
 def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True, validated_data={})
-    return "—" if value is None or value == {} else f"`{_yaml(value)}`"
+    return "" if value is None or value == {} else _yaml(value)
 
 
 def _yaml(value: Any) -> str:
@@ -183,7 +184,7 @@ def _yaml(value: Any) -> str:
         return "[" + ", ".join(map(_yaml, value)) + "]"
     if isinstance(value, bool):
         return str(value).lower()
-    return f"{value:.12g}" if isinstance(value, float) else str(value)
+    return plain(value) if isinstance(value, float) else str(value)
 
 
 def _allowed(node: dict[str, Any]) -> str:
@@ -191,7 +192,7 @@ def _allowed(node: dict[str, Any]) -> str:
         if key in node:
             return " or ".join(dict.fromkeys(filter(None, map(_allowed, node[key]))))
     if "enum" in node or "const" in node:
-        return ", ".join(f"`{value}`" for value in node.get("enum", [node.get("const")]))
+        return ", ".join(map(str, node.get("enum", [node.get("const")])))
     kind = node.get("type")
     if kind == "array":
         return f"list, each: {_allowed(node.get('items', {}))}"
@@ -203,7 +204,7 @@ def _allowed(node: dict[str, Any]) -> str:
 _NOUNS = {
     "number": "number",
     "integer": "whole number",
-    "boolean": "`true`, `false`",
+    "boolean": "true, false",
     "string": "text",
     "object": "mapping",
 }
@@ -211,4 +212,8 @@ _NOUNS = {
 
 def _bounds(node: dict[str, Any]) -> list[str]:
     signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
-    return [f"{sign} {node[key]:g}" for key, sign in signs.items() if key in node]
+    return [f"{sign} {plain(node[key])}" for key, sign in signs.items() if key in node]
+
+
+if __name__ == "__main__":
+    sys.stdout.write(reference_page())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +17,7 @@ _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": 
 _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 
 
-def schema() -> Schema:
+def json_schema() -> Schema:
     """Return the JSON schema (draft 2020-12) of campaign files of all models.
 
     It accepts every valid file. It refuses what can be told without units: unknown keys, wrong kinds, numbers out of
@@ -39,11 +38,6 @@ def schema() -> Schema:
         "allOf": choices,
         "$defs": definitions,
     }
-
-
-def text() -> str:
-    """Return the schema as it stands in ``docs/campaign.schema.json``."""
-    return json.dumps(schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:

@@ -11,26 +11,9 @@ import pytest
 
 from mdr_dask.campaign import Replication, Tolerance, load, loads
 
-SMALL = "name: a\nmodel: rubbing\nparameters: {length: 20 mm, normal_force: 1 N}\n"
-FULL = """\
-# yaml-language-server: $schema=campaign.schema.json
-name: force-sweep
-model: rubbing
-seed: 2013
-realisations: {at_least: 10, at_most: 200, until: {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}}
-parameters:
-  length: 20 mm
-  hurst: 0.7
-  normal_force: {geometric: [1 mN, 100 N, 20]}
-  velocity: {geometric: [1e-4, 1e-1, 36]}
-series:
-  roughness: {hurst: {linear: [0, 1, 6]}}
-  spacing: {points: [2000, 5000, 20000]}
-sampling: grid
-accuracy: 1 %
-outputs: [pressure, friction_coefficient, indentation_depth]
-store: {path: results/other.zarr, blocks: {realisation: 50, velocity: 36}}
-"""
+VALID = Path(__file__).parent / "valid"
+SMALL = (VALID / "small.yaml").read_text()
+FULL = (VALID / "full.yaml").read_text()
 
 
 def test_defaults():
@@ -38,7 +21,7 @@ def test_defaults():
     assert campaign.replication == Replication(1, 1, {})
     assert campaign.outputs == ("friction_coefficient", "indentation_depth")
     assert (campaign.seed, campaign.accuracy, campaign.blocks) == (0, None, {})
-    assert campaign.store == "results/a.zarr"
+    assert campaign.store == "results/small.zarr"
     assert [series.name for series in campaign.series] == [""]
 
 
@@ -101,3 +84,8 @@ def test_a_typical_file_is_read_fast():
         times.append(time.perf_counter() - start)
     # measured 8 ms once pint is loaded; the bound leaves room for a busy machine
     assert min(times) < 0.2
+
+
+@pytest.mark.parametrize("path", sorted(VALID.glob("*.yaml")), ids=lambda path: path.stem)
+def test_valid_files_are_read(path):
+    assert load(path).name == path.stem
