@@ -49,6 +49,8 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
     """
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
+        if _is_of_another_branch(details, kind, data):
+            continue
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         _report_group(path, group, kind, data, report)
@@ -67,6 +69,22 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
     if details["type"] == "union_tag_invalid":
         path = (*path, *_tag_key(data, details["ctx"]["tag"]))
     return path
+
+
+def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
+    """Return whether an error comes from trying a structure that the value does not claim to be."""
+    path: Path = ()
+    value = data
+    for part in details["loc"]:
+        if isinstance(value, Mapping) and part in value:
+            path, value = (*path, part), value[part]
+            continue
+        found = fields.owner(kind, path, data)
+        info = found[0].model_fields[found[1]] if found else None
+        claimed = fields.structure(info, value) if info else None
+        if info and claimed and part in {one.__name__ for one in fields.structures(info)} - {claimed.__name__}:
+            return True
+    return False
 
 
 def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
