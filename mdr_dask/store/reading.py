@@ -48,7 +48,8 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
-    return dataset
+    order = [*dataset.attrs["outputs"], "status"]
+    return dataset[order]
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
