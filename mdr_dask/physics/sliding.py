@@ -244,7 +244,12 @@ def _states(
 
 
 def steady_sliding(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme = "hermite"
+    height: FloatArray,
+    slope: FloatArray | None,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme = "hermite",
+    contact: bool = True,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation sliding over a periodic line.
 
@@ -260,6 +265,8 @@ def steady_sliding(
         F_N / (4 G L), the mean displacement, in the unit of height.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
         Exact sweep over cubic cells or over straight ones, or the papers' time steps.
+    contact : bool
+        Whether fraction and slope of the contact are wanted where they cost extra.
 
     Returns
     -------
@@ -279,17 +286,21 @@ def steady_sliding(
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, INVALID, np.int8)
     if np.any(good):
-        solve = _backward_euler if scheme == "backward_euler" else _exact
-        results[:, good], status[good] = solve(height, slope, reaches[good] * height.size, loads[good], scheme)
+        cells, weights = reaches[good] * height.size, loads[good]
+        results[:, good], status[good] = (
+            _backward_euler(height, cells, weights, contact)
+            if scheme == "backward_euler"
+            else _exact(height, slope if scheme == "hermite" else None, cells, weights)
+        )
     results[:, status != CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
 def _exact(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
+    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; reaches in cells."""
-    if scheme == "hermite" and slope is not None:
+    """Solve by sweeps over cells, straight ones without slopes; reaches in cells."""
+    if slope is not None:
         rise = slope / height.size
         cells, top = cut(height, rise, np.roll(rise, -1), True, True)
     else:
@@ -305,13 +316,16 @@ def _exact(
 
 
 def _backward_euler(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
+    height: FloatArray, reaches: FloatArray, loads: FloatArray, contact: bool
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by time steps of one cell; reaches in cells."""
-    start = int(np.argmax(height))
-    top = height[start]
-    depths, sums = backward_euler.solve(np.roll(height, -start) - top, reaches, loads)
-    touched = sums[backward_euler.TOUCHED]
-    contact_slope = np.sqrt(sums[backward_euler.STRETCH] / np.maximum(touched, 1)) * height.size
-    status = np.where(np.isnan(sums[0]), NOT_CONVERGED, CONVERGED).astype(np.int8)
-    return np.stack([sums[backward_euler.DRAG], depths - top, touched / height.size, contact_slope]), status
+    last = int(np.argmax(height)) + 1
+    below = np.roll(height, -last) - height[last - 1]
+    depths, drags = backward_euler.solve(below, reaches, loads)
+    results = np.full((4, loads.size), np.nan)
+    results[0], results[1] = drags, depths - height[last - 1]
+    if contact:
+        backward_euler.contact(below, below - np.roll(below, 1), reaches, depths, results[2], results[3])
+        results[2] /= height.size
+        results[3] *= height.size
+    return results, np.where(np.isnan(drags), NOT_CONVERGED, CONVERGED).astype(np.int8)
