@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,10 @@ from mdr_dask.models.base import Block, Coordinate, Model, Output
 
 #: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
 BLOCK_SECONDS = 1.0
+#: Small studies are cut into about so many blocks, so that there is something to share among workers ...
+FEW_BLOCKS = 16
+#: ... but never into blocks of less work than this.
+LEAST_SECONDS = 0.1
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
 #: More cases than this are a mistake in the file, not a study.
@@ -221,30 +225,41 @@ def available_memory() -> float:
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
-    """Fill a block to about `BLOCK_SECONDS`: shared axes whole, then realisations, then the other axes."""
+    """Fill a block with work: shared axes whole, then realisations, then the other axes."""
     whole = {axis.dim for axis in template.series.axes if _is_whole(axis, model.whole)}
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
+    goal = _block_seconds(template, model, chunks)
     for dim in sorted(whole, key=lambda dim: -template.sizes[dim]):
         while chunks[dim] > 1 and (
-            math.prod(chunks.values()) > limit or _mean_seconds(template, model, chunks) > 4 * BLOCK_SECONDS
+            math.prod(chunks.values()) > limit or _mean_seconds(template, model, chunks) > 4 * goal
         ):
             chunks[dim] = math.ceil(chunks[dim] / 2)
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
-        room = min(
-            BLOCK_SECONDS / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values())
-        )
-        size = template.sizes[dim]
-        chunks[dim] = _even_part(size, max(1, min(size, int(room))))
+        room = min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values()))
+        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], int(room))))
     return {**chunks, **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items()}}
+
+
+def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
+    parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
+    total = parts * _mean_seconds(template, model, chunks)
+    return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
 
 
 def _is_whole(axis: Axis, whole: tuple[str, ...]) -> bool:
     return any(axis.path == path or axis.path.startswith(path + ".") for path in whole)
 
 
-def _even_part(size: int, most: int) -> int:
-    """Return the length of the parts when `size` is cut into the fewest nearly equal parts of at most `most`."""
+def _part(template: Template, dim: str, most: int) -> int:
+    """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
+
+    Where rounds add realisations, parts divide a round, so that every round fills whole blocks.
+    """
+    size = template.sizes[dim]
+    replication = template.campaign.replication
+    if dim == "realisation" and replication.until:
+        return max(part for part in range(1, most + 1) if math.gcd(part, replication.at_least) == part)
     return math.ceil(size / math.ceil(size / most))
 
 
@@ -284,7 +299,8 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
     for index in itertools.product(*(range(count) for count in template.grid[:-1])):
         block = template.block((*index, 0))
         seconds += model.seconds(block)
-        solves += model.distinct(block) if model.distinct else block.cases
+        alone = replace(block, realisations=block.realisations[:1])
+        solves += model.distinct(alone) if model.distinct else block.cases
     realisations = template.sizes["realisation"]
     return Estimate(
         cases=template.cases,

@@ -79,6 +79,22 @@ def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
     return values
 
 
+def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
+    """Join each mean and its standard error into one column for a reader: ``0.1234 +- 0.0005``."""
+    outputs = [name.removesuffix("_mean") for name in units if name.endswith("_mean")]
+    kept = [name for name in units if name.removesuffix("_mean").removesuffix("_standard_error") not in outputs]
+    joined = [
+        {name: row[name] for name in kept}
+        | {name: _with_error(row[f"{name}_mean"], row[f"{name}_standard_error"]) for name in outputs}
+        for row in rows
+    ]
+    return joined, {name: units[name] for name in kept} | {name: units[f"{name}_mean"] for name in outputs}
+
+
+def _with_error(mean: float, error: float) -> str:
+    return f"{mean:.4g} +- {error:.1g}"
+
+
 def _short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli import selection
-from mdr_dask.cli.printing import print_json, print_rows, table
+from mdr_dask.cli.printing import print_json, print_rows, table, with_errors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,8 +115,10 @@ def show(
 
     dataset = selection.group(room.datasets(store), series)
     wanted = selection.select(selection.outputs(dataset, outputs), selections)
-    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error", "count"))
+    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error"))
     rows, units = table(shown)
+    if not (raw or statistic or form):
+        rows, units = with_errors(rows, units)
     print_rows(rows, units, form or "table", limit)
 
 

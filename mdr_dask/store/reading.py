@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import xarray as xr
@@ -48,7 +49,8 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             and not dataset.indexes[dim].is_monotonic_increasing
         ):
             dataset = dataset.sortby(dim)
-    return dataset
+    order = [*dataset.attrs["outputs"], "status"]
+    return dataset[order]
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
@@ -61,5 +63,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     }
     if path.suffix == ".nc":
         plain.to_netcdf(path, engine="scipy")
-    else:
-        plain.to_zarr(path, mode="w", consolidated=False)
+        return
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        plain.to_zarr(path, mode="w", consolidated=True)
