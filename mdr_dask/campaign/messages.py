@@ -25,8 +25,6 @@ _KINDS = {
     "bool_type": "true or false",
     "string_type": "a text",
     "dict_type": "a mapping",
-    "model_type": "a mapping",
-    "model_attributes_type": "a mapping",
     "tuple_type": "a list",
     "list_type": "a list",
     "finite_number": "a finite number",
@@ -149,7 +147,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
         return str(context["expected"])
     if error == "union_tag_invalid":
         return _listed(_choices(details))
-    if error == "union_tag_not_found":
+    if error in ("union_tag_not_found", "model_type", "model_attributes_type"):
         return _kinds(path, kind, data)
     if error in ("too_short", "too_long"):
         size, words = ("min_length", "at least") if error == "too_short" else ("max_length", "at most")
@@ -162,7 +160,9 @@ def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
     found = fields.owner(kind, path, data)
     structures = fields.structures(found[0].model_fields[found[1]]) if found else ()
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
-    name = keys[0][0] if keys else ""
+    if not keys:
+        return "a mapping"
+    name = keys[0][0]
     return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
 
 
