@@ -25,7 +25,9 @@ def output_of(*command: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", ["ruff format --check .", "ruff check .", "mypy", "lint-imports"], ids=lambda command: command.split()[0]
+    "command",
+    ["ruff format --check .", "ruff check .", "mypy", "lint-imports"],
+    ids=["format", "lint", "types", "imports"],
 )
 def test_tools_are_content(command):
     name, *arguments = command.split()
