@@ -81,7 +81,7 @@ class Excursions(NamedTuple):
 
     def every_second(self) -> Excursions:
         """Return the excursions of the line made of the even points, for an estimate of the grid's error."""
-        keep = self.place % 2 == 0
+        keep = (self.place % 2 == 0) & (self.place < self.points // 2 * 2)
         return Excursions(self.place[keep] // 2, self.height[keep], self.points // 2)
 
 
