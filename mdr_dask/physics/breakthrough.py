@@ -336,22 +336,26 @@ def judge_windows(
     return Windows(contact, overlap)
 
 
-def creep_positions(points: int, slide_roll_ratio: float, stride: int) -> tuple[IntArray, IntArray]:
-    """Return where the window stands on each line while the mean surface travels once around.
+def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
+    """Return where the window stands on each line after some way of the mean surface.
 
     Parameters
     ----------
+    way : array_like, shape (n,)
+        In points. For mean values, ways an eighth of the window apart lose nothing: closer windows tell the same.
     points : int
         Points of each line.
     slide_roll_ratio : float
-        ``(v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the mean way.
-    stride : int
-        Mean way between windows in points. Expected values do not depend on it; an eighth of the window loses nothing,
-        for windows that overlap by more tell the same.
+        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the way.
+
+    Returns
+    -------
+    two int arrays, shape (n,)
+        First point of the window on each line.
     """
-    way = np.arange(0, points, stride, dtype=np.float64)
-    half = slide_roll_ratio / 2
-    return tuple(np.round(way * (1 + sign * half)).astype(np.int64) % points for sign in (1, -1))  # type: ignore[return-value]
+    ways = np.asarray(way, dtype=np.float64)
+    first, second = (np.round(ways * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
+    return first, second
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:

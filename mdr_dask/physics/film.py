@@ -202,6 +202,14 @@ PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694,
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
 
 
+#: The formulas by the name that a campaign gives them.
+FORMULAS: dict[str, FilmFormula] = {
+    "pan_hamrock": PAN_HAMROCK_CENTRAL,
+    "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
+    "dowson_higginson": DOWSON_HIGGINSON_MINIMUM,
+}
+
+
 class Moes(NamedTuple):
     """Moes' load and lubricant parameters; with them ``h/R (2 U)^(-1/2)`` depends on two numbers only."""
 

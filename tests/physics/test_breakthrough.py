@@ -235,7 +235,7 @@ def test_creep_leaves_the_expected_probability():
         line_1, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed, rms=np.sqrt(0.5))
         line_2, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed + 1, rms=np.sqrt(0.5))
         for slip, found in values.items():
-            positions = bt.creep_positions(points, slip, window // 8)
+            positions = bt.creep_positions(np.arange(0, points, window // 8), points, slip)
             found.append(
                 (bt.judge_windows(line_1, line_2, level, 1.0, strength, window, positions).contact_points > 0).mean()
             )
@@ -250,14 +250,14 @@ def test_sparse_windows_have_the_mean_of_all():
     line, _, _ = rough_line(100_000, 100, 10_000, 0.7, 3)
     found = clusters_of(line, 1.0, 1.0, 1e-3)
     every = bt.contact_points(found, 200) > 0
-    positions = bt.creep_positions(100_000, 0.0, 25)
+    positions = bt.creep_positions(np.arange(0, 100_000, 25), 100_000, 0.0)
     sparse = bt.judge_windows(line, np.zeros(100_000), 1.0, 1.0, 1e-3, 200, positions).contact_points > 0
     # the trace changes state a few times a window at most: a grid of eighths misses part of an eighth each time
     assert sparse.mean() == pytest.approx(every.mean(), abs=0.01)
 
 
 def test_creep_moves_the_lines_apart_by_the_slide_roll_ratio():
-    first, second = bt.creep_positions(1000, 0.2, 10)
+    first, second = bt.creep_positions(np.arange(0, 1000, 10), 1000, 0.2)
     assert first.size == 100
     assert (first[1] - first[0], second[1] - second[0]) == (11, 9)
 
