@@ -257,6 +257,8 @@ class Model(Generic[P]):
         Coordinates of the dimensions that outputs have beyond case and realisation.
     distinct : callable, Block -> int, optional
         Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
+    memory : callable, Block -> float
+        Estimated peak memory of `compute` in bytes, beyond its outputs.
     """
 
     name: str
@@ -269,6 +271,7 @@ class Model(Generic[P]):
     whole: tuple[str, ...] = ()
     coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
     distinct: Callable[[Block[P]], int] | None = None
+    memory: Callable[[Block[P]], float] = lambda _: 0.0
 
     def output(self, name: str) -> Output:
         """Return the declared output of that name; KeyError if there is none."""
