@@ -301,7 +301,7 @@ def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[O
 
     client.wait_for_workers(1)
     remaining = iter(works)
-    queue = as_completed()
+    queue = as_completed(loop=client.loop)
     running: dict[Future, Work] = {}
     suspects: list[Work] = []
 

@@ -157,4 +157,4 @@ def _flow(node: Node) -> str:
         return "{" + ", ".join(f"{_flow(key)}: {_flow(value)}" for key, value in node.value) + "}"
     if isinstance(node, SequenceNode):
         return "[" + ", ".join(_flow(item) for item in node.value) + "]"
-    return str(node.value)
+    return str(node.value) or "null"

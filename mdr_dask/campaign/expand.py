@@ -74,10 +74,13 @@ class _Expansion:
         if self.spec.sampling == "grid":
             columns = [self._grid_column(base, variations, index, broken) for index in range(len(variations))]
         else:
-            columns = self._case_columns(base, variations, broken)
-        if base is None or broken or any(value is None for column in columns for value in column):
+            columns = [self._cases(base, variations, broken)] * len(variations)
+        if base is None or broken or any(None in column for column in columns):
             return None
-        axes = [self._axis(found, column) for found, column in zip(variations, columns, strict=True)]
+        axes = [
+            self._axis(one, [_get(point, one.path) for point in column])
+            for one, column in zip(variations, columns, strict=True)
+        ]
         return Series(name, base, tuple(axes))
 
     def _variations(self) -> tuple[Variation, ...] | None:
@@ -108,31 +111,32 @@ class _Expansion:
 
     def _grid_column(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
-    ) -> list[Any]:
+    ) -> list[Parameters | None]:
+        """Return the parameters at each value of one axis, the others at their first value."""
         one = variations[index]
-        first = self._substituted(self.data, variations, 0)
-        known = _checked(base, first, {one.path[0]})
-        column, seen = [], set()
+        known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
         last = self._validate(known, [one], len(one.items) - 1, broken)
+        column: list[Parameters | None] = []
+        seen = set()
         for position, item in enumerate(one.items):
             if item.inner and None in (base, last):
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, broken)
+            column.append(checked)
             value = None if checked is None else _get(checked, one.path)
-            column.append(value)
             key = value if isinstance(value, int | float) else item.label
-            if value is not None and key in seen:
+            if checked is not None and key in seen:
                 self._complain(item.origin, f"this value is given twice: {item.label}")
             seen.add(key)
         return column
 
-    def _case_columns(
+    def _cases(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
-    ) -> list[list[Any]]:
+    ) -> list[Parameters | None]:
+        """Return the parameters of each case."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
         cases = min((len(one.items) for one in variations), default=0)
-        rows = [self._validate(known, variations, position, broken) for position in range(cases)]
-        return [[None if row is None else _get(row, one.path) for row in rows] for one in variations]
+        return [self._validate(known, variations, position, broken) for position in range(cases)]
 
     def _validate(
         self, data: Mapping[str, Any], variations: Sequence[Variation], position: int, broken: set[Path]

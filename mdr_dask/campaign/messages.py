@@ -122,7 +122,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
         bound = context[key]
         noun = "whole number" if isinstance(bound, int) else "number"
         behind = f" {unit}" if bound and unit not in (None, "1") else ""
-        return f"a {noun} {words} {bound:g}{behind}"
+        return f"a {noun} {words} {plain(bound)}{behind}"
     if error == "float_type" and unit is not None:
         return expected(unit)
     if context.get("class_name") == "DataFile":
@@ -146,6 +146,11 @@ def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
     name = keys[0][0] if keys else ""
     return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
+
+
+def plain(number: float) -> str:
+    """Return a number as short as it can be written."""
+    return str(number) if isinstance(number, int) else f"{number:.12g}"
 
 
 def _choices(details: ErrorDetails) -> list[str]:

@@ -39,7 +39,7 @@ kelvin = [temperature]; offset: 0 = K
 radian = [angle] = rad
 ampere = [current] = A
 mole = [substance] = mol
-degree_Celsius = kelvin; offset: 273.15 = °C = degC = celsius
+degree_Celsius = kelvin; offset: 273.15 = °C = degC = celsius = degreeC
 percent = 0.01
 permille = 0.001 = ‰
 ppm = 1e-6

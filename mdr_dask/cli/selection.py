@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -80,6 +80,6 @@ def _number(text: str, unit: str, name: str) -> float:
         raise click.UsageError(f"{name}: {error}") from None
 
 
-def _meant(name: str, known: list[Any]) -> str:
-    close = difflib.get_close_matches(name, [str(k) for k in known], n=1)
+def _meant(name: str, known: list[str]) -> str:
+    close = [other for other in known if name in other] or difflib.get_close_matches(name, known, n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""

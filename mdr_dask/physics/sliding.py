@@ -37,7 +37,8 @@ MESSAGES = {
     INVALID: "load, velocity and profile must be finite, the load and v tau positive",
 }
 ITERATIONS = 200
-LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
+PATIENCE = 20  # sweeps before the bracket is halved
+LATTICE_BITS = 14  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
 @dataclass(frozen=True)
@@ -165,28 +166,50 @@ def _next(depth: float) -> float:
 
 
 @njit(nogil=True, cache=True)
+def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
+    """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before."""
+    carried = sums[DISPLACEMENT]
+    load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
+    change = load - trail[1]
+    bend = (slope - trail[2]) / change if abs(change) > 1e-12 and trail[2] > 0 else 0.0
+    trail[0], trail[1], trail[2], trail[3] = np.log(depth), load, slope, bend
+
+
+@njit(nogil=True, cache=True)
+def _guess(trail: FloatArray, load: float) -> float:
+    """Extrapolate log depth over log load to a load."""
+    ahead = np.log(load) - trail[1]
+    bend = 0.5 * trail[3] * ahead
+    limit = 0.5 * trail[2]
+    return math.exp(trail[0] + ahead * (trail[2] + min(max(bend, -limit), limit)))
+
+
+@njit(nogil=True, cache=True)
 def _solve(
     cells: Cells,
     barriers: FloatArray,
     block_barriers: FloatArray,
     reach: float,
     load: float,
-    guess: float,
+    trail: FloatArray,
     sums: FloatArray,
 ) -> tuple[float, bool]:
     """Find the last lattice depth that carries less than the load, and leave its sums.
 
     The load is a convex, increasing function of the depth, so that its tangent bounds the root from above: a lattice
     depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
-    and so the answer does not depend on the guess.
+    and so the answer does not depend on the `trail` that the search follows.
     """
     low, high = 0.0, np.inf
-    depth = _floor(guess)
+    depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
-    for _ in range(ITERATIONS):
+    for iteration in range(ITERATIONS):
         sweep(cells, barriers, block_barriers, reach, depth, sums)
-        carried, stiffness = sums[DISPLACEMENT], sums[STIFFNESS]
-        tangent = depth + (load - carried) / stiffness
+        carried = sums[DISPLACEMENT]
+        if not (carried > 0 and sums[STIFFNESS] > 0):
+            return depth, False
+        tangent = depth + (load - carried) / sums[STIFFNESS]
+        _follow(sums, depth, trail)
         if carried <= load:
             low = depth
             best[:] = sums
@@ -197,16 +220,15 @@ def _solve(
         if low > 0 and _next(low) >= high:
             sums[:] = best
             return low, True
-        power = min(max(stiffness * depth / carried, 0.5), 1e3) if carried > 0 else 1e3
-        proposal = depth * (load / carried) ** (1 / power) if carried > 0 else 2 * depth
-        proposal = min(proposal, tangent) if carried <= load else proposal
-        if not low < proposal < high:
-            proposal = 0.5 * (low + high) if high < np.inf else 2 * low
+        proposal = min(_guess(trail, load), tangent) if carried <= load else _guess(trail, load)
+        if iteration > PATIENCE and high < np.inf:
+            proposal = 0.5 * (low + high)
         depth = _floor(proposal)
         if depth <= low:
             depth = _next(low)
         elif depth >= high:
-            depth = _floor(0.5 * (low + high))
+            depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
+            depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
     return depth, False
 
 
@@ -214,28 +236,26 @@ def _solve(
 def _states(
     cells: Cells, reaches: FloatArray, loads: FloatArray, results: FloatArray, status: NDArray[np.int8]
 ) -> None:
-    """Solve the cases of one profile in the order given, each from the one before; see `Steady` for the columns."""
+    """Solve the cases of one profile, ordered by reach and load, each from the one before; see `Steady` for the columns."""
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK)
-    sums = np.empty(SUMS)
-    depth, carried, power, reach = 1.0, 0.0, 1.0, -1.0
+    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
+    reach = -1.0
+    first[:] = math.log(loads[0]), math.log(loads[0] * n), 0.7, 0.0
     for k in range(loads.size):
-        load = loads[k] * n
-        if not (0 < load < np.inf and 0 < reaches[k] < np.inf):
-            status[k] = INVALID
-            continue
-        if reaches[k] != reach:
+        starts = reaches[k] != reach
+        if starts:
             reach = reaches[k]
             barrier(cells, reach, barriers, block_barriers)
-        guess = depth * (load / carried) ** (1 / power) if carried > 0 else loads[k]
-        depth, converged = _solve(cells, barriers, block_barriers, reach, load, guess, sums)
-        carried = sums[DISPLACEMENT]
-        if not (converged and carried > 0):
+            trail[:] = first
+        depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k] * n, trail, sums)
+        if not converged:
             status[k] = NOT_CONVERGED
-            carried, depth = 0.0, 1.0
+            trail[:] = first
             continue
-        power = sums[STIFFNESS] * depth / carried
-        shift = (load - carried) / sums[STIFFNESS]
+        if starts:
+            first[:] = trail
+        shift = (loads[k] * n - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = OUTSIDE_LINE if sums[OUTSIDE] > 0 else CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
@@ -244,7 +264,12 @@ def _states(
 
 
 def steady_sliding(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme = "hermite"
+    height: FloatArray,
+    slope: FloatArray | None,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme = "hermite",
+    contact: bool = True,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation sliding over a periodic line.
 
@@ -260,6 +285,8 @@ def steady_sliding(
         F_N / (4 G L), the mean displacement, in the unit of height.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
         Exact sweep over cubic cells or over straight ones, or the papers' time steps.
+    contact : bool
+        Whether fraction and slope of the contact are wanted where they cost extra.
 
     Returns
     -------
@@ -279,17 +306,21 @@ def steady_sliding(
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, INVALID, np.int8)
     if np.any(good):
-        solve = _backward_euler if scheme == "backward_euler" else _exact
-        results[:, good], status[good] = solve(height, slope, reaches[good] * height.size, loads[good], scheme)
+        cells, weights = reaches[good] * height.size, loads[good]
+        results[:, good], status[good] = (
+            _backward_euler(height, cells, weights, contact)
+            if scheme == "backward_euler"
+            else _exact(height, slope if scheme == "hermite" else None, cells, weights)
+        )
     results[:, status != CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
 def _exact(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
+    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; reaches in cells."""
-    if scheme == "hermite" and slope is not None:
+    """Solve by sweeps over cells, straight ones without slopes; reaches in cells."""
+    if slope is not None:
         rise = slope / height.size
         cells, top = cut(height, rise, np.roll(rise, -1), True, True)
     else:
@@ -305,13 +336,16 @@ def _exact(
 
 
 def _backward_euler(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
+    height: FloatArray, reaches: FloatArray, loads: FloatArray, contact: bool
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by time steps of one cell; reaches in cells."""
-    start = int(np.argmax(height))
-    top = height[start]
-    depths, sums = backward_euler.solve(np.roll(height, -start) - top, reaches, loads)
-    touched = sums[backward_euler.TOUCHED]
-    contact_slope = np.sqrt(sums[backward_euler.STRETCH] / np.maximum(touched, 1)) * height.size
-    status = np.where(np.isnan(sums[0]), NOT_CONVERGED, CONVERGED).astype(np.int8)
-    return np.stack([sums[backward_euler.DRAG], depths - top, touched / height.size, contact_slope]), status
+    last = int(np.argmax(height)) + 1
+    below = np.roll(height, -last) - height[last - 1]
+    depths, drags = backward_euler.solve(below, reaches, loads)
+    results = np.full((4, loads.size), np.nan)
+    results[0], results[1] = drags, depths - height[last - 1]
+    if contact:
+        backward_euler.contact(below, below - np.roll(below, 1), reaches, depths, results[2], results[3])
+        results[2] /= height.size
+        results[3] *= height.size
+    return results, np.where(np.isnan(drags), NOT_CONVERGED, CONVERGED).astype(np.int8)

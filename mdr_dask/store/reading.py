@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import xarray as xr
@@ -62,5 +63,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     }
     if path.suffix == ".nc":
         plain.to_netcdf(path, engine="scipy")
-    else:
-        plain.to_zarr(path, mode="w", consolidated=False)
+        return
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")
+        plain.to_zarr(path, mode="w", consolidated=True)

@@ -49,6 +49,7 @@ class Rubbing(Parameters):
     temperature: float = quantity("K", "temperature", default=293.15, gt=0)
     moduli: tuple[float, ...] = quantity("Pa", "moduli of the Prony series", default=(1e6,), strict=False, min_length=1)
     indenter: Indenter = Field(Plane(shape="plane"), description="shape of the indenter")
+    depth: float | None = quantity("m", "depth of the layer, endless if not given", default=None, gt=0)
     profile: NamedFile | None = Field(None, description="measured line")
 
     @model_validator(mode="after")

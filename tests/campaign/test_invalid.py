@@ -25,7 +25,7 @@ def test_invalid_campaign_is_refused_with_all_its_problems(path, monkeypatch):
 
 def test_problems_are_sorted_and_survive_pickling(monkeypatch):
     monkeypatch.chdir(FOLDER)
-    with pytest.raises(CampaignError, match="many.yaml") as caught:
+    with pytest.raises(CampaignError, match=r"many\.yaml") as caught:
         load("many.yaml")
     lines = [int(problem.split(":")[1]) for problem in caught.value.args]
     assert lines == sorted(lines)
