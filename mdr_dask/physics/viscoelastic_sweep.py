@@ -137,7 +137,7 @@ def _fly(
 @njit(nogil=True, cache=True, error_model="numpy")
 def sweep(
     penetration: FloatArray,
-    memory: FloatArray,
+    start: FloatArray,
     moduli: FloatArray,
     reach: FloatArray,
     times: FloatArray,
@@ -155,8 +155,8 @@ def sweep(
     ----------
     penetration : array, shape (nodes,)
         w at each node; the last node of a periodic line repeats the first.
-    memory : array, shape (arms,)
-        a_m at the first node; ignored if `undeformed`.
+    start : array, shape (arms,)
+        e_m at the first node under the penetration there; ignored if `undeformed`.
     moduli, reach : array, shape (arms,)
         Arms, ascending in reach.
     times, stretch_of, amplitude_of : arrays
@@ -184,16 +184,14 @@ def sweep(
     totals[:] = 0.0
     glass, push = 1.0, penetration[0]
     for m in range(arms):
-        e[m] = 0.0 if undeformed else penetration[0] - memory[m]
+        e[m] = 0.0 if undeformed else start[m]
         glass += moduli[m]
         push += moduli[m] * e[m]
         modes[m] = 0.0
     place, pieces, node = 0.0, 0, 1
     flying = undeformed or push < 0
     if flying and not undeformed:
-        for m in range(arms):
-            e[m] -= push / glass
-        _into_flight(e, modes, amplitude_of)
+        _into_flight(penetration[0], push / glass, e, moduli, modes, amplitude_of)
     while True:
         landing = _fly(place, node, modes, times, penetration, last) if flying else place
         goal = landing if landing >= 0 else float(last)
@@ -256,14 +254,22 @@ def sweep(
             for m in range(arms):
                 work[0, m] = e[m]
             return pieces, OPEN_END
-        for m in range(arms):
-            e[m] -= pressure / glass
-        _into_flight(e, modes, amplitude_of)
+        _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
         flying = True
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _into_flight(e: FloatArray, modes: FloatArray, amplitude_of: FloatArray) -> None:  # pragma: no cover
+def _into_flight(
+    strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
+) -> None:  # pragma: no cover
+    """Turn stretches into modes, after the strain has given way by `excess`; the shortest arm makes the stress zero."""
+    stress = strain - excess
+    for m in range(e.size):
+        e[m] -= excess
+        if m > 0:
+            stress += moduli[m] * e[m]
+    if e.size:
+        e[0] = -stress / moduli[0]
     for k in range(modes.size):
         modes[k] = 0.0
         for m in range(modes.size):
@@ -304,12 +310,12 @@ def tangent(
     stretch_of: FloatArray,
     amplitude_of: FloatArray,
     memory_of: FloatArray,
-    tail: bool,
+    periodic: bool,
     change: FloatArray,
     strain_area: FloatArray,
     scratch: FloatArray,
 ) -> None:  # pragma: no cover
-    """Differentiate a sweep: change of a_m over the line, and integral of u, by (a at the start..., depth).
+    """Differentiate a sweep: change of a_m over the line, and integral of u, by (e at the start..., depth).
 
     Contacts and flights of fixed lengths act linearly on the arms, and u is continuous where they meet, so moving the
     meeting points does not matter to first order.
@@ -320,10 +326,10 @@ def tangent(
         As in `sweep`.
     memory_of : array, shape (arms, arms)
         a_m in each mode.
-    tail : bool
-        Whether the recovery beyond the line counts.
+    periodic : bool
+        Whether the line closes; otherwise there is only the column of the depth, and the recovery beyond the line counts.
     change : array, shape (arms, columns), output
-        Derivative of a(end) - a(start); the last column belongs to the depth, the others to a(start).
+        Derivative of a(end) - a(start); the last column belongs to the depth, the others to e(start).
     strain_area : array, shape (columns,), output
         Derivative of the integral of u.
     scratch : array, shape (2, arms, columns)
@@ -335,9 +341,10 @@ def tangent(
     strain_area[:] = 0.0
     stretch[:] = 0.0
     for m in range(arms):
-        stretch[m, depth] = 1.0
-        if m < depth:
-            stretch[m, m] = -1.0
+        if periodic:
+            stretch[m, m] = 1.0
+        else:
+            stretch[m, depth] = 1.0
     for piece in range(pieces):
         length = lengths[piece]
         if piece % 2 == 1:
@@ -354,7 +361,7 @@ def tangent(
             stretch[:, depth] += 1.0
             for k in range(arms):
                 lost = -np.expm1(-length / times[k])
-                weight = times[k] * (1.0 if tail and piece == pieces - 1 else lost)
+                weight = times[k] * (lost if periodic or piece < pieces - 1 else 1.0)
                 for j in range(columns):
                     strain_area[j] += weight * modes[k, j]
                     after = modes[k, j] * (1 - lost)
@@ -460,7 +467,7 @@ def solve_sliding(
     tolerance : float
         Largest last step, relative to the depth.
     unknown : array, shape (arms + 1,), input and output
-        Start and solution: a_m at the first node, then the depth.
+        Start and solution: e_m at the first node, then the depth.
     totals : array, shape (6,), output
         See `sweep`.
 
@@ -483,7 +490,7 @@ def solve_sliding(
             lengths, imbalance, totals, work,
         )
         tangent(
-            lengths, pieces, moduli, reach, times, stretch_of, amplitude_of, memory_of, not periodic,
+            lengths, pieces, moduli, reach, times, stretch_of, amplitude_of, memory_of, periodic,
             change, row, scratch,
         )
         total = totals[0] if periodic else totals[0] + totals[5]
@@ -491,10 +498,10 @@ def solve_sliding(
         matrix[columns - 1] = row
         if periodic:
             for m in range(arms):
-                scale = -change[m, m]
-                residual[m] = imbalance[m] / reach[m] / scale
+                scale = change[m, m]
+                residual[m] = -imbalance[m] / reach[m] / scale
                 for j in range(columns):
-                    matrix[m, j] = -change[m, j] / scale
+                    matrix[m, j] = change[m, j] / scale
         if not solve_in_place(matrix, residual):
             return False, sweeps, True
         largest = 0.0
