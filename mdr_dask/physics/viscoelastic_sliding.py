@@ -25,6 +25,9 @@ BALANCE = 1e-7
 GRIDS = (1, 2, 4)
 """Every point, every second and every fourth: extrapolation and its error estimate."""
 
+FIRST_ORDER_SHARE = 0.125
+"""Part of the correction that counts as error even where two extrapolations happen to agree."""
+
 
 @dataclass(frozen=True)
 class ViscoelasticSteady:
@@ -160,20 +163,16 @@ def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady
     """Extrapolate the two finest grids by their second order; the coarsest tells how well that works."""
     coarsest, coarse, fine = solutions
     if any(solution.status != CONVERGED for solution in solutions):
-        worst = fine.status if fine.status != CONVERGED else NOT_CONVERGED
-        return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, worst, fine.sweeps)
+        status = fine.status if fine.status != CONVERGED else NOT_CONVERGED
+        return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, status, fine.sweeps)
     before = coarse.values + (coarse.values - coarsest.values) / 3
     values = fine.values + (fine.values - coarse.values) / 3
-    error = estimate(*(solution.values[0] for solution in solutions))
     friction, depth, fraction, slope = (float(value) for value in values)
-    del before
+    change = max(abs(friction - before[0]), FIRST_ORDER_SHARE * abs(fine.values[0] - coarse.values[0]))
+    error = float(change / abs(friction)) if friction else float(change)
     return ViscoelasticSteady(
-        friction, depth + mean, min(max(fraction, 0.0), 1.0), slope, error / abs(friction), fine.status, fine.sweeps
+        friction, depth + mean, min(max(fraction, 0.0), 1.0), slope, error, fine.status, fine.sweeps
     )
-
-
-def estimate(coarsest: float, coarse: float, fine: float) -> float:
-    return abs(fine - coarse) / 3
 
 
 def _check(heights: FloatArray, spacing: float, velocity: float, normal_force: float, periodic: bool) -> None:

@@ -375,12 +375,18 @@ def tangent(
 def _take_stress(stretch: FloatArray, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
     arms, columns = stretch.shape
+    if arms == 0:
+        return
     for j in range(columns):
-        stress = 1.0 if j == columns - 1 else 0.0
+        strain = 1.0 if j == columns - 1 else 0.0
+        stress = strain
         for m in range(arms):
             stress += moduli[m] * stretch[m, j]
-        for m in range(arms):
+        balance = strain - stress / glass
+        for m in range(1, arms):
             stretch[m, j] -= stress / glass
+            balance += moduli[m] * stretch[m, j]
+        stretch[0, j] = -balance / moduli[0]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
