@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field
 
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
 
@@ -23,6 +23,7 @@ FINEST = 64  # oversampling beyond which `auto` gives up
 SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
+ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
 
@@ -66,21 +67,7 @@ class Power(Parameters):
         return self.coefficient, self.exponent
 
 
-def _shape_of(value: Any) -> Any:
-    return value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
-
-
-Indenter = Annotated[
-    Annotated[Plane, Tag("plane")]
-    | Annotated[Cone, Tag("cone")]
-    | Annotated[Parabola, Tag("parabola")]
-    | Annotated[Power, Tag("power")],
-    Discriminator(
-        _shape_of,
-        custom_error_type="unknown_shape",
-        custom_error_message="expected shape: plane, cone, parabola or power",
-    ),
-]
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
 
 
 class SlidingFriction(Parameters):
@@ -423,6 +410,12 @@ def seconds(block: Block[SlidingFriction]) -> float:
     return total
 
 
+def memory(block: Block[SlidingFriction]) -> float:
+    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
+    grid = [FINEST if value == "auto" else 2 * int(value) for value in block.column("oversampling")]
+    return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
+
+
 MODEL = Model(
     name="sliding_friction",
     version=1,
@@ -433,4 +426,5 @@ MODEL = Model(
     seconds=seconds,
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=distinct,
+    memory=memory,
 )
