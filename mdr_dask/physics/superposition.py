@@ -353,7 +353,8 @@ def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: Floa
 
 def _require_overlap(result: Superposition) -> None:
     low, high = (
-        np.array([function(result.x[result.member == k]) for k in range(result.groups.size)]) for function in (np.min, np.max)
+        np.array([function(result.x[result.member == k]) for k in range(result.groups.size)])
+        for function in (np.min, np.max)
     )
     order = np.argsort(low)
     reach = np.maximum.accumulate(high[order])
