@@ -5,7 +5,9 @@ from __future__ import annotations
 import itertools
 import os
 import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -19,7 +21,8 @@ from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
-from mdr_dask.task import Outcome, Work, run_block, write_off
+from mdr_dask.store import Place
+from mdr_dask.task import Outcome, Work, run_block, versions, write_off
 
 if TYPE_CHECKING:
     from distributed import Client, Future
@@ -118,27 +121,54 @@ def run(
         If the campaign is too large to be run.
     """
     with store.lock(url):
-        chunks: Mapping[str, Mapping[str, int]] = {}
-        realisations = 0
-        if store.exists(url):
-            stored = store.reconcile(url, campaign)
-            campaign, chunks, realisations = stored.campaign, stored.chunks, stored.realisations
-        layout = templates(campaign, max(campaign.replication.at_least, realisations), chunks)
+        layout, asked = _plan(campaign, url)
         with _executor(resources) as execute:
-            return _run_rounds(url, layout, execute, report, retry_failed)
+            return _run_rounds(url, layout, asked, execute, report, retry_failed)
+
+
+def outlook(campaign: Campaign, url: str) -> Progress:
+    """Return what a store holds of the first round of a campaign, without touching it; results kept and to do.
+
+    Raises
+    ------
+    StoreError
+        If the store was made from another campaign.
+    CampaignError
+        If the campaign is too large to be run.
+    """
+    layout, asked = _plan(campaign, url)
+    first = (0, next(rounds(campaign.replication)))
+    found = [_cells(url, t, mask, mask, first, retry_failed=False) for t, mask in zip(layout, asked, strict=True)]
+    return _begin_round(Progress(), found)
+
+
+def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDArray[np.bool_]]]:
+    """Lay out a campaign together with what is stored of it; say which cases it asks for."""
+    if not store.exists(url):
+        layout = templates(campaign, campaign.replication.at_least)
+        return layout, [np.ones(template.shape[:-1], dtype=bool) for template in layout]
+    stored = store.reconcile(url, campaign)
+    layout = templates(stored.campaign, max(campaign.replication.at_least, stored.realisations), stored.chunks)
+    asked = [stored.asked.get(t.series.name, np.ones(t.shape[:-1], dtype=bool)) for t in layout]
+    return layout, asked
 
 
 _Execute = Callable[[Iterable[Work], Callable[[Outcome], None]], None]
 
 
 def _run_rounds(
-    url: str, layout: tuple[Template, ...], execute: _Execute, report: Callable[[Progress], None], retry_failed: bool
+    url: str,
+    layout: tuple[Template, ...],
+    asked: list[NDArray[np.bool_]],
+    execute: _Execute,
+    report: Callable[[Progress], None],
+    retry_failed: bool,
 ) -> Progress:
     """Run round after round, each over the cases that the one before left too uncertain."""
     campaign = layout[0].campaign
     start = time.monotonic()
     progress = Progress()
-    needed = [np.ones(template.shape[:-1], dtype=bool) for template in layout]
+    needed = asked
     before = 0
 
     def account(outcome: Outcome) -> None:
@@ -153,7 +183,10 @@ def _run_rounds(
                 break
             layout = _grow(layout, count)
         store.lay_out(url, layout)
-        found = [_cells(url, t, mask, (before, count), retry_failed) for t, mask in zip(layout, needed, strict=True)]
+        found = [
+            _cells(url, template, asked_here, needed_here, (before, count), retry_failed)
+            for template, asked_here, needed_here in zip(layout, asked, needed, strict=True)
+        ]
         progress = _begin_round(progress, found)
         report(progress)
         execute(_work(url, layout, found), account)
@@ -170,7 +203,7 @@ def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ..
 def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
     until = template.campaign.replication.until
     values = {name: store.values(url, template.series.name, name)[..., :count] for name in until}
-    return needs_more(values, store.ledger(url, template.series.name)[..., :count], until)
+    return needs_more(values, store.ledger(url, template.series.name, template.shape)[..., :count], until)
 
 
 @dataclass(frozen=True)
@@ -178,46 +211,51 @@ class _Cells:
     """Which results of a group a round has to compute, and which only need a word in the ledger."""
 
     wanted: NDArray[np.bool_]
-    unsettled: NDArray[np.bool_]
+    spared: NDArray[np.bool_]
     kept: int
 
 
 def _cells(
-    url: str, template: Template, needed: NDArray[np.bool_], realisations: tuple[int, int], retry_failed: bool
+    url: str,
+    template: Template,
+    asked: NDArray[np.bool_],
+    needed: NDArray[np.bool_],
+    realisations: tuple[int, int],
+    retry_failed: bool,
 ) -> _Cells:
-    status = store.ledger(url, template.series.name)
+    status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
     if retry_failed:
         open_states += [Status.FAILED, Status.NOT_CONVERGED]
     in_round = np.zeros(status.shape, dtype=bool)
-    in_round[..., slice(*realisations)] = True
+    in_round[..., slice(*realisations)] = asked[..., None]
     wanted = in_round & needed[..., None] & np.isin(status, open_states)
-    unsettled = in_round & ~wanted & (status == Status.MISSING)
-    return _Cells(wanted, unsettled, int(np.count_nonzero(in_round & ~wanted & ~unsettled)))
+    spared = in_round & ~wanted & (status == Status.MISSING)
+    return _Cells(wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
 
 
 def _begin_round(progress: Progress, found: list[_Cells]) -> Progress:
     kept = sum(cells.kept for cells in found)
-    new = sum(int(np.count_nonzero(cells.wanted) + np.count_nonzero(cells.unsettled)) for cells in found)
+    new = sum(int(np.count_nonzero(cells.wanted) + np.count_nonzero(cells.spared)) for cells in found)
     return replace(progress, total=progress.total + kept + new, kept=progress.kept + kept)
 
 
 def _work(url: str, layout: tuple[Template, ...], found: list[_Cells]) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
+    laid_out = uuid.uuid4().hex
     for template, cells in zip(layout, found, strict=True):
         attempts = store.attempts(url, template.series.name)
         for index in template.block_indices():
             region = template.region(index)
-            wanted = cells.wanted[region]
-            if wanted.any() or cells.unsettled[region].any():
+            wanted, spared = cells.wanted[region], cells.spared[region]
+            if wanted.any() or spared.any():
                 yield Work(
-                    url=url,
+                    place=Place(url, template.series.name, index, region, laid_out),
                     model=template.campaign.model,
-                    series=template.series.name,
-                    index=index,
-                    region=region,
+                    versions=versions(template.campaign.model),
                     block=template.block(index),
-                    wanted=None if wanted.all() else wanted,
+                    wanted=wanted,
+                    spared=spared,
                     attempt=attempts.get(index, 0) + 1,
                 )
 
@@ -254,7 +292,10 @@ def _cores() -> int:
 
 
 def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], threads: int) -> None:
-    """Run on Dask's threaded scheduler: no server, no sockets; a window of blocks is a graph."""
+    """Run on Dask's threaded scheduler: no server, no sockets; a window of blocks is a graph.
+
+    However it ends, the blocks that have begun are finished first, for the store is still ours.
+    """
     import dask
     from dask.callbacks import Callback
 
@@ -264,11 +305,9 @@ def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], thre
 
     task = dask.delayed(run_block, pure=False, traverse=False)
     remaining = iter(works)
-    with Callback(posttask=finished):
+    with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
         while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
-            dask.compute(
-                [task(work) for work in window], scheduler="threads", num_workers=threads, optimize_graph=False
-            )
+            dask.compute([task(work) for work in window], scheduler="threads", pool=pool, optimize_graph=False)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from mdr_dask.store.files import attributes, read_json
+from mdr_dask.store.files import bytes_of, series_names
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
@@ -29,19 +29,11 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     StoreError
         If there is no study of mdr_dask at `url`.
     """
-    root = attributes(url)
-    names = [""] if "axes" in root else _series_names(url)
-    return {name: _open_sorted(url, name) for name in names}
-
-
-def _series_names(url: str) -> list[str]:
-    metadata = read_json(url, "zarr.json") or {}
-    members = metadata["consolidated_metadata"]["metadata"]
-    return [name for name, member in members.items() if member["node_type"] == "group"]
+    return {name: _open_sorted(url, name) for name in series_names(url)}
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
-    dataset: xr.Dataset = xr.open_zarr(url, group=series or None, chunks=None, consolidated=True)
+    dataset: xr.Dataset = xr.open_zarr(bytes_of(url), group=series or None, chunks=None, consolidated=True)
     for dim in dataset.dims:
         if (
             dim in dataset.indexes
