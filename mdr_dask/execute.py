@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 import time
 import uuid
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import store
 from mdr_dask.campaign import Campaign
+from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
 
 #: Blocks handed to the threads at a time: the graph never grows with the study.
 THREAD_WINDOW = 64
+#: Run in every worker process: Ctrl-C reaches them too, and it is for the driver to end them.
+IGNORE_INTERRUPTS = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+#: Seconds that a scheduler is given to answer.
+SCHEDULER_PATIENCE = 10
 
 
 @dataclass(frozen=True)
@@ -312,26 +318,47 @@ def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], thre
 
 @contextmanager
 def _client(resources: Resources) -> Iterator[Client]:
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
     if resources.scheduler is not None:
-        with Client(resources.scheduler, set_as_default=False) as client:
+        with _connected(resources.scheduler) as client:
             yield client
         return
-    if resources.cluster is not None:
-        package, _, name = resources.cluster["class"].rpartition(".")
-        cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
-        cluster.scale(**resources.cluster.get("scale", {}))
-    else:
-        cluster = LocalCluster(
+    with _cluster(resources) as cluster, Client(cluster, set_as_default=False) as client:
+        yield client
+
+
+def _connected(address: str) -> Client:
+    from distributed import Client
+    from distributed.comm import get_address_host_port
+
+    try:
+        get_address_host_port(address)
+        return Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no Dask scheduler answers at {address!r}: {str(error) or type(error).__name__}") from None
+
+
+def _cluster(resources: Resources) -> Any:
+    from distributed import LocalCluster
+
+    if resources.cluster is None:
+        return LocalCluster(
             n_workers=resources.workers,
             threads_per_worker=1,
             dashboard_address=None,
             scheduler_port=0,
             protocol="tcp://",
+            silence_logs=logging.CRITICAL,
+            preload=[IGNORE_INTERRUPTS],
         )
-    with cluster, Client(cluster, set_as_default=False) as client:
-        yield client
+    package, _, name = resources.cluster["class"].rpartition(".")
+    try:
+        cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
+        cluster.scale(**resources.cluster.get("scale", {}))
+    except (ImportError, AttributeError, TypeError, ValueError, OSError) as error:
+        raise ClusterError(f"cannot start {resources.cluster['class']!r}: {type(error).__name__}: {error}") from None
+    return cluster
 
 
 def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[Outcome], None]) -> None:
@@ -355,7 +382,7 @@ def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[O
     for future in queue:
         work = running.pop(future)
         try:
-            account(future.result())
+            account(_outcome(future))
         except KilledWorker:
             suspects.append(work)
         future.release()
@@ -364,15 +391,31 @@ def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[O
         _run_suspect(client, work, account)
 
 
-def _run_suspect(client: Client, work: Work, account: Callable[[Outcome], None]) -> None:
-    """Run one block with nothing else on the cluster; if it kills its workers again, it is written down as failed."""
-    from distributed import KilledWorker
+def _outcome(future: Future) -> Outcome:
+    """Return what a task sent home; a scheduler that went away is no fault of the task."""
+    from concurrent.futures import CancelledError
 
     try:
-        account(client.submit(run_block, work, pure=False).result())
-    except KilledWorker as error:
-        account(
-            write_off(
-                work, f"its worker died again and again ({error.allowed_failures} times), memory is the usual cause"
-            )
-        )
+        outcome: Outcome = future.result()
+    except (CancelledError, ModuleNotFoundError) as error:
+        what = "the scheduler went away" if isinstance(error, CancelledError) else f"a worker lacks {error.name!r}"
+        raise ClusterError(f"{what}; what is in the store is kept: run the campaign again") from None
+    return outcome
+
+
+def _run_suspect(client: Client, suspect: Work, account: Callable[[Outcome], None]) -> None:
+    """Run a block with nothing else on the cluster, by halves if it kills its workers, down to the result to blame."""
+    from distributed import KilledWorker
+
+    pieces = [suspect]
+    attempts = itertools.count(suspect.attempt)
+    while pieces:
+        work = replace(pieces.pop(), attempt=next(attempts))
+        try:
+            account(_outcome(client.submit(run_block, work, pure=False)))
+        except KilledWorker as error:
+            halves = work.halves()
+            pieces += reversed(halves)
+            if not halves:
+                died = f"its worker died again and again ({error.allowed_failures + 1} times)"
+                account(write_off(work, f"{died}, memory is the usual cause"))
