@@ -355,7 +355,8 @@ def _cluster(resources: Resources) -> Any:
     package, _, name = resources.cluster["class"].rpartition(".")
     try:
         cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
-        cluster.scale(**resources.cluster.get("scale", {}))
+        if "scale" in resources.cluster:
+            cluster.scale(**resources.cluster["scale"])
     except (ImportError, AttributeError, TypeError, ValueError, OSError) as error:
         raise ClusterError(f"cannot start {resources.cluster['class']!r}: {type(error).__name__}: {error}") from None
     return cluster

@@ -71,6 +71,17 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
         sync(bytes_of(url).set(name, default_buffer_prototype().buffer.from_bytes(content)))
 
 
+def clear(url: str) -> None:
+    """Remove what a run left that took the place and got no further."""
+
+    async def remove() -> None:
+        for name in [name async for name in bytes_of(url).list_dir("") if name != "zarr.json"]:
+            await bytes_of(url).delete_dir(name)
+
+    with guarded(url, "clearing it"):
+        sync(remove())
+
+
 def names(url: str, prefix: str) -> list[str]:
     """Return the names of all JSON documents below a prefix, in order."""
 
@@ -97,10 +108,10 @@ def exists(url: str) -> bool:
         others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial")
         if others:
             raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
-    return metadata is not None and not _only_claimed(metadata["attributes"])
+    return metadata is not None and not only_claimed(metadata["attributes"])
 
 
-def _only_claimed(found: Mapping[str, Any]) -> bool:
+def only_claimed(found: Mapping[str, Any]) -> bool:
     """Say whether a run took the place and was stopped before its arrays were laid out."""
     return list(found) == ["mdr_dask_layout"]
 
@@ -121,7 +132,7 @@ def attributes(url: str) -> dict[str, Any]:
         raise StoreError(f"{url}: a Zarr group, but not one that mdr_dask made")
     if found["mdr_dask_layout"] > LAYOUT:
         raise StoreError(f"{url}: made by a newer mdr_dask (layout {found['mdr_dask_layout']}, known: {LAYOUT})")
-    if _only_claimed(found):
+    if only_claimed(found):
         raise StoreError(f"{url}: still empty, its first run has not come far enough; run the campaign")
     return found
 

@@ -61,7 +61,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     held = {name: found for name, found in groups.items() if found is not None}
     differences = _study_differences(url, campaign)
     for series in campaign.series:
-        found = _series_differences(series, held[series.name]) if series.name in held else []
+        found = _series_differences(series, held[series.name], campaign.outputs) if series.name in held else []
         differences += [f"{series.name}.{line}" if series.name else line for line in found]
     if differences:
         lines = "\n  ".join(dict.fromkeys(differences))
@@ -107,7 +107,7 @@ def _difference(what: str, stored: Any, now: Any) -> str:
     return f"{what}: {stored!r} in the store, {now!r} in the campaign"
 
 
-def _series_differences(series: Series, held: Mapping[str, Any]) -> list[str]:
+def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[str, ...]) -> list[str]:
     axes = {axis.path: axis for axis in series.axes}
     held_axes = {axis["path"]: axis for axis in held["axes"]}
     found = []
@@ -118,6 +118,9 @@ def _series_differences(series: Series, held: Mapping[str, Any]) -> list[str]:
         for path in axes.keys() & held_axes.keys()
         if axes[path].labels is not None and held_axes[path]["labels"] is None
     ]
+    lacking = [name for name in outputs if name not in held["outputs"]]
+    if lacking:
+        found.append(f"outputs: the store lacks {', '.join(lacking)}, for which every case would be computed again")
     before = _leaves(json.loads(held["parameters"]), "")
     now = _leaves(series.parameters.model_dump(mode="json"), "")
     fixed = [

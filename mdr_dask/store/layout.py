@@ -20,7 +20,7 @@ from mdr_dask import __version__, models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import DataFile, Status, unit_of
 from mdr_dask.plan import Template
-from mdr_dask.store.files import LAYOUT, read_json, write_bytes
+from mdr_dask.store.files import LAYOUT, clear, only_claimed, read_json, write_bytes
 
 _COORDINATE_CHUNK = 4096
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
@@ -49,6 +49,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     held = read_json(url, "zarr.json")
     if held is None:
         write_bytes(url, "zarr.json", _group_document({}, {"mdr_dask_layout": LAYOUT}))
+    elif only_claimed(held["attributes"]):
+        clear(url)
     members: dict[str, Any] = held["consolidated_metadata"]["metadata"] if held else {}
     study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
     groups: dict[str, bytes] = {}
