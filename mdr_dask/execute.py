@@ -357,7 +357,7 @@ def _cluster(resources: Resources) -> Any:
         cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
         if "scale" in resources.cluster:
             cluster.scale(**resources.cluster["scale"])
-    except (ImportError, AttributeError, TypeError, ValueError, OSError) as error:
+    except (ImportError, AttributeError, TypeError, ValueError, OSError, RuntimeError) as error:
         raise ClusterError(f"cannot start {resources.cluster['class']!r}: {type(error).__name__}: {error}") from None
     return cluster
 

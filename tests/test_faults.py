@@ -47,9 +47,7 @@ def disk(monkeypatch):
 
 
 def small(toy, **options):
-    return replace(
-        toy.campaign(toy.axis("position", [1.0, 4.0]), **options), blocks={"realisation": 4, "position": 1}
-    )
+    return replace(toy.campaign(toy.axis("position", [1.0, 4.0]), **options), blocks={"realisation": 4, "position": 1})
 
 
 def grown(toy, **options):
@@ -78,7 +76,7 @@ def adaptive(toy):
 SCENES = {
     "first layout and blocks": lambda toy: [small(toy)],
     "growth of axes and realisations": lambda toy: [small(toy), grown(toy)],
-        "growth of series": lambda toy: [two_series(small(toy)), two_series(small(toy), (1.0, 1.5, 2.0))],
+    "growth of series": lambda toy: [two_series(small(toy)), two_series(small(toy), (1.0, 1.5, 2.0))],
     "two outputs": lambda toy: [small(toy, outputs=("height", "trace"))],
     "rounds": lambda toy: [adaptive(toy)],
     "retry": lambda toy: [small(toy, fail_above=2.0), small(toy, fail_above=2.0)],

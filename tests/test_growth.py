@@ -92,7 +92,9 @@ def test_fewer_outputs_go_on_with_the_stored_ones_and_more_are_refused(toy, url)
     assert run(fewer, url).done == 6
     assert np.isfinite(values(url, "trace")).all()
     run(fewer, url + "2")
-    with pytest.raises(StoreError, match=r"outputs: the store lacks trace, for which every case would be computed again"):
+    with pytest.raises(
+        StoreError, match=r"outputs: the store lacks trace, for which every case would be computed again"
+    ):
         run(both, url + "2")
 
 
@@ -266,7 +268,9 @@ class StoreAgainstDict(RuleBasedStateMachine):
             return
         dataset = store.datasets(self.url)[""].load()
         height, status = dataset.height.to_numpy(), dataset.status.to_numpy()
-        for (i, position), (j, noise) in ((p, n) for p in enumerate(dataset.position.to_numpy()) for n in enumerate(dataset.noise.to_numpy())):
+        for (i, position), (j, noise) in (
+            (p, n) for p in enumerate(dataset.position.to_numpy()) for n in enumerate(dataset.noise.to_numpy())
+        ):
             for r in range(dataset.sizes["realisation"]):
                 cell = (float(position), float(noise), r)
                 state = status[i, j, r]

@@ -124,6 +124,9 @@ def attributes(url: str) -> dict[str, Any]:
     StoreError
         If there is no study of mdr_dask at `url`, or one with a newer layout.
     """
+    path = local(url)
+    if path is not None and path.is_file():
+        raise StoreError(f"{url}: a file, expected the folder of a store; 'mdr-dask run {url}' runs a campaign")
     metadata = read_json(url, "zarr.json")
     if metadata is None:
         raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")
