@@ -5,7 +5,8 @@ Hertz units as in :mod:`mdr_dask.physics.deformation`. The film obeys (thesis eq
     d/dX( rho H^3/eta dP/dX ) = K d(rho H)/dX,   K = (3 pi^2/4) U/W^2,
 
 in finite volumes around the nodes; cavitation is the complementarity ``P >= 0``, ``R <= 0``, ``P R = 0`` of pressure
-and balance R; the load ``int P dX = pi/2`` is the last equation. Unknowns: the nodal pressures and the film at ``X = 0``.
+and balance R; the load ``int P dX = pi/2`` is the last equation. Unknowns are the nodal pressures and the film at
+``X = 0``.
 """
 
 from __future__ import annotations
@@ -52,12 +53,21 @@ class Liquid(NamedTuple):
 
 @njit(nogil=True, cache=True)
 def log_viscosity(P: float, liquid: Liquid) -> tuple[float, float]:
-    """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative by Barus, or Roelands if it has an exponent."""
+    """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
     ratio = 1.0 + P / liquid.pole
     power = ratio ** (liquid.exponent - 1.0)
     return liquid.alpha * liquid.pole / liquid.exponent * (power * ratio - 1.0), liquid.alpha * power
+
+
+@njit(nogil=True, cache=True)
+def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
+    """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
+    result = np.empty_like(pressure)
+    for i in range(pressure.size):
+        result[i] = log_viscosity(pressure[i], liquid)[0]
+    return result
 
 
 @njit(nogil=True, cache=True)

@@ -132,8 +132,8 @@ def line_contact(
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
 
-class _State(NamedTuple):
-    """A converged pressure and film on one grid."""
+class GridSolution(NamedTuple):
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, and the steps taken."""
 
     nodes: FloatArray
     pressure: FloatArray
@@ -154,10 +154,8 @@ class LineSolution:
         CONVERGED (0), or what stopped the iteration on the grid that failed.
     reason : str
         One sentence if it failed or missed the accuracy, else empty.
-    nodes, pressure, film : array, shape (n,)
-        Solution on the finest grid; empty if it failed.
-    grid_central_film : float
-        Film at ``X = 0`` on the finest grid, not extrapolated.
+    fine, coarse : GridSolution
+        On the finest grid and on the one before, of double spacing; empty if it failed.
     central_film, minimum_film : float
         In ``a^2/R``, extrapolated over the grids to second order.
     minimum_position : float
@@ -179,10 +177,8 @@ class LineSolution:
     case: LineContact
     status: int
     reason: str
-    nodes: FloatArray
-    pressure: FloatArray
-    film: FloatArray
-    grid_central_film: float
+    fine: GridSolution
+    coarse: GridSolution
     central_film: float
     minimum_film: float
     minimum_position: float
@@ -194,9 +190,24 @@ class LineSolution:
     rupture_position: float
     steps: int
 
+    @property
+    def nodes(self) -> FloatArray:
+        """Nodes of the finest grid in half widths, shape (n,)."""
+        return self.fine.nodes
+
+    @property
+    def pressure(self) -> FloatArray:
+        """Pressure there in p0, shape (n,)."""
+        return self.fine.pressure
+
+    @property
+    def film(self) -> FloatArray:
+        """Film there in ``a^2/R``, shape (n,)."""
+        return self.fine.film
+
     def film_at(self, positions: FloatArray) -> FloatArray:
         """Return the film at any positions in half widths, from the deformation by the pressure found."""
-        return film_at(np.asarray(positions, dtype=np.float64), self.nodes, self.pressure, self.grid_central_film)
+        return film_at(np.asarray(positions, dtype=np.float64), self.nodes, self.pressure, self.fine.central)
 
     def pressure_at(self, positions: FloatArray) -> FloatArray:
         """Return the pressure in p0 at any positions in half widths; zero outside the film."""
@@ -211,14 +222,14 @@ def expected_film(M: float, L: float) -> float:
 
 def _solve_on(
     case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, paces: tuple[tuple[float, int], ...]
-) -> tuple[int, _State]:
+) -> tuple[int, GridSolution]:
     """Solve on one grid from a guess of the pressure at its nodes, at the first pace that converges."""
     width = np.diff(nodes)
     weights = np.zeros_like(nodes)
     weights[:-1] += width / 2
     weights[1:] += width / 2
     matrix = influence_matrix(nodes, nodes)
-    status, total, state = TOO_MANY_STEPS, 0, _State(nodes, pressure, pressure, central, 0)
+    status, total, state = TOO_MANY_STEPS, 0, GridSolution(nodes, pressure, pressure, central, 0)
     for clip, most in paces:
         trial = pressure.copy()
         trial[0] = trial[-1] = 0.0
@@ -228,7 +239,7 @@ def _solve_on(
             nodes, matrix, weights, case.liquid, case.film_number, trial, central + lift, clip, _TOLERANCE, most
         )
         total += steps
-        state = _State(nodes, trial, film, found, total)
+        state = GridSolution(nodes, trial, film, found, total)
         if status == CONVERGED:
             break
     return status, state
@@ -241,7 +252,7 @@ def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
     return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
-def _first_solution(case: LineContact) -> tuple[int, _State]:
+def _first_solution(case: LineContact) -> tuple[int, GridSolution]:
     """Return the solution on a first grid, by the first of the known ways that leads there."""
     for factor, clip, count in _ATTEMPTS:
         guess = factor * expected_film(case.M, case.L)
@@ -253,7 +264,7 @@ def _first_solution(case: LineContact) -> tuple[int, _State]:
     return status, state
 
 
-def _refine(case: LineContact, state: _State, source: _State, count: int) -> tuple[int, _State]:
+def _refine(case: LineContact, state: GridSolution, source: GridSolution, count: int) -> tuple[int, GridSolution]:
     """Solve on `count` nodes placed as the solution `source` asks for, starting from `state`."""
     density = ehl_grid.adapted_density(source.nodes, source.pressure, source.film, source.central)
     nodes = ehl_grid.sample(source.nodes, density, count)
@@ -261,7 +272,7 @@ def _refine(case: LineContact, state: _State, source: _State, count: int) -> tup
     return _solve_on(case, nodes, guess, state.central, _PACES)
 
 
-def _minimum(state: _State) -> tuple[float, float]:
+def _minimum(state: GridSolution) -> tuple[float, float]:
     """Return position and height of the lowest film: the vertex of the parabola through the lowest three nodes."""
     i = int(np.clip(np.argmin(state.film), 1, state.film.size - 2))
     x, h = state.nodes[i - 1 : i + 2], state.film[i - 1 : i + 2]
@@ -274,7 +285,7 @@ def _minimum(state: _State) -> tuple[float, float]:
     return float(x[1] + offset), float(h[1] + 0.5 * slope * offset)
 
 
-def _spike(state: _State) -> tuple[float, float]:
+def _spike(state: GridSolution) -> tuple[float, float]:
     """Return position and height of a second pressure maximum behind the first, NaN twice if there is none."""
     P = state.pressure
     peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
@@ -286,7 +297,7 @@ def _spike(state: _State) -> tuple[float, float]:
     return float(state.nodes[last]), float(P[last])
 
 
-def _rupture(state: _State) -> float:
+def _rupture(state: GridSolution) -> float:
     """Return where the film ends, from the pressure's last two positive values: it goes out like a square."""
     last = int(np.flatnonzero(state.pressure)[-1])
     (x1, x2), (P1, P2) = state.nodes[last - 1 : last + 1], state.pressure[last - 1 : last + 1]
@@ -315,11 +326,10 @@ def extrapolate(values: FloatArray) -> tuple[float, float]:
 
 
 def _failed(case: LineContact, status: int, steps: int, nodes: int) -> LineSolution:
-    nan, empty = float("nan"), np.empty(0)
+    nan = float("nan")
+    none = GridSolution(np.empty(0), np.empty(0), np.empty(0), nan, 0)
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {_WHY[status]} on {nodes} nodes"
-    return LineSolution(
-        case, status, reason, empty, empty, empty, nan, nan, nan, nan, nan, nan, nan, nan, nan, nan, steps
-    )
+    return LineSolution(case, status, reason, none, none, nan, nan, nan, nan, nan, nan, nan, nan, nan, steps)
 
 
 def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
@@ -357,7 +367,7 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
             break
         if status != CONVERGED:
             continue  # too coarse for this film
-        state = finer
+        coarser, state = state, finer
         films.append((state.central, _minimum(state)[1]))
         if len(films) > 2:
             limits = [extrapolate(np.array(column)) for column in zip(*films, strict=True)]
@@ -366,11 +376,17 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
                 break
     if not np.isfinite(error):
         return _failed(case, status, steps, count)
-    return _solution(case, state, np.array(films), error, accuracy, steps)
+    return _solution(case, state, coarser, np.array(films), error, accuracy, steps)
 
 
 def _solution(
-    case: LineContact, state: _State, films: FloatArray, error: float, accuracy: float, steps: int
+    case: LineContact,
+    state: GridSolution,
+    coarser: GridSolution,
+    films: FloatArray,
+    error: float,
+    accuracy: float,
+    steps: int,
 ) -> LineSolution:
     """Put together what the grids gave."""
     central, minimum = (extrapolate(column)[0] for column in films.T)
@@ -388,10 +404,8 @@ def _solution(
         case=case,
         status=CONVERGED,
         reason=reason,
-        nodes=state.nodes,
-        pressure=state.pressure,
-        film=state.film,
-        grid_central_film=state.central,
+        fine=state,
+        coarse=coarser,
         central_film=central,
         minimum_film=minimum,
         minimum_position=position,
