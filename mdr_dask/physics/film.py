@@ -7,6 +7,7 @@ Conventions (physics of thesis section 5.2.1 and appendix B): ``E* = E'/2`` with
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -67,6 +68,48 @@ def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> He
     load = np.asarray(line_load, dtype=np.float64)
     half_width = np.sqrt(4 * load * np.asarray(radius) / (np.pi * np.asarray(E_star)))
     return HertzLine(half_width, 2 * load / (np.pi * half_width))
+
+
+def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
+    """Return the gap in m between the bodies of a dry line contact at places x (m) from its middle, 0 inside."""
+    ratio = np.maximum(1.0, np.abs(np.asarray(x, dtype=np.float64)) / half_width)
+    root = np.sqrt(ratio**2 - 1)
+    return np.asarray(half_width**2 / (2 * radius) * (ratio * root - np.log(ratio + root)))
+
+
+def fluid_friction(
+    contact: HertzLine,
+    film: float,
+    sliding_velocity: float,
+    viscosity: Callable[[FloatArray], FloatArray],
+    eyring_stress: float,
+) -> float:
+    """Return the coefficient of friction of a uniform film under the Hertzian pressure.
+
+    Parameters
+    ----------
+    contact : HertzLine
+        Half width in m and highest pressure in Pa.
+    film : float
+        Film thickness in m.
+    sliding_velocity : float
+        Difference of the two surface velocities in m/s.
+    viscosity : callable
+        Viscosity in Pa s at pressures in Pa.
+    eyring_stress : float
+        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; infinite for a Newtonian liquid.
+
+    Returns
+    -------
+    float
+        Mean shear stress over mean pressure, by 64 Gauss points in the angle ``x = a sin(angle)``; rolling friction
+        is left out.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    cosine = np.cos(np.pi / 2 * nodes)
+    newtonian = viscosity(contact.pressure * cosine) * abs(sliding_velocity) / film
+    stress = newtonian if np.isinf(eyring_stress) else eyring_stress * np.arcsinh(newtonian / eyring_stress)
+    return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
 class Groups(NamedTuple):
@@ -157,6 +200,14 @@ _DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0
 PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, *_PAN_HAMROCK_RANGE)
 PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, *_PAN_HAMROCK_RANGE)
 DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
+
+
+#: The formulas by the name that a campaign gives them.
+FORMULAS: dict[str, FilmFormula] = {
+    "pan_hamrock": PAN_HAMROCK_CENTRAL,
+    "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
+    "dowson_higginson": DOWSON_HIGGINSON_MINIMUM,
+}
 
 
 class Moes(NamedTuple):

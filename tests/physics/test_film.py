@@ -128,3 +128,26 @@ def test_arrays_broadcast():
     films = film.limiting_films(np.array([1e-5, 1e-4])[:, None], np.array([1e-12, 1e-11, 1e-10]), 5000.0)
     assert films.shape == (4, 2, 3)
     assert film.regime(np.array([1e-5, 1e-4]), 1e-11, 5000.0).shape == (2,)
+
+
+def test_gap_beside_a_dry_contact_starts_at_zero_and_ends_at_the_parabola():
+    gap = film.hertz_gap(np.array([0.0, 1e-4, 1e-1]), 1e-4, 0.025)
+    assert gap[:2].tolist() == [0.0, 0.0]
+    # far away: x^2/2R less the approach of the bodies, which grows as the logarithm of x/a
+    assert gap[2] == pytest.approx(0.1**2 / 0.05, rel=1e-4)
+
+
+def test_friction_of_an_isoviscous_newtonian_film_is_shear_times_width():
+    contact = film.hertz_line(8e4, 115e9, 0.025)
+    found = film.fluid_friction(contact, 1e-6, -0.3, lambda p: 0.1 + 0 * p, np.inf)
+    assert found == pytest.approx(0.1 * 0.3 / 1e-6 * 2 * contact.half_width / 8e4, rel=1e-12)
+
+
+def test_eyring_friction_is_newtonian_for_slow_shear_and_smaller_for_fast():
+    contact = film.hertz_line(8e4, 115e9, 0.025)
+    slow, fast = (
+        [film.fluid_friction(contact, 1e-6, v, lambda p: 0.1 * np.exp(1e-8 * p), stress) for stress in (5e6, np.inf)]
+        for v in (1e-3, 10.0)
+    )
+    assert slow[0] == pytest.approx(slow[1], rel=1e-6)
+    assert fast[0] < 0.9 * fast[1]
