@@ -21,6 +21,7 @@ IntArray = NDArray[np.intp]
 ACCURACY = 0.01  # where the campaign does not say
 FINEST = 64  # oversampling beyond which `auto` gives up
 SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
+CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
@@ -151,35 +152,40 @@ class _Task:
             return height, slope
         return np.append(height, height[0]), np.append(slope, slope[0])
 
-    def solve(self, height: FloatArray, slope: FloatArray, scheme: Scheme) -> Steady:
-        """Solve the cases on a grid."""
+    def solve(
+        self, nodes: tuple[FloatArray, FloatArray], scheme: Scheme, near: Steady | None = None, close: float = 0.0
+    ) -> Steady:
+        """Solve the cases on a grid, beginning near a solution on another one."""
         from mdr_dask.physics import sliding
 
-        cases = (self.reaches, self.loads, scheme, self.contact)
-        if self.line.coefficient == 0:
+        height, slope = nodes
+        guesses = None if near is None else near.depth
+        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
+        coefficient, exponent = self.line.coefficient, self.line.exponent
+        if coefficient == 0:
             return sliding.steady_sliding(height, slope, *cases)
-        return sliding.steady_indenter(height, slope, self.line.coefficient, self.line.exponent, *cases)
+        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
 
     def on_grid(self, oversampling: int) -> Steady:
         """Solve the cases on one grid, without an estimate of the error."""
-        return self.solve(*self.nodes(oversampling), self.scheme)
+        return self.solve(self.nodes(oversampling), self.scheme)
 
-    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
+    def with_error(self, oversampling: int, near: Steady | None = None) -> tuple[Steady, FloatArray]:
         """Solve the cases on one grid and estimate the relative error of their friction.
 
         The exact sweep on a fine grid is compared with the two grids that hold every other node: two, because one may
         agree by accident. Anything else is compared with the exact sweep on a grid twice as fine.
         """
-        height, slope = self.nodes(oversampling)
-        steady = self.solve(height, slope, self.scheme)
+        nodes = self.nodes(oversampling)
+        steady = self.solve(nodes, self.scheme, near)
         if self.scheme != "hermite" or oversampling % 2 or self.line.points * oversampling < 32:
-            finer = self.solve(*self.nodes(2 * oversampling), "hermite")
+            finer = self.solve(self.nodes(2 * oversampling), "hermite")
             return steady, SAFETY_FINER * _difference(steady, finer)
-        even = _difference(self.solve(height[::2], slope[::2], self.scheme), steady)
+        even, odd = ((nodes[0][first::2], nodes[1][first::2]) for first in (0, 1))
+        error = _difference(self.solve(even, self.scheme, steady, CLOSE), steady)
         if self.line.coefficient:
-            return steady, SAFETY_EVEN * even
-        odd = _difference(self.solve(height[1::2], slope[1::2], self.scheme), steady)
-        return steady, SAFETY_BOTH * np.maximum(even, odd)
+            return steady, SAFETY_EVEN * error
+        return steady, SAFETY_BOTH * np.maximum(error, _difference(self.solve(odd, self.scheme, steady, CLOSE), steady))
 
     def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
@@ -190,15 +196,17 @@ class _Task:
             if not np.any(wanting):
                 break
             oversampling *= 2
-            finer, error[wanting] = self.only(wanting).with_error(oversampling)
+            finer, error[wanting] = self.only(wanting).with_error(oversampling, steady.only(wanting))
             steady = steady.replaced(wanting, finer)
         return steady, error
 
 
 def _difference(one: Steady, other: Steady) -> FloatArray:
     with np.errstate(all="ignore"):
-        change: FloatArray = np.abs(one.drag / other.drag - 1)
-    return change
+        change = np.abs(one.drag / other.drag - 1)
+    # where a coarse grid has no solution nothing is known
+    unknown: FloatArray = np.where(np.isnan(change) & (other.status == 0), np.inf, change)
+    return unknown
 
 
 def _canonical(number: FloatArray) -> FloatArray:
