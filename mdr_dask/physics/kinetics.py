@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mdr_dask.physics.kinetics_kernels import (
+    BLOCK,
     DRAG,
     LENGTH,
     LOAD,
@@ -17,6 +18,7 @@ from mdr_dask.physics.kinetics_kernels import (
     Course,
     Patches,
     Profile,
+    block_least,
     height_at,
     march,
     released,
@@ -80,7 +82,11 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
     height, slope = height[index], slope[index]
     enter, leave, rise = slope[:-1] / n, slope[1:] / n, np.diff(height)
     area = 0.5 * (height[1:] + height[:-1]) + (enter - leave) / 12
-    square = (36 * rise**2 - 6 * rise * (enter + leave) + 4 * (enter**2 + leave**2) - 2 * enter * leave) / 30
+    squared = enter**2
+    bend = (np.roll(slope[:-2], -1) ** 2 - np.roll(slope[:-2], 1) ** 2) / (24 * n**2)
+    bend = np.append(bend, [bend[0], bend[1]])
+    # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
+    square = 0.5 * (squared + leave**2) + bend[:-1] - bend[1:]
     return Profile(
         height,
         slope,
@@ -114,10 +120,12 @@ def _settle(
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
     start, end = np.empty(floor.size), np.empty(floor.size)
+    least = np.empty(floor.size // BLOCK)
+    block_least(profile, reach, least)
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, none, Course(moment, at, rate, 1), np.inf, reach, 0.0, start, end, sums)
+        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums)
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
@@ -297,8 +305,10 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
     start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(4)
+    least = np.empty(floor.size // BLOCK)
+    block_least(profile, reach, least)
     course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1)
-    found = max(touch(profile, runs, floor, none, course, np.inf, reach, 0.0, start, end, sums), 0)
+    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums), 0)
     pressed = np.empty(found)
     for k in range(found):
         pressed[k] = depth + height_at(profile, end[k])[0]

@@ -22,8 +22,12 @@ IntArray = NDArray[np.int64]
 
 CANDIDATES = 8
 BLOCK = 16
+WINDOW_CELLS = 64.0
+WINDOWS = 12
+TRIALS = 40
+CLOSE, ENOUGH = 1e-7, 1e-5  # of the load: where a last secant step follows, and where a depth counts as found
 ROOT_STEPS = 60
-GUARD_CELLS = 400.0
+GUARD_CELLS = 200.0
 LOAD, DRAG, LENGTH, STIFFNESS = range(4)
 
 
@@ -109,11 +113,10 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
 
 
 @njit(nogil=True, cache=True)
-def add_patch(profile: Profile, start: float, end: float, depth: float, rate: float, reach: float, sums: FloatArray) -> None:
-    """Add the forces of a patch in contact, f = d + p + d_dot + reach p', exactly over the cubic cells."""
+def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
+    """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly over the cubic cells."""
     h0, area0, square0 = integrals_at(profile, start)
     h1, area1, square1 = integrals_at(profile, end)
-    lift = depth + rate
     sums[LOAD] += lift * (end - start) + area1 - area0 + reach * (h1 - h0)
     sums[DRAG] += lift * (h1 - h0) + 0.5 * (h1 * h1 - h0 * h0) + reach * (square1 - square0)
     sums[LENGTH] += end - start
@@ -198,22 +201,6 @@ def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) 
 
 
 @njit(nogil=True, cache=True)
-def _was_pressed(profile: Profile, first: Patches, t: float, reach: float, x: float) -> bool:
-    """Return whether the element at x was in contact at the jump."""
-    s = x - reach * t
-    if profile.periodic:
-        s -= np.floor(s - profile.origin)
-    low, high = 0, first.count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if first.start[middle] <= s:
-            low = middle
-        else:
-            high = middle
-    return first.start[low] <= s <= first.end[low]
-
-
-@njit(nogil=True, cache=True)
 def _wake(
     profile: Profile,
     first: Patches,
@@ -266,33 +253,72 @@ def _meeting(
     course: Course,
     t: float,
     reach: float,
-    depth: float,
     low: float,
     high: float,
-    rising: bool,
+    x: float,
     places: FloatArray,
     count: int,
     oldest: float,
 ) -> tuple[float, float, float]:
-    """Return where profile and wake meet between low and high, the slope of their gap there, and how much has faded."""
-    x = high if rising else low
+    """Return where the profile rises through the wake between low and high, the slope of their gap there, and how much has faded."""
+    depth = course.depth[course.count - 1]
     slope, fade = 1.0, 0.0
     for _ in range(ROOT_STEPS):
+        if not low < x < high:
+            x = 0.5 * (low + high)
         u, u_slope, fade = _wake(profile, first, course, t, reach, x, places, count, oldest)
         h, h_slope, _ = height_at(profile, x)
         gap = depth + h - u
         slope = h_slope - u_slope
-        if (gap > 0) == rising:
+        if gap > 0:
             high = x
         else:
             low = x
-        step = x - gap / slope if (slope > 0) == rising and slope != 0 else 0.5 * (low + high)
-        if not low <= step <= high:
-            step = 0.5 * (low + high)
-        if abs(step - x) < 1e-11 * profile.cell:
-            return step, slope, fade
-        x = step
+        step = -gap / slope if slope > 0 else 2 * profile.cell
+        if abs(step) < 1e-6 * profile.cell or high - low < 1e-9 * profile.cell:
+            return min(max(x + step, low), high), slope, fade
+        x += step
     return x, slope, fade
+
+
+@njit(nogil=True, cache=True)
+def _losing(
+    profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float
+) -> float:
+    """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
+    while high - low > 1e-12 * profile.cell:
+        x = 0.5 * (low + high)
+        if not low < x < high:
+            break
+        if depth + height_at(profile, x)[0] > _before(profile, first, t, reach, x)[0]:
+            low = x
+        else:
+            high = x
+    return high
+
+
+@njit(nogil=True, cache=True)
+def _spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
+    """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
+    now = course.count - 1
+    lowest = highest = course.depth[now]
+    back = now
+    for k in range(spreads.size):
+        since = t - window / reach * 2.0**k
+        while back > 0 and course.time[back] > since:
+            back -= 1
+            lowest, highest = min(lowest, course.depth[back]), max(highest, course.depth[back])
+        spreads[k] = highest - lowest
+
+
+@njit(nogil=True, cache=True, inline="always")
+def _spread(spreads: FloatArray, window: float, distance: float) -> float:
+    """Return the range of the depth while the profile went a distance."""
+    k = 0
+    while k < spreads.size - 1 and distance > window:
+        distance *= 0.5
+        k += 1
+    return float(spreads[k])
 
 
 @njit(nogil=True, cache=True)
@@ -331,11 +357,11 @@ def touch(
     profile: Profile,
     runs: IntArray,
     floor: FloatArray,
+    least: FloatArray,
     first: Patches,
     course: Course,
     t: float,
     reach: float,
-    spread: float,
     start: FloatArray,
     end: FloatArray,
     sums: FloatArray,
@@ -347,16 +373,16 @@ def touch(
     profile : Profile
     runs : int array, shape (m, 2)
         First and last node of the stretches in which contact is possible.
-    floor : array, shape (n + 1,)
+    floor : array, shape of the profile
         Displacement that a free element has at least.
+    least : array
+        See :func:`block_least`.
     first : Patches
         State before the jump; ``count = 0`` for the steady state.
     course : Course
         Depth and rate, this moment included.
     t, reach : float
         Time since the jump, and v tau / L since then.
-    spread : float
-        Range of the depth so far: two places from which elements leave are compared later if they are closer than that.
     start, end : array
         Written: the patches.
     sums : array, shape (4,)
@@ -367,85 +393,98 @@ def touch(
     int
         Number of patches, or -1 if a patch does not end within its stretch or there are more than fit.
     """
-    now = course.count - 1
-    depth, rate = course.depth[now], course.rate[now]
-    lift = depth + rate
-    sums[:] = 0.0
-    edges = 0.0
-    places = np.empty(CANDIDATES)
-    known, found = 0, 0
-    oldest, last_start = -np.inf, 0.0
-    contact, begin, free_from = profile.periodic, profile.origin, 0.0
+    depth = course.depth[course.count - 1]
+    lift = depth + course.rate[course.count - 1]
     height, slope, cell = profile.height, profile.slope, profile.cell
-    guard = first.count > 0 and reach * t < GUARD_CELLS * cell
+    places, known, found, edges = np.empty(CANDIDATES), 0, 0, 0.0
+    oldest, last_start = -np.inf, -np.inf
+    contact, begin, free_from = profile.periodic, profile.origin, 0.0
     finish = 1.0 + profile.origin if profile.periodic else np.inf
+    guard = first.count > 0 and reach * t < GUARD_CELLS * cell
+    next_free = _next_free(profile, first, t, reach, begin) if guard and contact else np.inf
+    window, spreads = WINDOW_CELLS * cell, np.empty(WINDOWS)
+    _spreads(course, t, reach, window, spreads)
+    fade_of_cell = np.exp(-cell / (min(reach, first.reach) if first.count > 0 else reach))
+    least_free, known_at = 0.0, 0.0
+    sums[:] = 0.0
     for run in range(runs.shape[0]):
-        for i in range(runs[run, 0], runs[run, 1]):
-            x0, x1 = i * cell, (i + 1) * cell
-            h1, slope1 = height[i + 1], slope[i + 1]
+        i, stop = runs[run, 0], runs[run, 1]
+        if not contact:
+            known_at = -np.inf
+        while i < stop:
+            if contact and i % BLOCK == 0 and i + BLOCK < stop:
+                if lift + least[i // BLOCK] > 0 and (i + BLOCK) * cell < next_free:
+                    i += BLOCK
+                    continue
+            x0, x1, h1, slope1 = i * cell, (i + 1) * cell, height[i + 1], slope[i + 1]
+            i += 1
             if x1 > finish:
                 x1 = finish
                 h1, slope1, _ = height_at(profile, x1)
-            w1 = depth + h1
-            f1 = lift + h1 + reach * slope1
+            pulls = lift + h1 + reach * slope1 <= 0
             if contact:
-                leaves = f1 <= 0
-                until = _unloading(profile, lift, reach, max(x0, begin), x1) if leaves else x1
+                until = _unloading(profile, lift, reach, max(x0, begin), x1) if pulls else x1
                 lost = False
-                if guard and not _was_pressed(profile, first, t, reach, until):
+                if until >= next_free:
                     w = depth + height_at(profile, until)[0]
-                    lost = w < _before(profile, first, t, reach, until)[0] * (1 - 1e-14)
-                if lost:
-                    until = _meeting(
-                        profile, first, course, t, reach, depth, max(x0, begin), until, False, places, 0, -np.inf
-                    )[0]
-                if not (leaves or lost):
+                    next_free = _next_free(profile, first, t, reach, until)
+                    if next_free == until and w < _before(profile, first, t, reach, until)[0] * (1 - 1e-14):
+                        until, lost = _losing(profile, first, t, reach, depth, max(x0, begin), until), True
+                if not (pulls or lost):
                     continue
                 if found + 1 >= start.size:
                     return -1
-                add_patch(profile, begin, until, depth, rate, reach, sums)
+                add_patch(profile, begin, until, lift, reach, sums)
                 start[found], end[found] = begin, until
                 found += 1
-                h_begin, h_until = height_at(profile, begin)[0], height_at(profile, until)[0]
-                if (depth + h_begin) * np.exp(-(until - begin) / reach) + 2 * spread < depth + h_until:
+                w_begin, w = depth + height_at(profile, begin)[0], depth + height_at(profile, until)[0]
+                spread = _spread(spreads, window, 2 * (until - places[0]) + window) if known > 0 else spreads[0]
+                if w_begin * np.exp(-(until - begin) / reach) + 2 * spread < w:
                     known = 0
+                least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                 oldest, last_start = last_start, begin
                 if not lost:
                     known = min(known, CANDIDATES - 1)
                     places[known] = until
                     known += 1
                 contact, free_from = False, until
-                if lost and leaves:
-                    continue
-            w0 = depth + height[i]
-            if w1 <= floor[i + 1] and w0 <= floor[i]:
                 continue
-            low, probe, ends = max(x0, free_from), x1, False
-            if f1 <= 0:
-                if lift + height[i] + reach * slope[i] <= 0 or free_from > x0:
+            least_free *= fade_of_cell
+            highest = depth + max(h1, height[i - 1])
+            if slope[i - 1] > 0 > slope1:
+                highest += 0.5 * cell * min(slope[i - 1], -slope1)
+            if highest <= min(floor[i - 1], floor[i]) or (highest < least_free and x1 - known_at < window):
+                continue
+            low, probe = max(x0, free_from), x1
+            if pulls:
+                if lift + height[i - 1] + reach * slope[i - 1] <= 0 or free_from > x0:
                     continue
-                probe, ends = _unloading(profile, lift, reach, low, x1), True
-            u = _wake(profile, first, course, t, reach, probe, places, known, oldest)[0]
-            w = depth + height_at(profile, probe)[0]
-            if w > u:
-                begin, gap_slope, fade = _meeting(
-                    profile, first, course, t, reach, depth, low, probe, True, places, known, oldest
+                probe = _unloading(profile, lift, reach, low, x1)
+                h1, slope1, _ = height_at(profile, probe)
+            u, u_slope, _ = _wake(profile, first, course, t, reach, probe, places, known, oldest)
+            gap, rise = depth + h1 - u, slope1 - u_slope
+            spread = _spread(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+            least_free, known_at = (u - spread) * fade_of_cell, probe
+            if gap > 0:
+                guess = probe - gap / rise if rise > 0 else low
+                begin, rise, fade = _meeting(
+                    profile, first, course, t, reach, low, probe, guess, places, known, oldest
                 )
                 h, h_slope, _ = height_at(profile, begin)
-                if course.count > 1:
-                    fade = 0.0
-                if gap_slope > 0:
-                    edges += max(lift + h + reach * h_slope, 0.0) * (1 - fade) / gap_slope
+                memory = fade if course.count == 1 else 0.0
+                if rise > 0:
+                    edges += max(lift + h + reach * h_slope, 0.0) * (1 - memory) / rise
                 contact = True
-            if ends and (contact or w > u - 2 * spread):
+                next_free = _next_free(profile, first, t, reach, begin) if guard else np.inf
+            if pulls and gap > -2 * spread:
                 if contact:
                     if found + 1 >= start.size:
                         return -1
-                    add_patch(profile, begin, probe, depth, rate, reach, sums)
+                    add_patch(profile, begin, probe, lift, reach, sums)
                     start[found], end[found] = begin, probe
                     found += 1
                     oldest, last_start = last_start, begin
-                    if 2 * spread + u < w:
+                    if 2 * spread < gap:
                         known = 0
                 known = min(known, CANDIDATES - 1)
                 places[known] = probe
@@ -453,11 +492,11 @@ def touch(
                 contact, free_from = False, probe
         if contact and run + 1 < runs.shape[0]:
             return -1
-    if contact != profile.periodic and contact:
+    if contact and not profile.periodic:
         return -1
     if profile.periodic:
         begin = begin if contact else finish
-        add_patch(profile, begin, finish, depth, rate, reach, sums)
+        add_patch(profile, begin, finish, lift, reach, sums)
         start[found], end[found] = begin, finish
         found += 1
     sums[STIFFNESS] = sums[LENGTH] + edges
@@ -490,14 +529,14 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
             h, slope, _ = height_at(profile, x1)
             now = lift + h + reach * slope > 0
             if pressed and not now:
-                add_patch(profile, begin, _unloading(profile, lift, reach, x0, x1), first.depth, rate, reach, sums)
+                add_patch(profile, begin, _unloading(profile, lift, reach, x0, x1), lift, reach, sums)
             elif now and not pressed:
                 begin = _loading(profile, lift, reach, x0, x1)
             pressed = now
             x0 = x1
             i += 1
         if pressed:
-            add_patch(profile, begin, first.end[k], first.depth, rate, reach, sums)
+            add_patch(profile, begin, first.end[k], lift, reach, sums)
     sums[STIFFNESS] = sums[LENGTH]
 
 
@@ -570,9 +609,10 @@ def march(
         0 done, 1 depth not found, 2 limits exceeded.
     """
     start, end = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
+    least = np.empty(profile.height.size // BLOCK)
+    block_least(profile, reach, least)
     sums = np.empty(4)
-    lowest, highest = depth[0], depth[0]
-    near = 0
+    near, gain = 0, 1.0
     for now in range(1, moments.size):
         course = Course(moments, depth, rate, now + 1)
         t, step = moments[now], moments[now] - moments[now - 1]
@@ -584,23 +624,30 @@ def march(
             bend = (rate[now - 1] - rate[now - 2]) / (moments[now - 1] - moments[now - 2])
             guess = depth[now - 1] + step * (rate[now - 1] + 0.5 * step * bend)
         guess = min(max(guess, limits[0]), limits[1])
-        converged = False
-        for _ in range(40):
+        off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
+        for trial in range(TRIALS):
             depth[now], rate[now] = guess, a * guess + b
-            spread = max(highest, guess) - min(lowest, guess)
-            found = touch(profile, runs, floor, first, course, t, reach, spread, start, end, sums)
+            found = touch(profile, runs, floor, least, first, course, t, reach, start, end, sums)
             if found < 0:
                 return now, 2
-            if abs(sums[LOAD] - load) <= 1e-10 * load:
-                converged = True
+            off = sums[LOAD] / load - 1
+            drag[now] = sums[DRAG]
+            if abs(off) <= CLOSE:
+                if trial > 0 and off != before_off:
+                    share = off / (before_off - off)
+                    guess += share * (guess - before)
+                    drag[now] += share * (drag[now] - before_drag)
                 break
-            guess += (load - sums[LOAD]) / (sums[STIFFNESS] + a * sums[LENGTH])
+            stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
+            if trial > 0 and (off - before_off) * (guess - before) > 0:
+                gain = min(max((off - before_off) / (guess - before) / stiffness, 0.05), 2.0)
+            before, before_off, before_drag = guess, off, drag[now]
+            guess -= off / (gain * stiffness)
             if not limits[0] <= guess <= limits[1]:
                 return now, 2
-        if not converged and abs(sums[LOAD] - load) > 1e-6 * load:
+        if abs(off) > ENOUGH:
             return now, 1
-        drag[now] = sums[DRAG]
-        lowest, highest = min(lowest, depth[now]), max(highest, depth[now])
+        depth[now], rate[now] = guess, a * guess + b
         near = near + 1 if abs(drag[now] - aim[1]) <= aim[2] and abs(depth[now] - aim[0]) <= aim[2] else 0
         if near == 8:
             return now + 1, 0

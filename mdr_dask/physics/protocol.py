@@ -82,7 +82,7 @@ def _depth(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tu
             continue
         step = (mean * n - total) / touching
         depth += step
-        if abs(step) <= 1e-13 * (abs(depth) + abs(mean)):
+        if abs(step) <= 1e-12 * (abs(depth) + abs(mean)):
             return depth, True
     return depth, False
 
