@@ -16,6 +16,7 @@ from mdr_dask.physics.kinetics_kernels import (
     LOAD,
     STIFFNESS,
     Course,
+    Pace,
     Patches,
     Profile,
     block_least,
@@ -35,6 +36,9 @@ MESSAGES = {
     INVALID: "load, velocity and profile must be finite, the load and both velocities positive",
 }
 STEPS_PER_DECADE = 24
+MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
+NEGLIGIBLE = 1e-6  # of the mean displacement: changes of depth that need no finer steps
+MOMENTS = 20000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 6
 
@@ -170,6 +174,11 @@ def _release(profile: Profile, first: Patches, reach: float, load: float, sums: 
     return rate, abs(sums[LOAD] - load) <= 1e-9 * load
 
 
+def _full(state: Patches, profile: Profile) -> bool:
+    """Return whether all of a periodic line is in contact: then u = d + p, d is constant and nothing relaxes."""
+    return state.count == 1 and profile.periodic and state.end[0] - state.start[0] >= 1
+
+
 def _reachable(profile: Profile, floor: FloatArray, highest: float) -> IntArray:
     """Return the stretches of nodes in which an element can be in contact up to a depth."""
     active = highest + profile.height > floor
@@ -181,8 +190,8 @@ def _reachable(profile: Profile, floor: FloatArray, highest: float) -> IntArray:
     return runs
 
 
-def moments_after(last: float, reach: float, wavenumber: float, per_decade: float = STEPS_PER_DECADE) -> FloatArray:
-    """Return graded moments from 0 to `last`: the first step a part of the time to pass 1 / q_max, then a constant ratio.
+def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, change: float, load: float) -> Pace:
+    """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio, up to `last`.
 
     Parameters
     ----------
@@ -194,12 +203,14 @@ def moments_after(last: float, reach: float, wavenumber: float, per_decade: floa
         q_max L of the profile.
     per_decade : float
         Steps in a factor ten of the time.
+    change : float
+        Difference of the depths before and after.
+    load : float
+        F_N / (4 G L), in the same unit.
     """
-    ratio = 10 ** (1 / per_decade)
-    least = FIRST_STEP * min(1.0, 1 / (wavenumber * reach)) * STEPS_PER_DECADE / per_decade
-    scale = least / (ratio - 1)
-    count = int(np.ceil(np.log1p(last / scale) / np.log(ratio)))
-    return scale * np.expm1(np.log(ratio) * np.arange(count + 1))
+    finer = STEPS_PER_DECADE / per_decade
+    first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * max(abs(change), NEGLIGIBLE * load), last)
 
 
 def velocity_jump(
@@ -250,7 +261,8 @@ def velocity_jump(
     if steady.status.any():
         return failed._replace(status=NOT_CONVERGED)
     profile = cubic_profile(height, slope)
-    return _relax(profile, load, reaches, steady.depth, times, moments_after(times[-1], reaches[1], wavenumber, per_decade), resolution)
+    pace = pace_after(float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load)
+    return _relax(profile, load, reaches, steady.depth, times, pace, resolution)
 
 
 def _relax(
@@ -259,7 +271,7 @@ def _relax(
     reaches: tuple[float, float],
     depths: FloatArray,
     times: FloatArray,
-    moments: FloatArray,
+    pace: Pace,
     resolution: float,
 ) -> Jump:
     """Solve both steady states on one profile and march between them."""
@@ -281,20 +293,30 @@ def _relax(
         if not (good_first and good_last):
             margin *= 4
             continue
+        if _full(first, profile) and _full(last, profile):
+            return Jump(before, after, after, np.full(times.size, after), np.array([first.depth, last.depth]), 0, CONVERGED)
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed
-        depth, rates, drag = (np.empty(moments.size) for _ in range(3))
-        depth[0], rates[0], drag[0] = first.depth, rate, sums[DRAG]
+        course = np.empty((4, MOMENTS))
+        course[:, 0] = 0.0, first.depth, rate, sums[DRAG]
         count, status = march(
-            profile, runs, floor, first, reaches[1], load, moments,
-            (low - margin, high + margin), (last.depth, after, resolution), depth, rates, drag,
+            profile,
+            runs,
+            floor,
+            first,
+            reaches[1],
+            load,
+            pace,
+            (low - margin, high + margin),
+            (last.depth, after, resolution),
+            *course,
         )
         if status == 1:
             return failed
         if status == 0:
-            trace = _at_times(moments[:count], drag[:count], times, after)
-            return Jump(before, drag[0], after, trace, np.array([first.depth, last.depth]), count, CONVERGED)
+            trace = _at_times(course[0, :count], course[3, :count], times, after)
+            return Jump(before, course[3, 0], after, trace, np.array([first.depth, last.depth]), count, CONVERGED)
         margin *= 4
     return failed
 

@@ -569,6 +569,80 @@ def _rate_weights(course: Course, now: int, order: int) -> tuple[float, float]:
     return a, b
 
 
+class Pace(NamedTuple):
+    """How the steps of a march go.
+
+    Parameters
+    ----------
+    first : float
+        First step.
+    growth : float
+        Largest ratio of one step to the one before.
+    miss : float
+        Largest difference, in depth, of what a parabola foretells from what is found.
+    until : float
+        Last time.
+    """
+
+    first: float
+    growth: float
+    miss: float
+    until: float
+
+
+@njit(nogil=True, cache=True)
+def _balance(
+    profile: Profile,
+    runs: IntArray,
+    floor: FloatArray,
+    least: FloatArray,
+    first: Patches,
+    course: Course,
+    reach: float,
+    load: float,
+    weights: tuple[float, float],
+    limits: tuple[float, float],
+    gain: float,
+    room: tuple[FloatArray, FloatArray],
+) -> tuple[int, float, float]:
+    """Find the depth that carries the load at the last moment of the course, by secants.
+
+    Returns
+    -------
+    status : int
+        0 found, 1 not found, 2 limits exceeded.
+    drag : float
+    gain : float
+        True derivative of the load over the one at frozen past, for the next moment.
+    """
+    now = course.count - 1
+    guess, (a, b) = course.depth[now], weights
+    sums = np.empty(4)
+    off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
+    for trial in range(TRIALS):
+        course.depth[now], course.rate[now] = guess, a * guess + b
+        found = touch(profile, runs, floor, least, first, course, course.time[now], reach, room[0], room[1], sums)
+        if found < 0:
+            return 2, 0.0, gain
+        off = sums[LOAD] / load - 1
+        drag = sums[DRAG]
+        if abs(off) <= CLOSE:
+            if trial > 0 and off != before_off:
+                share = off / (before_off - off)
+                guess += share * (guess - before)
+                drag += share * (drag - before_drag)
+            course.depth[now], course.rate[now] = guess, a * guess + b
+            return 0, drag, gain
+        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
+        if trial > 0 and (off - before_off) * (guess - before) > 0:
+            gain = min(max((off - before_off) / (guess - before) / stiffness, 0.02), 2.0)
+        before, before_off, before_drag = guess, off, drag
+        guess -= off / (gain * stiffness)
+        if not limits[0] <= guess <= limits[1]:
+            return 2, 0.0, gain
+    return 1, 0.0, gain
+
+
 @njit(nogil=True, cache=True)
 def march(
     profile: Profile,
@@ -577,14 +651,15 @@ def march(
     first: Patches,
     reach: float,
     load: float,
-    moments: FloatArray,
+    pace: Pace,
     limits: tuple[float, float],
     aim: tuple[float, float, float],
+    time: FloatArray,
     depth: FloatArray,
     rate: FloatArray,
     drag: FloatArray,
 ) -> tuple[int, int]:
-    """March the depth at constant load through the moments after a jump, by the backward differentiation of order three.
+    """March the depth at constant load through the time after a jump, by backward differentiation of order three.
 
     Parameters
     ----------
@@ -592,13 +667,12 @@ def march(
         As in :func:`touch`.
     load : float
         F_N / (4 G L).
-    moments : array, shape (m,)
-        Times, the first one zero.
+    pace : Pace
     limits : tuple of float
         Least and greatest depth for which `runs` and `floor` hold.
     aim : tuple of float
-        Final depth and drag, and how near to the drag ends the march (zero for never).
-    depth, rate, drag : array, shape (m,)
+        Final depth and drag, and how near to both the march ends (zero for never).
+    time, depth, rate, drag : array, shape (m,)
         Written from the second entry on; the first one holds the state right after the jump.
 
     Returns
@@ -608,47 +682,38 @@ def march(
     status : int
         0 done, 1 depth not found, 2 limits exceeded.
     """
-    start, end = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
+    room = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
     least = np.empty(profile.height.size // BLOCK)
     block_least(profile, reach, least)
-    sums = np.empty(4)
-    near, gain = 0, 1.0
-    for now in range(1, moments.size):
-        course = Course(moments, depth, rate, now + 1)
-        t, step = moments[now], moments[now] - moments[now - 1]
-        if now == 1:
-            a, b = 2 / step, -2 * depth[0] / step - rate[0]
-            guess = depth[0] + step * rate[0]
-        else:
-            a, b = _rate_weights(course, now, min(now, 3))
-            bend = (rate[now - 1] - rate[now - 2]) / (moments[now - 1] - moments[now - 2])
-            guess = depth[now - 1] + step * (rate[now - 1] + 0.5 * step * bend)
-        guess = min(max(guess, limits[0]), limits[1])
-        off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
-        for trial in range(TRIALS):
-            depth[now], rate[now] = guess, a * guess + b
-            found = touch(profile, runs, floor, least, first, course, t, reach, start, end, sums)
-            if found < 0:
-                return now, 2
-            off = sums[LOAD] / load - 1
-            drag[now] = sums[DRAG]
-            if abs(off) <= CLOSE:
-                if trial > 0 and off != before_off:
-                    share = off / (before_off - off)
-                    guess += share * (guess - before)
-                    drag[now] += share * (drag[now] - before_drag)
-                break
-            stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
-            if trial > 0 and (off - before_off) * (guess - before) > 0:
-                gain = min(max((off - before_off) / (guess - before) / stiffness, 0.05), 2.0)
-            before, before_off, before_drag = guess, off, drag[now]
-            guess -= off / (gain * stiffness)
-            if not limits[0] <= guess <= limits[1]:
-                return now, 2
-        if abs(off) > ENOUGH:
+    near, gain, step, now = 0, 1.0, pace.first, 1
+    while time[now - 1] < pace.until:
+        if now == time.size:
             return now, 1
-        depth[now], rate[now] = guess, a * guess + b
+        time[now] = min(time[now - 1] + step, pace.until)
+        if pace.until - time[now] < 0.1 * step:
+            time[now] = pace.until
+        taken = time[now] - time[now - 1]
+        course = Course(time, depth, rate, now + 1)
+        if now == 1:
+            weights = 2 / taken, -2 * depth[0] / taken - rate[0]
+            foretold = depth[0] + taken * rate[0]
+        else:
+            weights = _rate_weights(course, now, min(now, 3))
+            bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
+            foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
+        depth[now] = min(max(foretold, limits[0]), limits[1])
+        status, drag[now], gain = _balance(
+            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, room
+        )
+        miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
+        if miss > 2 * pace.miss or status != 0:
+            if step < 1e-3 * pace.first:
+                return now, max(status, 1)
+            step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
+            continue
+        step = taken * min(pace.growth, 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3))
         near = near + 1 if abs(drag[now] - aim[1]) <= aim[2] and abs(depth[now] - aim[0]) <= aim[2] else 0
+        now += 1
         if near == 8:
-            return now + 1, 0
-    return moments.size, 0
+            break
+    return now, 0
