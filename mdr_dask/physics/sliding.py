@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.physics import backward_euler
+from mdr_dask.physics.profile import Profile, cut, indented_line, periodic_line
 from mdr_dask.physics.sweep import (
     BLOCK,
     DISPLACEMENT,
@@ -23,7 +24,6 @@ from mdr_dask.physics.sweep import (
     SUMS,
     Cells,
     barrier,
-    summit,
     sweep,
 )
 
@@ -37,7 +37,8 @@ MESSAGES = {
     INVALID: "load, velocity and profile must be finite, the load and v tau positive",
 }
 ITERATIONS = 200
-LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
+PATIENCE = 20  # sweeps before the bracket is halved
+LATTICE_BITS = 14  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
 @dataclass(frozen=True)
@@ -77,80 +78,6 @@ class Steady:
 
 
 @njit(nogil=True, cache=True)
-def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
-    """Return the highest point of every cell, and the cell and place of the highest of all."""
-    peaks = np.empty(enter.size)
-    best, place = 0, 0.0
-    for i in range(enter.size):
-        rise = height[i + 1] - height[i]
-        b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
-        x = summit(enter[i], b, c)
-        if x > 1:
-            x = 0.0 if height[i] >= height[i + 1] else 1.0
-            peaks[i] = max(height[i], height[i + 1])
-        else:
-            peaks[i] = height[i] + x * (enter[i] + x * (b + x * c))
-        if i == 0 or peaks[i] > peaks[best]:
-            best, place = i, x
-    return peaks, best, place
-
-
-def cut(height: FloatArray, enter: FloatArray, leave: FloatArray, periodic: bool, smooth: bool) -> tuple[Cells, float]:
-    """Cut a profile into the cells of a sweep.
-
-    Parameters
-    ----------
-    height : array, shape (n,) if periodic, else (n + 1,)
-        Heights at the nodes, into the elastomer.
-    enter, leave : array, shape (n,)
-        Rise over one cell at the slope of its start and of its end.
-    periodic : bool
-        Whether the last cell ends at the first node.
-    smooth : bool
-        Whether slopes are continuous and periodic, so that the integral of their square is summed by Euler and
-        Maclaurin: exact over the whole line if that is resolved.
-
-    Returns
-    -------
-    cells : Cells
-    top : float
-        Height of the highest point.
-    """
-    nodes = np.append(height, height[0]) if periodic else height
-    peaks, best, place = _peaks(nodes, enter, leave)
-    top = float(peaks[best])
-    rise = np.diff(nodes)
-    mean = 0.5 * (nodes[1:] + nodes[:-1]) + (enter - leave) / 12 - top
-    stretch = (36 * rise**2 - 6 * rise * (enter + leave) + 4 * (enter**2 + leave**2) - 2 * enter * leave) / 30
-    if smooth:
-        whole, square = stretch, enter**2
-        correction = (np.roll(square, -1) - np.roll(square, 1)) / 24
-        stretch = 0.5 * (square + np.roll(square, -1)) + correction - np.roll(correction, -1)
-        # the first cell is cut in two and integrated as a polynomial: the others take the difference
-        stretch += (stretch[best] - whole[best]) / max(enter.size - 1, 1)
-        stretch[best] = whole[best]
-    roll = best if periodic else 0
-    height, enter, leave, peaks, mean, stretch = (
-        np.roll(array, -roll) for array in (nodes[: enter.size] - top, enter, leave, peaks - top, mean, stretch)
-    )
-    after = height[:2] if periodic else np.array([nodes[-1] - top, nodes[-1] - top])
-    blocks = enter.size // BLOCK
-    return Cells(
-        np.append(height, after),
-        np.append(enter, enter[0]),
-        np.append(leave, leave[0]),
-        np.append(peaks, peaks[0]),
-        np.append(mean, mean[0]),
-        np.append(stretch, stretch[0]),
-        peaks[: blocks * BLOCK].reshape(blocks, BLOCK).max(axis=1),
-        mean[: blocks * BLOCK].reshape(blocks, BLOCK).sum(axis=1),
-        stretch[: blocks * BLOCK].reshape(blocks, BLOCK).sum(axis=1),
-        place if periodic else 0.0,
-        periodic,
-    ), top
-
-
-@njit(nogil=True, cache=True)
 def _floor(depth: float) -> float:
     """Return the lattice depth at or below a positive depth."""
     mantissa, exponent = math.frexp(depth)
@@ -165,28 +92,50 @@ def _next(depth: float) -> float:
 
 
 @njit(nogil=True, cache=True)
+def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
+    """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before."""
+    carried = sums[DISPLACEMENT]
+    load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
+    change = load - trail[1]
+    bend = (slope - trail[2]) / change if abs(change) > 1e-12 and trail[2] > 0 else 0.0
+    trail[0], trail[1], trail[2], trail[3] = np.log(depth), load, slope, bend
+
+
+@njit(nogil=True, cache=True)
+def _guess(trail: FloatArray, load: float) -> float:
+    """Extrapolate log depth over log load to a load."""
+    ahead = np.log(load) - trail[1]
+    bend = 0.5 * trail[3] * ahead
+    limit = 0.5 * trail[2]
+    return math.exp(trail[0] + ahead * (trail[2] + min(max(bend, -limit), limit)))
+
+
+@njit(nogil=True, cache=True)
 def _solve(
     cells: Cells,
     barriers: FloatArray,
     block_barriers: FloatArray,
     reach: float,
     load: float,
-    guess: float,
+    trail: FloatArray,
     sums: FloatArray,
 ) -> tuple[float, bool]:
     """Find the last lattice depth that carries less than the load, and leave its sums.
 
     The load is a convex, increasing function of the depth, so that its tangent bounds the root from above: a lattice
     depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
-    and so the answer does not depend on the guess.
+    and so the answer does not depend on the `trail` that the search follows.
     """
     low, high = 0.0, np.inf
-    depth = _floor(guess)
+    depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
-    for _ in range(ITERATIONS):
+    for iteration in range(ITERATIONS):
         sweep(cells, barriers, block_barriers, reach, depth, sums)
-        carried, stiffness = sums[DISPLACEMENT], sums[STIFFNESS]
-        tangent = depth + (load - carried) / stiffness
+        carried = sums[DISPLACEMENT]
+        if not (carried > 0 and sums[STIFFNESS] > 0):
+            return depth, False
+        tangent = depth + (load - carried) / sums[STIFFNESS]
+        _follow(sums, depth, trail)
         if carried <= load:
             low = depth
             best[:] = sums
@@ -197,16 +146,15 @@ def _solve(
         if low > 0 and _next(low) >= high:
             sums[:] = best
             return low, True
-        power = min(max(stiffness * depth / carried, 0.5), 1e3) if carried > 0 else 1e3
-        proposal = depth * (load / carried) ** (1 / power) if carried > 0 else 2 * depth
-        proposal = min(proposal, tangent) if carried <= load else proposal
-        if not low < proposal < high:
-            proposal = 0.5 * (low + high) if high < np.inf else 2 * low
+        proposal = min(_guess(trail, load), tangent) if carried <= load else _guess(trail, load)
+        if iteration > PATIENCE and high < np.inf:
+            proposal = 0.5 * (low + high)
         depth = _floor(proposal)
         if depth <= low:
             depth = _next(low)
         elif depth >= high:
-            depth = _floor(0.5 * (low + high))
+            depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
+            depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
     return depth, False
 
 
@@ -214,28 +162,26 @@ def _solve(
 def _states(
     cells: Cells, reaches: FloatArray, loads: FloatArray, results: FloatArray, status: NDArray[np.int8]
 ) -> None:
-    """Solve the cases of one profile in the order given, each from the one before; see `Steady` for the columns."""
+    """Solve the cases of one profile, ordered by reach and load, each from the one before; see `Steady` for the columns."""
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK)
-    sums = np.empty(SUMS)
-    depth, carried, power, reach = 1.0, 0.0, 1.0, -1.0
+    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
+    reach = -1.0
+    first[:] = math.log(loads[0]), math.log(loads[0] * n), 0.7, 0.0
     for k in range(loads.size):
-        load = loads[k] * n
-        if not (0 < load < np.inf and 0 < reaches[k] < np.inf):
-            status[k] = INVALID
-            continue
-        if reaches[k] != reach:
+        starts = reaches[k] != reach
+        if starts:
             reach = reaches[k]
             barrier(cells, reach, barriers, block_barriers)
-        guess = depth * (load / carried) ** (1 / power) if carried > 0 else loads[k]
-        depth, converged = _solve(cells, barriers, block_barriers, reach, load, guess, sums)
-        carried = sums[DISPLACEMENT]
-        if not (converged and carried > 0):
+            trail[:] = first
+        depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k], trail, sums)
+        if not converged:
             status[k] = NOT_CONVERGED
-            carried, depth = 0.0, 1.0
+            trail[:] = first
             continue
-        power = sums[STIFFNESS] * depth / carried
-        shift = (load - carried) / sums[STIFFNESS]
+        if starts:
+            first[:] = trail
+        shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = OUTSIDE_LINE if sums[OUTSIDE] > 0 else CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
@@ -244,7 +190,12 @@ def _states(
 
 
 def steady_sliding(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme = "hermite"
+    height: FloatArray,
+    slope: FloatArray | None,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme = "hermite",
+    contact: bool = True,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation sliding over a periodic line.
 
@@ -260,6 +211,8 @@ def steady_sliding(
         F_N / (4 G L), the mean displacement, in the unit of height.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
         Exact sweep over cubic cells or over straight ones, or the papers' time steps.
+    contact : bool
+        Whether fraction and slope of the contact are wanted where they cost extra.
 
     Returns
     -------
@@ -271,47 +224,88 @@ def steady_sliding(
     ValueError
         If the scheme needs slopes that are not given.
     """
-    if scheme == "hermite" and slope is None:
+    return _steady(periodic_line(height, _needed(slope, scheme)), reaches, loads, scheme, contact)
+
+
+def steady_indenter(
+    height: FloatArray,
+    slope: FloatArray | None,
+    coefficient: float,
+    exponent: float,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme = "hermite",
+    contact: bool = True,
+) -> Steady:
+    """Return the steady states of a Kelvin foundation under a rough line -c |x|^n + h(x) that it enters undeformed.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n + 1,)
+        The roughness h, both ends included, and its derivative as in :func:`steady_sliding`.
+    coefficient, exponent : float
+        c > 0 and n >= 1 of the line, x in units of its length from its middle node n // 2.
+    reaches, loads, scheme, contact
+        As in :func:`steady_sliding`.
+
+    Returns
+    -------
+    Steady
+        With status `OUTSIDE_LINE` where an end of the line is in contact.
+    """
+    profile = indented_line(height, _needed(slope, scheme), coefficient, exponent)
+    return _steady(profile, reaches, loads, scheme, contact)
+
+
+def _needed(slope: FloatArray | None, scheme: Scheme) -> FloatArray | None:
+    """Return the slopes for a scheme that uses them."""
+    if scheme != "hermite":
+        return None
+    if slope is None:
         raise ValueError("expected slopes at the nodes for the scheme 'hermite', got None")
+    return slope
+
+
+def _steady(profile: Profile, reaches: FloatArray, loads: FloatArray, scheme: Scheme, contact: bool) -> Steady:
+    """Solve the cases that are numbers."""
     good = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
-    if not np.all(np.isfinite(height)) or (slope is not None and not np.all(np.isfinite(slope))):
-        good[:] = False
+    good &= bool(np.all(np.isfinite(profile.height)) and np.all(np.isfinite(profile.enter)))
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, INVALID, np.int8)
-    if np.any(good):
-        solve = _backward_euler if scheme == "backward_euler" else _exact
-        results[:, good], status[good] = solve(height, slope, reaches[good] * height.size, loads[good], scheme)
+    n = profile.enter.size
+    if np.any(good) and scheme == "backward_euler":
+        results[:, good], status[good] = _stepped(profile, reaches[good] * n, loads[good] * n, contact)
+    elif np.any(good):
+        results[:, good], status[good] = _swept(profile, reaches[good] * n, loads[good] * n)
     results[:, status != CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
-def _exact(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
-) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; reaches in cells."""
-    if scheme == "hermite" and slope is not None:
-        rise = slope / height.size
-        cells, top = cut(height, rise, np.roll(rise, -1), True, True)
-    else:
-        rise = np.roll(height, -1) - height
-        cells, top = cut(height, rise, rise, True, False)
+def _swept(profile: Profile, reaches: FloatArray, loads: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
+    """Solve by sweeps over cells; reaches in cells, loads over 4 G dx."""
+    cells, top = cut(profile)
     order = np.lexsort((loads, reaches))
-    results, status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
-    ordered, ordered_status = results.copy(), status.copy()
+    ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
     _states(cells, reaches[order], loads[order], ordered, ordered_status)
+    results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= top
     return results.T, status
 
 
-def _backward_euler(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray, scheme: Scheme
+def _stepped(
+    profile: Profile, reaches: FloatArray, loads: FloatArray, contact: bool
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by time steps of one cell; reaches in cells."""
-    start = int(np.argmax(height))
-    top = height[start]
-    depths, sums = backward_euler.solve(np.roll(height, -start) - top, reaches, loads)
-    touched = sums[backward_euler.TOUCHED]
-    contact_slope = np.sqrt(sums[backward_euler.STRETCH] / np.maximum(touched, 1)) * height.size
-    status = np.where(np.isnan(sums[0]), NOT_CONVERGED, CONVERGED).astype(np.int8)
-    return np.stack([sums[backward_euler.DRAG], depths - top, touched / height.size, contact_slope]), status
+    """Solve by time steps of one cell; reaches in cells, loads over 4 G dx."""
+    highest, n = int(np.argmax(profile.height)), profile.enter.size
+    top = profile.height[highest]
+    below = (np.roll(profile.height, -1 - highest) if profile.periodic else profile.height) - top
+    results = np.full((4, loads.size), np.nan)
+    depths, results[0], outside = backward_euler.solve(below, profile.periodic, reaches, loads)
+    results[1] = depths - top
+    if contact:
+        backward_euler.contact(below, profile.periodic, reaches, depths, results[2], results[3])
+        results[2] /= n
+        results[3] *= n
+    status = np.where(np.isnan(results[0]), NOT_CONVERGED, np.where(outside, OUTSIDE_LINE, CONVERGED))
+    return results, status.astype(np.int8)

@@ -8,6 +8,7 @@ du/d(depth) is 1 in contact and decays with u in free flight, whatever the touch
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ FloatArray = NDArray[np.float64]
 BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
 NONE = 2.0  # a position in a cell that is not there
 TINY = 1e-290
+CLOSE = 1e-8  # a Newton step after which the next one is below rounding
+ITERATIONS = 80
 
 # What a sweep returns, in this order
 DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
@@ -92,22 +95,32 @@ def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: Fl
 
 
 @njit(nogil=True, cache=True)
+def _lost(x: float) -> float:
+    """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
+    if x > 1 / 32:
+        return -math.expm1(-x)
+    return x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))))
+
+
+@njit(nogil=True, cache=True)
 def _leaving(w0: float, a: float, b: float, c: float, reach: float, start: float) -> float:
     """Return where w + reach w' falls to 0 between start and 1, or `NONE`."""
     if w0 + a + b + c + reach * (a + 2 * b + 3 * c) > 0:
         return NONE
+    # the force is a cubic itself
+    p, q, r = w0 + reach * a, a + 2 * reach * b, b + 3 * reach * c
     low, high, x = start, 1.0, start
-    for _ in range(80):
-        force = w0 + x * (a + x * (b + x * c)) + reach * (a + x * (2 * b + x * 3 * c))
+    for _ in range(ITERATIONS):
+        force = p + x * (q + x * (r + x * c))
         if force > 0:
             low = x
         else:
-            high = x
             if x == start:
                 return start
-        slope = a + x * (2 * b + x * 3 * c) + reach * (2 * b + x * 6 * c)
-        step = x - force / slope if slope != 0 else low
-        if abs(step - x) < 1e-15:
+            high = x
+        slope = q + x * (2 * r + x * 3 * c)
+        step = x - force / slope if slope < 0 else high
+        if abs(step - x) < CLOSE:
             return min(max(step, start), 1.0)
         x = step if low < step < high else 0.5 * (low + high)
     return x
@@ -119,16 +132,16 @@ def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, e
     if w0 >= u:
         return 0.0
     low, high, x = 0.0, end, end
-    for _ in range(80):
-        free = u * np.exp(-x / reach)
+    for _ in range(ITERATIONS):
+        free = u - u * _lost(x / reach)
         gap = w0 + x * (a + x * (b + x * c)) - free
         if gap > 0:
             high = x
         else:
             low = x
         slope = a + x * (2 * b + x * 3 * c) + free / reach
-        step = x - gap / slope if slope != 0 else low
-        if abs(step - x) < 1e-15:
+        step = x - gap / slope if slope > 0 else low
+        if abs(step - x) < CLOSE:
             return min(max(step, 0.0), end)
         x = step if low < step < high else 0.5 * (low + high)
     return x
@@ -140,7 +153,7 @@ def _reached(w0: float, a: float, b: float, c: float, reach: float, u: float, de
     if w0 + a + b + c > u * decay:
         return 1.0
     x = summit(a, b, c)
-    if x < 1 and w0 + x * (a + x * (b + x * c)) > u * np.exp(-x / reach):
+    if x < 1 and w0 + x * (a + x * (b + x * c)) > u - u * _lost(x / reach):
         return x
     return NONE
 
@@ -149,13 +162,15 @@ def _reached(w0: float, a: float, b: float, c: float, reach: float, u: float, de
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
     """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
-    arm = half * 0.7745966692414834
-    area = stretch = 0.0
-    for x, weight in ((middle - arm, 5.0 / 9), (middle, 8.0 / 9), (middle + arm, 5.0 / 9)):
-        slope = a + x * (2 * b + x * 3 * c)
-        area += weight * (w0 + x * (a + x * (b + x * c)))
-        stretch += weight * slope * slope
-    return half * area, half * stretch
+    x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
+    before, centre, after = (
+        a + x * (2 * b + x * 3 * c),
+        a + middle * (2 * b + middle * 3 * c),
+        a + y * (2 * b + y * 3 * c),
+    )
+    area = 5 * x * (a + x * (b + x * c)) + 8 * middle * (a + middle * (b + middle * c)) + 5 * y * (a + y * (b + y * c))
+    stretch = 5 * before * before + 8 * centre * centre + 5 * after * after
+    return half * (2 * w0 + area / 9), half * stretch / 9
 
 
 @njit(nogil=True, cache=True)
@@ -208,7 +223,7 @@ def sweep(
             if left <= 1:
                 u = w0 + left * (c1 + left * (c2 + left * c3))
                 flown = 1 - left
-                a = np.exp(-flown / reach)
+                a = 1 - _lost(flown / reach)
                 contact = depth + cells.height[i + 1] > u * a
                 end = 1.0 if contact else left
             part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
@@ -230,12 +245,13 @@ def sweep(
             if end <= 1:
                 x = _touching(w0, c1, c2, c3, reach, u * a, end)
                 flown += x
-                memory = -reach * np.expm1(-flown / reach)
+                lost = _lost(flown / reach)
+                memory = reach * lost
                 slope = c1 + x * (2 * c2 + x * 3 * c3)
                 if u > 0:
                     area += u * memory
                     rate += memory
-                    flights -= 0.5 * u * u * np.expm1(-2 * flown / reach)
+                    flights += 0.5 * u * u * lost * (2 - lost)
                     flights_rate += memory * (u / reach + slope)
                 else:
                     flights_rate += reach * slope
@@ -258,10 +274,11 @@ def sweep(
         w0 = depth + h0
         x = _touching(w0, c1, c2, c3, reach, u * a, cells.start) if cells.start > 0 else 0.0
         flown += x
-        memory = -reach * np.expm1(-flown / reach)
+        lost = _lost(flown / reach)
+        memory = reach * lost
         area += u * memory
         rate += memory
-        flights -= 0.5 * u * u * np.expm1(-2 * flown / reach)
+        flights += 0.5 * u * u * lost * (2 - lost)
         flights_rate += memory * (u / reach + c1 + x * (2 * c2 + x * 3 * c3))
         part, part_stretch = _pressed(w0, c1, c2, c3, x, cells.start)
         area += part
