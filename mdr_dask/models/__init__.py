@@ -7,7 +7,10 @@ from typing import Any
 
 from mdr_dask.models.base import Model
 
-NAMES: tuple[str, ...] = ("sliding_friction",)
+NAMES: tuple[str, ...] = (
+    "sliding_friction",
+    "mixed_lubrication",
+)
 
 
 def load(name: str) -> Model[Any]:
