@@ -84,7 +84,7 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
     best, place = _summit(height, slope)
     index = (np.arange(n + 2) + best) % n
     height, slope = height[index], slope[index]
-    enter, leave, rise = slope[:-1] / n, slope[1:] / n, np.diff(height)
+    enter, leave = slope[:-1] / n, slope[1:] / n
     area = 0.5 * (height[1:] + height[:-1]) + (enter - leave) / 12
     squared = enter**2
     bend = (np.roll(slope[:-2], -1) ** 2 - np.roll(slope[:-2], 1) ** 2) / (24 * n**2)
@@ -143,7 +143,9 @@ def _settle(
     pressed = np.empty(max(found, 0))
     for k in range(pressed.size):
         pressed[k] = at[0] + height_at(profile, end[k])[0]
-    return Patches(start[: pressed.size].copy(), end[: pressed.size].copy(), pressed, pressed.size, at[0], reach), converged
+    return Patches(
+        start[: pressed.size].copy(), end[: pressed.size].copy(), pressed, pressed.size, at[0], reach
+    ), converged
 
 
 @njit(nogil=True, cache=True)
@@ -226,8 +228,8 @@ def velocity_jump(
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
 
     The start is the direct steady state at v_1; the instant t_0+ solves the jump condition (displacements and depth
-    do not change at once, the rate of the depth does); then the depth is marched by backward differentiation of order three
-    over graded steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
+    do not change at once, the rate of the depth does); then the depth is marched by backward differentiation of order
+    three over graded steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
 
     Parameters
     ----------
@@ -261,7 +263,9 @@ def velocity_jump(
     if steady.status.any():
         return failed._replace(status=NOT_CONVERGED)
     profile = cubic_profile(height, slope)
-    pace = pace_after(float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load)
+    pace = pace_after(
+        float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
+    )
     return _relax(profile, load, reaches, steady.depth, times, pace, resolution)
 
 
@@ -294,7 +298,9 @@ def _relax(
             margin *= 4
             continue
         if _full(first, profile) and _full(last, profile):
-            return Jump(before, after, after, np.full(times.size, after), np.array([first.depth, last.depth]), 0, CONVERGED)
+            return Jump(
+                before, after, after, np.full(times.size, after), np.array([first.depth, last.depth]), 0, CONVERGED
+            )
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed

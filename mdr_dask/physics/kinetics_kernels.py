@@ -1,7 +1,8 @@
 """Compiled parts of the velocity jump: who touches what at one moment, and the march of the depth through time.
 
-Lengths are in units of the line, heights in any one unit, times in relaxation times tau. An element at x has come along the
-path x' = x - reach (t - t') with reach = v tau / L, and its displacement is the largest it was ever pressed to, faded since:
+Lengths are in units of the line, heights in any one unit, times in relaxation times tau. An element at x came along
+the path x' = x - reach (t - t') with reach = v tau / L, and its displacement is the largest one it was pressed to,
+faded since:
 
     u(x, t) = max over t' <= t of (d(t') + p(x')) exp(-(t - t'))
 
@@ -24,7 +25,7 @@ CANDIDATES = 8
 BLOCK = 16
 WINDOW_CELLS = 64.0
 WINDOWS = 12
-TRIALS = 40
+TRIALS = 80
 CLOSE, ENOUGH = 1e-7, 1e-5  # of the load: where a last secant step follows, and where a depth counts as found
 ROOT_STEPS = 60
 GUARD_CELLS = 200.0
@@ -63,7 +64,7 @@ class Patches(NamedTuple):
     start: FloatArray
     end: FloatArray
     pressed: FloatArray
-    count: int
+    count: int  # type: ignore[assignment]
     depth: float
     reach: float
 
@@ -74,7 +75,7 @@ class Course(NamedTuple):
     time: FloatArray
     depth: FloatArray
     rate: FloatArray
-    count: int
+    count: int  # type: ignore[assignment]
 
 
 @njit(nogil=True, cache=True, inline="always")
@@ -109,12 +110,16 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     a, b, c, e = _cubic(profile, i)
     area = y * (a + y * (b / 2 + y * (c / 3 + y * e / 4)))
     square = y * (b * b + y * (2 * b * c + y * ((4 * c * c + 6 * b * e) / 3 + y * (3 * c * e + y * 1.8 * e * e))))
-    return a + y * (b + y * (c + y * e)), profile.area[i] + area * profile.cell, profile.square[i] + square / profile.cell
+    return (
+        a + y * (b + y * (c + y * e)),
+        profile.area[i] + area * profile.cell,
+        profile.square[i] + square / profile.cell,
+    )
 
 
 @njit(nogil=True, cache=True)
 def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
-    """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly over the cubic cells."""
+    """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
     h0, area0, square0 = integrals_at(profile, start)
     h1, area1, square1 = integrals_at(profile, end)
     sums[LOAD] += lift * (end - start) + area1 - area0 + reach * (h1 - h0)
@@ -153,8 +158,8 @@ def _left_from(
 ) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place`, its slope along x, and how much has faded.
 
-    The leaving point of that element is where its load vanished then, not where it vanishes now; two Newton steps from there
-    suffice, because the displacement is stationary in it.
+    The leaving point of that element is where its load vanished then, not where it vanishes now; a few Newton steps
+    from there suffice, because the displacement is stationary in it.
     """
     best, best_slope, best_fade = -1.0, 0.0, 0.0
     s = place
@@ -260,7 +265,7 @@ def _meeting(
     count: int,
     oldest: float,
 ) -> tuple[float, float, float]:
-    """Return where the profile rises through the wake between low and high, the slope of their gap there, and how much has faded."""
+    """Return where the profile rises through the wake, the slope of their gap there, and how much has faded."""
     depth = course.depth[course.count - 1]
     slope, fade = 1.0, 0.0
     for _ in range(ROOT_STEPS):
@@ -282,9 +287,7 @@ def _meeting(
 
 
 @njit(nogil=True, cache=True)
-def _losing(
-    profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float
-) -> float:
+def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12 * profile.cell:
         x = 0.5 * (low + high)
@@ -349,11 +352,11 @@ def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: floa
     until = first.end[low]
     if profile.periodic and low == first.count - 1:
         until = first.end[0] + 1.0
-    return until + turns + reach * t
+    return float(until + turns + reach * t)
 
 
 @njit(nogil=True, cache=True)
-def touch(
+def touch(  # noqa: C901 - one pass over the line; taken apart it runs slower than what it saves to read
     profile: Profile,
     runs: IntArray,
     floor: FloatArray,
@@ -366,7 +369,7 @@ def touch(
     end: FloatArray,
     sums: FloatArray,
 ) -> int:
-    """Find the patches in contact at time t, at the depth and rate that stand last in the course, and add up their forces.
+    """Find the patches in contact at time t, at the last depth and rate of the course, and add up their forces.
 
     Parameters
     ----------
@@ -412,10 +415,10 @@ def touch(
         if not contact:
             known_at = -np.inf
         while i < stop:
-            if contact and i % BLOCK == 0 and i + BLOCK < stop:
-                if lift + least[i // BLOCK] > 0 and (i + BLOCK) * cell < next_free:
-                    i += BLOCK
-                    continue
+            whole = contact and i % BLOCK == 0 and i + BLOCK < stop and (i + BLOCK) * cell < next_free
+            if whole and lift + least[i // BLOCK] > 0:
+                i += BLOCK
+                continue
             x0, x1, h1, slope1 = i * cell, (i + 1) * cell, height[i + 1], slope[i + 1]
             i += 1
             if x1 > finish:
@@ -467,9 +470,7 @@ def touch(
             least_free, known_at = (u - spread) * fade_of_cell, probe
             if gap > 0:
                 guess = probe - gap / rise if rise > 0 else low
-                begin, rise, fade = _meeting(
-                    profile, first, course, t, reach, low, probe, guess, places, known, oldest
-                )
+                begin, rise, fade = _meeting(profile, first, course, t, reach, low, probe, guess, places, known, oldest)
                 h, h_slope, _ = height_at(profile, begin)
                 memory = fade if course.count == 1 else 0.0
                 if rise > 0:
@@ -618,6 +619,7 @@ def _balance(
     now = course.count - 1
     guess, (a, b) = course.depth[now], weights
     sums = np.empty(4)
+    low, high = limits
     off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
     for trial in range(TRIALS):
         course.depth[now], course.rate[now] = guess, a * guess + b
@@ -636,10 +638,18 @@ def _balance(
         stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
         if trial > 0 and (off - before_off) * (guess - before) > 0:
             gain = min(max((off - before_off) / (guess - before) / stiffness, 0.02), 2.0)
+        if off < 0:
+            low = guess
+        else:
+            high = guess
+        if high - low <= 1e-13 * (abs(low) + abs(high)):
+            return 0, drag, gain  # the load jumps here, as a grid lets it where a patch comes or goes
         before, before_off, before_drag = guess, off, drag
         guess -= off / (gain * stiffness)
         if not limits[0] <= guess <= limits[1]:
             return 2, 0.0, gain
+        if trial > 4 and not low < guess < high:
+            guess = 0.5 * (low + high)
     return 1, 0.0, gain
 
 

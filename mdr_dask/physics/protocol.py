@@ -217,8 +217,8 @@ def follow(
     """Follow every element of a periodic line through a course of velocity and load.
 
     In free flight an element fades exponentially; in contact it has the displacement that the profile imposes, and
-    where it leaves within a step the largest displacement is found inside the step. The total of the loads fixes the mean
-    displacement, F_N / (4 G L) = I + tau dI/dt, so that the depth is the root of a convex sum.
+    where it leaves within a step the largest displacement is found inside the step. The total of the loads fixes the
+    mean displacement, F_N / (4 G L) = I + tau dI/dt, so that the depth is the root of a convex sum.
 
     Parameters
     ----------
