@@ -69,7 +69,7 @@ class Jump(NamedTuple):
     status: int
 
 
-def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
+def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float]:
     """Return a periodic profile of cubic cells that begins at its highest point.
 
     Parameters
@@ -79,11 +79,18 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
         order of the nodes.
     slope : array, shape (n,)
         Derivative at the nodes.
+
+    Returns
+    -------
+    profile : Profile
+        With heights from the highest point, so that a light contact loses no digits.
+    top : float
+        Height of that point.
     """
     n = height.size
-    best, place = _summit(height, slope)
+    best, place, top = _summit(height, slope)
     index = (np.arange(n + 2) + best) % n
-    height, slope = height[index], slope[index]
+    height, slope = height[index] - top, slope[index]
     enter, leave = slope[:-1] / n, slope[1:] / n
     area = 0.5 * (height[1:] + height[:-1]) + (enter - leave) / 12
     squared = enter**2
@@ -91,7 +98,7 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
     bend = np.append(bend, [bend[0], bend[1]])
     # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
     square = 0.5 * (squared + leave**2) + bend[:-1] - bend[1:]
-    return Profile(
+    profile = Profile(
         height,
         slope,
         np.concatenate([[0.0], np.cumsum(area)]) / n,
@@ -100,10 +107,11 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> Profile:
         place / n,
         True,
     )
+    return profile, top
 
 
-def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
-    """Return the cell of the highest point and where in the cell it is, 0..1."""
+def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
+    """Return the cell of the highest point, where in the cell it is, 0..1, and its height."""
     n = height.size
     after = np.roll(height, -1)
     enter, leave = slope / n, np.roll(slope, -1) / n
@@ -113,7 +121,7 @@ def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float]:
     place = np.where((enter > 0) & (leave < 0), np.nan_to_num(place), 0.0).clip(0, 1)
     peak = height + place * (enter + place * (b + place * c))
     best = int(np.argmax(peak))
-    return best, float(place[best])
+    return best, float(place[best]), float(peak[best])
 
 
 @njit(nogil=True, cache=True)
@@ -136,7 +144,7 @@ def _settle(
             converged = True
             break
         step = (load - sums[LOAD]) / sums[STIFFNESS]
-        if abs(step) < 1e-15 * abs(at[0]):
+        if abs(step) < 1e-14 * abs(at[0]):
             converged = True
             break
         at[0] += step
@@ -262,11 +270,12 @@ def velocity_jump(
     steady = steady_sliding(height, slope, both, np.full(2, load))
     if steady.status.any():
         return failed._replace(status=NOT_CONVERGED)
-    profile = cubic_profile(height, slope)
+    profile, top = cubic_profile(height, slope)
     pace = pace_after(
         float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
     )
-    return _relax(profile, load, reaches, steady.depth, times, pace, resolution)
+    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, resolution)
+    return jump._replace(depth=jump.depth - top)
 
 
 def _relax(
