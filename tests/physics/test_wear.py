@@ -101,7 +101,7 @@ def test_compiled_cases_agree_with_the_single_ones(exponent, cycles):
         scar, volume, force = wear_cases.fast_cases(exponent, c, cycles, 0.8, radius)
         fast = wear.fast(PowerProfile(exponent), c, cycles, 0.8)
         assert force == pytest.approx(fast.normal_force, abs=2e-6)  # of 4/3: the tail of a layer exp(-xi N / a) thin
-        assert volume == pytest.approx(fast.wear_volume, abs=1e-7)
+        assert volume == pytest.approx(fast.wear_volume, rel=2e-6, abs=1e-7)  # the same tail
         if cycles > 0:
             assert scar == pytest.approx(fast.contact_radius, abs=1e-6)
 
