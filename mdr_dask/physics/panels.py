@@ -36,6 +36,10 @@ class Panels:
         (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'.
     outer : array, shape (n, n)
         (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
+    slope : array, shape (n, n)
+        u'(z) at the nodes, each from the panel that ends at or holds it.
+    weights : array, shape (n,)
+        int_0^1 u dz.
     barycentric : array, shape (panels, order + 1)
         Weights of the interpolation inside each panel (the first uses the last `order` of them).
     """
@@ -46,6 +50,8 @@ class Panels:
     inner: FloatArray
     full: FloatArray
     outer: FloatArray
+    slope: FloatArray
+    weights: FloatArray
     barycentric: FloatArray
 
 
@@ -72,15 +78,17 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
     local = np.append(0.5 * (1.0 + interior), 1.0)
     nodes = (edges[:-1, None] + np.diff(edges)[:, None] * local).ravel()
     n = nodes.size
-    inner, full, outer = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
+    matrices = tuple(np.zeros((n, n)) for _ in range(4))
+    weights = np.zeros(n)
     barycentric = np.zeros((edges.size - 1, order + 1))
     for panel in range(edges.size - 1):
         members = panel_members(panel, order)
-        _add_panel(nodes, edges[panel], edges[panel + 1], members, inner, full, outer)
+        _add_panel(nodes, edges[panel], edges[panel + 1], members, matrices, weights)
         scaled = (nodes[members] - edges[panel]) / (edges[panel + 1] - edges[panel])
         distance = scaled[:, None] - scaled + np.eye(members.size)
         barycentric[panel, -members.size :] = 1.0 / np.prod(distance, axis=1)
-    return Panels(edges, order, nodes, inner, full, outer, barycentric)
+    inner, full, outer, slope = matrices
+    return Panels(edges, order, nodes, inner, full, outer, slope, weights, barycentric)
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
@@ -93,17 +101,21 @@ def _add_panel(
     low: float,
     high: float,
     members: NDArray[np.intp],
-    inner: FloatArray,
-    full: FloatArray,
-    outer: FloatArray,
+    matrices: tuple[FloatArray, ...],
+    weights: FloatArray,
 ) -> None:
-    """Add one panel's exact weights to the three matrices."""
+    """Add one panel's exact weights to the matrices and the rule for the whole integral."""
+    inner, full, outer, derivative = matrices
     size = members.size
     scale, middle = 2.0 / (high - low), 0.5 * (low + high)
     to_series = np.linalg.inv(legendre.legvander((nodes[members] - middle) * scale, size - 1))
     to_slope = legendre.legder(np.eye(size), axis=0) @ to_series * scale
     abscissa, weight = gauss(size + 1)
     many, heavy = gauss(2 * size + 8)
+    series = legendre.legvander(2.0 * abscissa - 1.0, size - 1)
+    weights[members] += (high - low) * weight @ series @ to_series
+    own = members[nodes[members] > low]
+    derivative[np.ix_(own, members)] = legendre.legvander((nodes[own] - middle) * scale, size - 2) @ to_slope
     for row, z in enumerate(nodes):
         if z > low:
             first, last = np.sqrt(max(z - min(high, z), 0.0)), np.sqrt(z - low)
