@@ -259,7 +259,7 @@ def march(problem: Problem, times: Sequence[float], tolerance: float) -> list[Mo
     NotConvergedError
         If a step fails however short it is.
     """
-    history = [problem.start()]
+    history = [_settled(problem)]
     step, remaining = 0.1 * tolerance, list(times)
     while remaining:
         if len(history) > _MOST_STEPS:
@@ -282,6 +282,26 @@ def march(problem: Problem, times: Sequence[float], tolerance: float) -> list[Mo
         if length == left:
             remaining.pop(0)
     return history
+
+
+def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
+    """Integrate a rate over the steps with the formulas of the steps themselves, shape (steps + 1,)."""
+    total = np.zeros(len(history))
+    for number in range(1, len(history)):
+        order = min(number, 3)
+        shares = _backward_shares([m.time for m in history[number - order : number + 1]][::-1])
+        past = total[number - order : number][::-1]
+        total[number] = (rates[number] - shares[1:] @ past) / shares[0]
+    return total
+
+
+def _settled(problem: Problem) -> Moment:
+    """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
+    virgin = problem.start()
+    unknowns = _newton(problem, virgin.unknowns, 0.0, lambda edge: np.zeros(problem.panels.nodes.size))
+    if unknowns is None:
+        return virgin
+    return Moment(0.0, unknowns, problem.gathered(unknowns), float(unknowns[problem.panels.nodes.size - 1]))
 
 
 def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tuple[Moment | None, float]:
