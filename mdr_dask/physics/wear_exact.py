@@ -95,7 +95,7 @@ class Slid:
 
 
 def gross(
-    profile: Profile, paths: Sequence[float], *, constant_force: bool = False, tolerance: float = 1e-5
+    profile: Profile, paths: Sequence[float], *, constant_force: bool = False, tolerance: float = 1e-4
 ) -> list[Slid]:
     """Return the contact after sliding, df/ds = p in all of the contact.
 
@@ -115,7 +115,7 @@ def gross(
     list of Slid
         One for each path.
     """
-    panels = _panels(tolerance, 0.03)
+    panels = _panels(tolerance, 0.3)
     force = None
     if constant_force:
         force = evolution.GrossSlip(profile, panels).normal_force(evolution.GrossSlip(profile, panels).start().unknowns)
