@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from mdr_dask.physics.dense import solve_in_place
 from mdr_dask.physics.panels import Panels, interpolate
 from mdr_dask.physics.profiles import Profile
 from mdr_dask.physics.transforms import gauss
@@ -26,6 +27,8 @@ FloatArray = NDArray[np.float64]
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
 _MOST_STEPS = 20000
 _MOST_ITERATIONS = 10
+#: Newton's method squares its error: what is left after so small a change is round-off.
+_LAST_CHANGE = 1e-7
 
 
 class NotConvergedError(ArithmeticError):
@@ -349,14 +352,13 @@ def _newton(
             matrix[:, column] = (problem.residual(moved, theta, known(moved[nodes - 1])) - residual) / 1e-7
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
             return None
-        try:
-            change = np.linalg.solve(matrix, -residual)
-        except np.linalg.LinAlgError:
+        change = -residual
+        if not solve_in_place(matrix, change):
             return None
         unknowns += change
         if not unknowns[nodes - 1] > problem.inner_radius:
             return None
-        if np.max(np.abs(change)) < 1e-9:
+        if np.max(np.abs(change)) < _LAST_CHANGE:
             return unknowns if np.all(np.isfinite(problem.gathered(unknowns))) else None
     return None
 
