@@ -240,22 +240,24 @@ class GrossSlip:
         return self.panels.full @ g - self.profile.height(self.radii(a))
 
 
-def march(problem: Problem, times: Sequence[float], tolerance: float) -> list[Moment]:
-    """Advance a contact through increasing times.
+def march(problem: Problem, end: float, tolerance: float) -> list[Moment]:
+    """Advance a contact until the first step that ends at or beyond a time.
+
+    The steps do not depend on that time, so that a longer march repeats the shorter one exactly.
 
     Parameters
     ----------
     problem : Problem
         The kind of slip.
-    times : sequence of float
-        Where the contact is wanted, increasing and positive.
+    end : float
+        Time to reach.
     tolerance : float
         Error of f in d0 allowed in one step.
 
     Returns
     -------
     list of Moment
-        All accepted steps, the wanted times among them; the first is the virgin contact.
+        All accepted steps; the first is the virgin contact.
 
     Raises
     ------
@@ -263,28 +265,40 @@ def march(problem: Problem, times: Sequence[float], tolerance: float) -> list[Mo
         If a step fails however short it is.
     """
     history = [_settled(problem)]
-    step, remaining = 0.1 * tolerance, list(times)
-    while remaining:
+    step = 0.1 * tolerance
+    while history[-1].time < end:
         if len(history) > _MOST_STEPS:
             raise NotConvergedError(f"the wear law needed more than {_MOST_STEPS} steps")
-        now = history[-1].time
-        left = remaining[0] - now
-        length = left if step > 0.999 * left else min(step, 0.5 * left) if step > 0.5 * left else step
-        moment, error = _try_step(problem, history, length)
+        moment, error = _try_step(problem, history, step)
+        power = 1.0 / (min(len(history), 3) + 1)
         if moment is None or error > tolerance:
-            order = min(len(history), 3)
-            shrink = 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** (1.0 / (order + 1)))
-            step = length * shrink
-            if step < 1e-13 * (1.0 + now):
-                raise NotConvergedError(f"the wear law could not be advanced beyond {now:.6g}")
+            step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
+            if step < 1e-13 * (1.0 + history[-1].time):
+                raise NotConvergedError(f"the wear law could not be advanced beyond {history[-1].time:.6g}")
             continue
-        order = min(len(history), 3)
         history.append(moment)
-        growth = min(1.8, 0.85 * (tolerance / max(error, 1e-300)) ** (1.0 / (order + 1)))
-        step = max(step if length < step else 0.0, length * (growth if growth > 1.1 or growth < 0.9 else 1.0))
-        if length == left:
-            remaining.pop(0)
+        growth = min(1.8, 0.85 * (tolerance / max(error, 1e-300)) ** power)
+        step *= growth if growth > 1.1 or growth < 0.9 else 1.0
     return history
+
+
+def unknowns_at(history: Sequence[Moment], time: float) -> FloatArray:
+    """Return the unknowns at any time marched through, by the polynomial of the step that passed it."""
+    return _extrapolate(time, neighbours(history, time))
+
+
+def value_at(history: Sequence[Moment], values: FloatArray, time: float) -> float:
+    """Return a number known at all moments at any time marched through, as `unknowns_at` does."""
+    numbers = {id(m): float(v) for m, v in zip(history, values, strict=True)}
+    near = neighbours(history, time)
+    marked = [Moment(m.time, np.array([numbers[id(m)]]), m.gathered, m.edge) for m in near]
+    return float(_extrapolate(time, marked)[0])
+
+
+def neighbours(history: Sequence[Moment], time: float) -> Sequence[Moment]:
+    """Return the moment at or after a time and up to three before it."""
+    last = int(np.searchsorted([m.time for m in history], time))
+    return history[max(last - 3, 0) : last + 1]
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:

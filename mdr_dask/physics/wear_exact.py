@@ -104,7 +104,7 @@ def gross(
     profile : Profile
         The virgin body, pressed to the depth 1.
     paths : sequence of float
-        s = k E* l / (sigma0 a0), increasing, positive.
+        s = k E* l / (sigma0 a0) >= 0.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
     tolerance : float
@@ -120,25 +120,26 @@ def gross(
     if constant_force:
         force = evolution.GrossSlip(profile, panels).normal_force(evolution.GrossSlip(profile, panels).start().unknowns)
     problem = evolution.GrossSlip(profile, panels, force)
-    history = evolution.march(problem, list(paths), 0.2 * tolerance)
+    history = evolution.march(problem, max(paths), 0.2 * tolerance)
     loads = evolution.integral_along(history, [problem.normal_force(m.unknowns) for m in history])
-    chosen = {m.time: (m, float(load)) for m, load in zip(history, loads, strict=True)}
-    return [_slid(problem, *chosen[float(path)]) for path in paths]
+    return [
+        _slid(problem, evolution.unknowns_at(history, path), evolution.value_at(history, loads, path)) for path in paths
+    ]
 
 
-def _slid(problem: evolution.GrossSlip, moment: evolution.Moment, force_path: float) -> Slid:
-    image, a, depth = problem.split(moment.unknowns)
-    volume = np.pi * a * a * float(problem.panels.weights @ moment.gathered)
+def _slid(problem: evolution.GrossSlip, unknowns: FloatArray, force_path: float) -> Slid:
+    image, a, depth = problem.split(unknowns)
+    volume = np.pi * a * a * float(problem.panels.weights @ problem.gathered(unknowns))
     return Slid(
         a,
         depth,
         volume,
-        problem.normal_force(moment.unknowns),
+        problem.normal_force(unknowns),
         force_path,
         problem.radii(a),
-        problem.worn(moment.unknowns),
+        problem.worn(unknowns),
         image,
-        problem.pressure(moment.unknowns),
+        problem.pressure(unknowns),
     )
 
 
@@ -155,22 +156,22 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], tolerance: flo
     panels = _panels(tolerance, c)
     reach = limit_radius(profile, c)
     problem = evolution.partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
-    history = evolution.march(problem, wanted, 0.2 * tolerance)
-    rates = [problem.wear_rate(m.unknowns) for m in history]
-    energy = evolution.integral_along(history, rates)
-    known = {m.time: (m, number) for number, m in enumerate(history)}
+    history = evolution.march(problem, max(wanted, default=0.0), 0.2 * tolerance)
+    energy = evolution.integral_along(history, [problem.wear_rate(m.unknowns) for m in history])
     result = {}
     for time in (0.0, *wanted):
-        moment, number = known[time]
-        result[time] = _describe(problem, moment, float(energy[number]), number)
+        unknowns = evolution.unknowns_at(history, time)
+        steps = int(np.searchsorted([m.time for m in history], time))
+        spent = evolution.value_at(history, energy, time)
+        result[time] = replace(_describe(problem, unknowns, time), energy_volume=spent, steps=steps)
     return result
 
 
-def _describe(problem: evolution.PartialSlip, moment: evolution.Moment, energy: float, steps: int) -> Fretted:
-    """Turn the nodal values of one moment into a worn contact."""
-    c, a, panels = problem.inner_radius, moment.edge, problem.panels
+def _describe(problem: evolution.PartialSlip, unknowns: FloatArray, time: float) -> Fretted:
+    """Turn the nodal values at one time into a worn contact."""
+    c, a, panels = problem.inner_radius, float(unknowns[-1]), problem.panels
     profile, eta = problem.profile, problem.eta
-    y, _, length = problem.split(moment.unknowns)
+    y, _, length = problem.split(unknowns)
     slope = panels.slope @ y
 
     def place(x: FloatArray) -> FloatArray:
@@ -188,10 +189,8 @@ def _describe(problem: evolution.PartialSlip, moment: evolution.Moment, energy: 
     abscissa, weight = gauss(32)
     stuck = 2.0 * c * float((1.0 - profile.image(c * abscissa)) @ weight)
     slipping = float(np.sqrt(length) * eta * panels.weights @ ((1.0 - y) * np.sqrt(length) / problem.radii(a)))
-    volume = worn_volume(change, c, a, breaks) if moment.time > 0.0 else 0.0
-    return Fretted(
-        profile, c, a, a, volume, stuck + slipping, 0.0, change, change_slope, breaks, energy_volume=energy, steps=steps
-    )
+    volume = worn_volume(change, c, a, breaks) if time > 0.0 else 0.0
+    return Fretted(profile, c, a, a, volume, stuck + slipping, 0.0, change, change_slope, breaks)
 
 
 def _distance(fine: Worn, coarse: Worn) -> float:

@@ -46,7 +46,7 @@ def test_every_step_conserves_energy():
     from mdr_dask.physics.panels import graded_panels
 
     problem = wear_evolution.partial_slip(PARABOLA, 0.455, graded_panels(8, 8, 6), 1.4)
-    moments = wear_evolution.march(problem, [4.0], 1e-5)
+    moments = wear_evolution.march(problem, 4.0, 1e-5)
     energy = wear_evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
     volumes = []
     for m in moments:
@@ -100,6 +100,14 @@ def test_zero_cycles_and_order_of_request():
     assert [w.wear_volume == 0.0 for w in worn] == [False, True, False]
     assert worn[0].wear_volume > worn[2].wear_volume
     assert worn[1].normal_force == pytest.approx(4 / 3, rel=1e-3)
+
+
+def test_a_result_does_not_depend_on_what_else_was_asked_for():
+    alone = exact(PARABOLA, 0.5, [1.3], tolerance=1e-3)[0]
+    among = exact(PARABOLA, 0.5, [9.0, 1.3, 0.2], tolerance=1e-3)[1]
+    assert alone.wear_volume == among.wear_volume
+    assert alone.error == among.error
+    np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
 
 
 @pytest.mark.parametrize(("exponent", "radius", "volume"), [(2.0, np.sqrt(2), np.pi), (1.0, np.pi / 2, np.pi**3 / 12)])
