@@ -58,6 +58,8 @@ class Record:
     ----------
     contact_radius, stick_radius, depth, normal_force : float
         a, c (zero in gross slip), d, F_N.
+    worn_depth : float
+        Largest f - f0.
     wear_volume, energy_volume : float
         V from the shape, and from the energy lost over mu: equal up to the grid's error.
     radius, height, image, pressure : array, shape (n,)
@@ -70,6 +72,7 @@ class Record:
     stick_radius: float
     depth: float
     normal_force: float
+    worn_depth: float
     wear_volume: float
     energy_volume: float
     radius: FloatArray
@@ -184,6 +187,7 @@ def _record(
         stick_radius=border,
         depth=state.depth,
         normal_force=grid.force(state.image, state.depth),
+        worn_depth=float(np.max(worn)),
         wear_volume=float(2.0 * np.pi * np.trapezoid(worn * grid.nodes, grid.nodes)),
         energy_volume=energy,
         radius=grid.nodes,
