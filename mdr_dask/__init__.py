@@ -1,1 +1,34 @@
-"""A distributed parameter-study runner for tribology with the method of dimensionality reduction."""
+"""A distributed parameter-study runner for tribology with the method of dimensionality reduction.
+
+The names below are loaded when they are first used: importing the package loads neither dask nor numba nor matplotlib.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Resources": "mdr_dask.execute",
+    "aggregate": "mdr_dask.aggregate",
+    "datasets": "mdr_dask.store",
+    "estimate": "mdr_dask.plan",
+    "load": "mdr_dask.campaign",
+    "loads": "mdr_dask.campaign",
+    "run": "mdr_dask.execute",
+}
+
+if TYPE_CHECKING:
+    from mdr_dask.aggregate import aggregate
+    from mdr_dask.campaign import load, loads
+    from mdr_dask.execute import Resources, run
+    from mdr_dask.plan import estimate
+    from mdr_dask.store import datasets
+
+__all__ = ["Resources", "aggregate", "datasets", "estimate", "load", "loads", "run"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)

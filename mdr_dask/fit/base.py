@@ -22,9 +22,9 @@ class Fit:
         One line with the law itself.
     compute : callable, mapping of str to Dataset -> Dataset
         Takes the groups of a store by series name (``""`` without series), each with dimensions (axes..., realisation,
-        ...) and every scalar parameter as a coordinate, varied or not. Returns one variable for every constant, over whatever
-        it varies with, beside ``<name>_low`` and ``<name>_high`` (95 % interval) and measures of the goodness of fit;
-        units in attrs.
+        ...) and every scalar parameter as a coordinate, varied or not. Returns one variable for every constant, over
+        whatever it varies with, beside ``<name>_low`` and ``<name>_high`` (95 % interval) and measures of the goodness
+        of fit; units in attrs.
     """
 
     name: str

@@ -1,0 +1,167 @@
+"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+CONFIDENCE = 0.95
+RESAMPLES = 1000
+#: Results that one step of the bootstrap holds in memory.
+_STEP = 2**22
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """A reduction over ``realisation`` as data: its name, what it means, how it is computed."""
+
+    name: str
+    meaning: str
+    compute: Callable[[xr.DataArray], xr.DataArray]
+
+
+def count(array: xr.DataArray) -> xr.DataArray:
+    """Return the number of realisations that succeeded."""
+    return array.notnull().sum("realisation")
+
+
+def mean(array: xr.DataArray) -> xr.DataArray:
+    """Return the mean of the realisations that succeeded; NaN where none did."""
+    number = count(array)
+    return array.sum("realisation") / number.where(number > 0)
+
+
+def standard_deviation(array: xr.DataArray) -> xr.DataArray:
+    """Return the standard deviation of one realisation; NaN below two of them."""
+    spare = count(array) - 1
+    squares: xr.DataArray = (array - mean(array)) ** 2
+    variance: xr.DataArray = squares.sum("realisation") / spare.where(spare > 0)
+    return variance**0.5
+
+
+def standard_error(array: xr.DataArray) -> xr.DataArray:
+    """Return the standard deviation of the mean; NaN below two realisations."""
+    number = count(array)
+    return standard_deviation(array) / number.where(number > 0) ** 0.5
+
+
+def quantiles(array: xr.DataArray) -> xr.DataArray:
+    """Return the quantiles `QUANTILES` along a new last dimension ``quantile``, interpolated linearly."""
+    return _reduce(array, _quantiles, {}, "quantile", len(QUANTILES)).assign_coords(quantile=list(QUANTILES))
+
+
+def _reduce(
+    array: xr.DataArray, function: Callable[..., NDArray[np.float64]], arguments: dict[str, int], dim: str, size: int
+) -> xr.DataArray:
+    """Apply a function that turns the last axis, realisations, into a dimension of its own."""
+    reduced: xr.DataArray = xr.apply_ufunc(
+        function,
+        array.chunk(realisation=-1) if array.chunks else array,
+        kwargs=arguments,
+        input_core_dims=[["realisation"]],
+        output_core_dims=[[dim]],
+        dask="parallelized",
+        output_dtypes=[float],
+        dask_gufunc_kwargs={"output_sizes": {dim: size}},
+    )
+    return reduced
+
+
+def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    ordered = np.sort(values, axis=-1)
+    last = np.maximum(np.isfinite(values).sum(axis=-1, keepdims=True) - 1, 0)
+    position = np.asarray(QUANTILES) * last
+    below = np.floor(position).astype(int)
+    low = np.take_along_axis(ordered, below, axis=-1)
+    high = np.take_along_axis(ordered, np.minimum(below + 1, last), axis=-1)
+    return np.asarray(low + (position - below) * (high - low))
+
+
+def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:
+    """Return the percentile bootstrap interval of the mean.
+
+    Parameters
+    ----------
+    array : DataArray
+        With a dimension ``realisation``; NaN where a case failed.
+    seed : int
+        Seed of the resampling. Every case is resampled alike, so that differences between cases keep the pairing that
+        common random numbers give them.
+
+    Returns
+    -------
+    DataArray
+        With the dimension ``bound`` (``low``, ``high``) instead of ``realisation``, at the confidence `CONFIDENCE`;
+        deviations are stretched by sqrt(n / (n - 1)), without which small ensembles are covered too rarely.
+    """
+    return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(
+        bound=np.array(["low", "high"], dtype=object)
+    )
+
+
+def _bootstrap(values: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
+    number = values.shape[-1]
+    draws = np.random.Generator(np.random.Philox(seed)).multinomial(number, np.full(number, 1 / number), RESAMPLES)
+    weights = draws.T.astype(float)
+    flat = values.reshape(-1, number)
+    bounds = np.full((len(flat), 2), np.nan)
+    step = max(1, _STEP // RESAMPLES)
+    for start in range(0, len(flat), step):
+        bounds[start : start + step] = _bootstrap_rows(flat[start : start + step], weights)
+    return bounds.reshape(*values.shape[:-1], 2)
+
+
+def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    valid = np.isfinite(rows)
+    number = valid.sum(axis=1)
+    mean = np.where(valid, rows, 0.0).sum(axis=1) / np.maximum(number, 1)
+    deviations = np.where(valid, rows - mean[:, None], 0.0) @ weights
+    drawn = valid.astype(float) @ weights
+    stretch = np.sqrt(number / np.maximum(number - 1, 1))
+    shifts = np.quantile(deviations / np.maximum(drawn, 1.0), [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=1).T
+    return np.where(number[:, None] > 1, mean[:, None] + stretch[:, None] * shifts, np.nan)
+
+
+STATISTICS = (
+    Statistic("mean", "mean over realisations", mean),
+    Statistic("standard_deviation", "standard deviation over realisations", standard_deviation),
+    Statistic("standard_error", "standard error of the mean over realisations", standard_error),
+    Statistic("quantile", "quantiles over realisations", quantiles),
+    Statistic("interval", "95 % bootstrap interval of the mean over realisations", bootstrap_interval),
+    Statistic("count", "number of realisations that succeeded", count),
+)
+NAMES = tuple(statistic.name for statistic in STATISTICS)
+
+
+def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
+    """Reduce a group of a store over its realisations.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        As :func:`mdr_dask.store.datasets` opens it; backed by dask, the result stays lazy.
+    statistics : sequence of str
+        Some of `NAMES`.
+
+    Returns
+    -------
+    Dataset
+        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs.
+    """
+    wanted = [statistic for statistic in STATISTICS if statistic.name in statistics]
+    reduced = {}
+    for name, array in dataset.data_vars.items():
+        if name == "status" or "realisation" not in array.dims:
+            continue
+        for statistic in wanted:
+            result = statistic.compute(array)
+            units = "1" if statistic.name == "count" else array.attrs.get("units", "1")
+            meaning = f"{array.attrs.get('long_name', name)}, {statistic.meaning}"
+            reduced[f"{name}_{statistic.name}"] = result.assign_attrs(units=units, long_name=meaning)
+    coordinates = {name: value for name, value in dataset.coords.items() if "realisation" not in value.dims}
+    return xr.Dataset(reduced, attrs=dataset.attrs).assign_coords(coordinates)

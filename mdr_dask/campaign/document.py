@@ -1,0 +1,163 @@
+"""YAML text to plain data that knows where each value stands."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from mdr_dask.campaign.problems import Path, Place, Problems, dotted
+
+_TAG = "tag:yaml.org,2002:"
+_DEEPEST = 50
+_LARGEST = 1_000_000
+_KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
+
+
+@dataclass
+class Document:
+    """The data of a YAML file and the nodes that they came from.
+
+    Parameters
+    ----------
+    source, text : str
+        Where the file was read, and the file as written.
+    data : object
+        Mappings, lists, texts, numbers, truth values and None.
+    """
+
+    source: str
+    text: str
+    data: Any = None
+    _nodes: dict[Path, Node] = field(default_factory=dict)
+    _keys: dict[Path, Node] = field(default_factory=dict)
+
+    def place(self, path: Path) -> Place:
+        """Return where the value of a path begins, or the value of the nearest path above it that exists."""
+        while path not in self._nodes and path:
+            path = path[:-1]
+        return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
+
+    def key_place(self, path: Path) -> Place:
+        """Return where the key of a path stands; the value for an entry of a list."""
+        return self._at(self._keys[path]) if path in self._keys else self.place(path)
+
+    def flow(self, path: Path) -> str:
+        """Return the value of a path as YAML on one line, scalars as they were written."""
+        return _flow(self._nodes[path])
+
+    def _at(self, node: Node) -> Place:
+        return Place(self.source, node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def parse(text: str, source: str, problems: Problems) -> Document:
+    """Return the document in a YAML 1.2 text.
+
+    Parameters
+    ----------
+    text, source : str
+        The text and the name it has in messages.
+    problems : Problems
+        Receives what is not YAML, duplicate keys, keys that are not texts and unknown tags.
+    """
+    document = Document(source, text)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ReusedAnchorWarning)
+            root = YAML(typ="safe", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        what = ", ".join(part for part in (error.context, error.problem) if part)
+        problems.add(Place(source, mark.line + 1, mark.column + 1), "", f"not YAML: {what}{_hint(text, mark.index)}")
+    except ReaderError as error:
+        before = text[: error.position]
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        problems.add(Place(source, line, column), "", f"not YAML: {str(error).splitlines()[0]}")
+    else:
+        if root is not None:
+            with suppress(_EndlessError):
+                document.data = _Reader(document, problems).read(root, ())
+    return document
+
+
+def _hint(text: str, index: int) -> str:
+    return " (indent with blanks, not with tabs)" if text[index : index + 1] == "\t" else ""
+
+
+class _EndlessError(Exception):
+    """A document that has been reported as having no end."""
+
+
+class _Reader:
+    """Builds the data of a document, node by node."""
+
+    def __init__(self, document: Document, problems: Problems) -> None:
+        self.document = document
+        self.problems = problems
+
+    def read(self, node: Node, path: Path) -> Any:
+        """Return the plain data of a node and remember its place."""
+        if len(path) > _DEEPEST or len(self.document._nodes) > _LARGEST:
+            self.problems.add(self.document._at(node), "", "nested too deeply, or refers to itself")
+            raise _EndlessError
+        self.document._nodes[path] = node
+        if isinstance(node, MappingNode):
+            return self._mapping(node, path)
+        if isinstance(node, SequenceNode):
+            return [self.read(item, (*path, index)) for index, item in enumerate(node.value)]
+        assert isinstance(node, ScalarNode)
+        return self._scalar(node, path)
+
+    def _mapping(self, node: MappingNode, path: Path) -> dict[str, Any]:
+        data: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key = key_node.value if isinstance(key_node, ScalarNode) else _flow(key_node)
+            place = self.document._at(key_node)
+            if key_node.tag not in (_TAG + "str", _TAG + "merge"):
+                self.problems.add(place, dotted((*path, key)), "expected a name as key (quote it)")
+            elif key in data:
+                first = self.document.key_place((*path, key)).line
+                self.problems.add(place, dotted((*path, key)), f"this key was already given in line {first}")
+            else:
+                self.document._keys[(*path, key)] = key_node
+                data[key] = self.read(value_node, (*path, key))
+        return data
+
+    def _scalar(self, node: ScalarNode, path: Path) -> Any:
+        kind = str(node.tag).removeprefix(_TAG)
+        text: str = node.value
+        if kind == "null":
+            return None
+        if kind == "bool":
+            return text.casefold() == "true"
+        if kind == "int":
+            return _integer(text.replace("_", ""))
+        if kind == "float":
+            return _real(text.replace("_", "").casefold())
+        if kind not in _KEPT_AS_TEXT:
+            self.problems.add(self.document._at(node), dotted(path), f"unknown tag {str(node.tag)!r}")
+        return text
+
+
+def _integer(text: str) -> int:
+    digits = text.lstrip("+-")
+    base = {"0x": 16, "0o": 8, "0b": 2}.get(digits[:2].casefold(), 10)
+    return int(text, base)
+
+
+def _real(text: str) -> float:
+    return float(text.replace(".inf", "inf").replace(".nan", "nan"))
+
+
+def _flow(node: Node) -> str:
+    if isinstance(node, MappingNode):
+        return "{" + ", ".join(f"{_flow(key)}: {_flow(value)}" for key, value in node.value) + "}"
+    if isinstance(node, SequenceNode):
+        return "[" + ", ".join(_flow(item) for item in node.value) + "]"
+    return str(node.value) or "null"

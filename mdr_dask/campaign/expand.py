@@ -1,0 +1,214 @@
+"""Parameters, axes and series of a campaign: every value checked by the model's own parameter set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import Any
+
+from pydantic import ValidationError
+
+from mdr_dask.campaign import fields, sampling, variation
+from mdr_dask.campaign.definition import Axis, Series
+from mdr_dask.campaign.document import Document
+from mdr_dask.campaign.messages import report_errors, value_at
+from mdr_dask.campaign.problems import Path, Place, Problems, dotted
+from mdr_dask.campaign.spec import CampaignSpec, LatinHypercubeSpec, SobolSpec, TableSpec
+from mdr_dask.campaign.units import to_si
+from mdr_dask.campaign.variation import Origin, Variation
+from mdr_dask.models.base import Model, Parameters
+
+
+def expand(
+    document: Document, model: Model[Any], spec: CampaignSpec, directory: str, problems: Problems
+) -> tuple[Series, ...]:
+    """Return the series of a campaign.
+
+    Parameters
+    ----------
+    document : Document
+        The file.
+    model : Model
+        The model that it names.
+    spec : CampaignSpec
+        Its keys, checked.
+    directory : str
+        Where the files it names are looked for.
+    problems : Problems
+        Receives everything wrong with parameters, ranges and tables; series that cannot be built are left out.
+    """
+    found = []
+    for name in spec.series or {"": {}}:
+        paths: dict[str, Path] = {key: ("parameters", key) for key in spec.parameters}
+        if spec.series:
+            paths |= {key: ("series", name, key) for key in spec.series[name]}
+        series = _Expansion(document, model.parameters, spec, directory, problems, paths).series(name)
+        if series is not None:
+            found.append(series)
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Expansion:
+    document: Document
+    parameters: type[Parameters]
+    spec: CampaignSpec
+    directory: str
+    problems: Problems
+    paths: Mapping[str, Path]
+    data: dict[str, Any] = field(init=False)
+
+    def __post_init__(self) -> None:
+        data = {name: value_at(self.document.data, path) for name, path in self.paths.items()}
+        object.__setattr__(self, "data", data)
+
+    def series(self, name: str) -> Series | None:
+        """Return the series of that name, or None if something is wrong with it."""
+        variations = self._variations()
+        if variations is None:
+            return None
+        broken: set[Path] = {found.path for found in variations if not found.items}
+        variations = tuple(found for found in variations if found.items)
+        base = self._validate(self.data, variations, 0, broken)
+        if self.spec.sampling == "grid":
+            columns = [self._grid_column(base, variations, index, broken) for index in range(len(variations))]
+        else:
+            columns = [self._cases(base, variations, broken)] * len(variations)
+        if base is None or broken or any(None in column for column in columns):
+            return None
+        axes = [
+            self._axis(one, [_get(point, one.path) for point in column])
+            for one, column in zip(variations, columns, strict=True)
+        ]
+        return Series(name, base, tuple(axes))
+
+    def _variations(self) -> tuple[Variation, ...] | None:
+        design = self.spec.sampling
+        drawn = isinstance(design, SobolSpec | LatinHypercubeSpec)
+        found = variation.find(self.document, self.parameters, self.data, self.paths, drawn, self.problems)
+        origin = Origin("sampling", self.document.place(("sampling",)))
+        if isinstance(design, TableSpec):
+            for one in found:
+                self._complain(one.origin, f"expected one value, for {design.table} says what varies")
+            return found or sampling.tabled(
+                design.table, self.directory, origin, self.parameters, self.data, self.problems
+            )
+        if drawn and not found:
+            self._complain(origin, "expected at least one range among the parameters, got none")
+        if isinstance(design, SobolSpec | LatinHypercubeSpec) and found and all(one.spread for one in found):
+            return sampling.drawn(design, self.spec.seed, found)
+        if design == "zip":
+            self._check_lengths(found)
+        return found
+
+    def _check_lengths(self, found: Sequence[Variation]) -> None:
+        sized = [one for one in found if one.items]
+        for one in sized[1:]:
+            if len(one.items) != len(sized[0].items):
+                what = f"expected {len(sized[0].items)} values as {'.'.join(sized[0].path)} has, got {len(one.items)}"
+                self._complain(one.origin, f"{what} (sampling: grid combines all with all)")
+
+    def _grid_column(
+        self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
+    ) -> list[Parameters | None]:
+        """Return the parameters at each value of one axis, the others at their first value."""
+        one = variations[index]
+        known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
+        last = self._validate(known, [one], len(one.items) - 1, broken)
+        column: list[Parameters | None] = []
+        seen = set()
+        for position, item in enumerate(one.items):
+            if item.inner and None in (base, last):
+                continue
+            checked = base if position == 0 else self._validate(known, [one], position, broken)
+            column.append(checked)
+            value = None if checked is None else _get(checked, one.path)
+            key = value if isinstance(value, int | float) else item.label
+            if checked is not None and key in seen:
+                self._complain(item.origin, f"this value is given twice: {item.label}")
+            seen.add(key)
+        return column
+
+    def _cases(
+        self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
+    ) -> list[Parameters | None]:
+        """Return the parameters of each case."""
+        known = _checked(base, self.data, {one.path[0] for one in variations})
+        cases = min((len(one.items) for one in variations), default=0)
+        return [self._validate(known, variations, position, broken) for position in range(cases)]
+
+    def _validate(
+        self, data: Mapping[str, Any], variations: Sequence[Variation], position: int, broken: set[Path]
+    ) -> Parameters | None:
+        tree = self._substituted(data, variations, position)
+        try:
+            return self.parameters.model_validate(tree, context={"to_si": to_si, "directory": self.directory})
+        except ValidationError as error:
+            origins: dict[Path, Origin] = {one.path: one.items[position].origin for one in variations}
+
+            def report(path: Path, key: bool, what: str) -> None:
+                if not any(path[: len(start)] == start for start in broken):
+                    place, name = self._locate(path, key, origins)
+                    self.problems.add(place, name, what)
+
+            report_errors(error, self.parameters, tree, report)
+        return None
+
+    def _substituted(self, data: Mapping[str, Any], variations: Sequence[Variation], position: int) -> dict[str, Any]:
+        tree = dict(data)
+        for one in variations:
+            tree = _replaced(tree, one.path, one.items[position].value)
+        return tree
+
+    def _locate(self, path: Path, key: bool, origins: Mapping[Path, Origin]) -> tuple[Place, str]:
+        for size in range(len(path), 0, -1):
+            start, rest = path[:size], path[size:]
+            if start in origins:
+                origin = origins[start]
+                if origin.path is None:
+                    return origin.place, origin.name
+                return self._at((*origin.path, *rest), key), dotted((origin.name, *rest))
+        if path and path[0] in self.paths:
+            full = (*self.paths[str(path[0])], *path[1:])
+            return self._at(full, key), dotted(full)
+        return self.document.key_place(("parameters",)), dotted(("parameters", *path))
+
+    def _at(self, path: Path, key: bool) -> Place:
+        return self.document.key_place(path) if key else self.document.place(path)
+
+    def _axis(self, one: Variation, column: list[Any]) -> Axis:
+        found = fields.owner(self.parameters, one.path, self.data)
+        description = found[0].model_fields[found[1]].description if found else None
+        name = "_".join(one.path)
+        numeric = all(isinstance(value, int | float) and not isinstance(value, bool) for value in column)
+        return Axis(
+            path=".".join(one.path),
+            name=name,
+            dim=name if self.spec.sampling == "grid" else "case",
+            values=tuple(column),
+            labels=None if numeric else tuple(item.label for item in one.items),
+            unit=(fields.unit_at(self.parameters, one.path, self.data) or "1") if numeric else None,
+            long_name=description or name,
+        )
+
+    def _complain(self, origin: Origin, what: str) -> None:
+        self.problems.add(origin.place, origin.name, what)
+
+
+def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
+    """Return the data with everything that does not vary replaced by what has been checked already."""
+    if base is None:
+        return dict(data)
+    return {name: value if name in varied else getattr(base, name) for name, value in data.items()}
+
+
+def _replaced(tree: Any, path: Sequence[str], value: Any) -> Any:
+    if not path:
+        return value
+    inner = dict(tree) if isinstance(tree, Mapping) else {}
+    return {**inner, path[0]: _replaced(inner.get(path[0]), path[1:], value)}
+
+
+def _get(parameters: Any, path: Sequence[str]) -> Any:
+    return reduce(getattr, path, parameters)

@@ -1,0 +1,81 @@
+"""What the parameter types say about a field: its unit, whether a list is one value of it, what stands below it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from mdr_dask.campaign.problems import Path
+from mdr_dask.models.base import unit_of
+
+
+def members(annotation: Any) -> tuple[Any, ...]:
+    """Return the types that a value may have: unions taken apart, annotations removed."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return members(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return tuple(found for part in get_args(annotation) for found in members(part))
+    return (annotation,)
+
+
+def holds_list(info: FieldInfo) -> bool:
+    """Return whether a list in the file is one value of this field and not several."""
+    kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
+    return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
+
+
+def holds_whole_numbers(info: FieldInfo) -> bool:
+    """Return whether the numbers of this field are whole."""
+    kinds = members(info.annotation)
+    return int in kinds and float not in kinds
+
+
+def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
+    """Return the parameter sets that a value of this field may be."""
+    return tuple(kind for kind in members(info.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel))
+
+
+def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
+    """Return the parameter set that a mapping stands for, told by its fixed keys such as ``shape: cone``."""
+    if not isinstance(value, dict):
+        return None
+    candidates = structures(info)
+    fitting = (
+        kind
+        for kind in candidates
+        if all(value.get(key, kind.model_fields[key].default) == only for key, only in fixed(kind).items())
+    )
+    return next(fitting, None)
+
+
+def fixed(kind: type[BaseModel]) -> dict[str, Any]:
+    """Return the fields of a parameter set that can have one value only, with that value."""
+    return {
+        key: get_args(info.annotation)[0]
+        for key, info in kind.model_fields.items()
+        if get_origin(info.annotation) is Literal and len(get_args(info.annotation)) == 1
+    }
+
+
+def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
+    """Return the parameter set and name of the field at a path into the data, None if there is none."""
+    kind: type[BaseModel] | None = parameters
+    for depth, part in enumerate(path):
+        if kind is None or not isinstance(part, str) or part not in kind.model_fields:
+            return None
+        data = data.get(part) if isinstance(data, dict) else None
+        if depth == len(path) - 1 or isinstance(data, list):
+            return kind, part
+        kind = structure(kind.model_fields[part], data)
+    return None
+
+
+def unit_at(parameters: type[BaseModel], path: Path, data: Any) -> str | None:
+    """Return the SI unit of the field at a path into the data, None if it is not a quantity."""
+    found = owner(parameters, path, data)
+    return unit_of(*found) if found else None

@@ -1,0 +1,202 @@
+"""Validation errors of pydantic to sentences for the user, each at its place in the file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from mdr_dask.campaign import fields
+from mdr_dask.campaign.problems import Path, did_you_mean, shown
+from mdr_dask.campaign.units import expected
+
+#: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
+Report = Callable[[Path, bool, str], None]
+
+_BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
+_BOUNDS |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "of at most")}
+_KINDS = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "dict_type": "a mapping",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "finite_number": "a finite number",
+}
+
+
+def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
+    """Report every error of a validation; those of the branches of one union become one sentence.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What ``kind.model_validate(data)`` raised.
+    kind : type
+        The parameter set.
+    data : object
+        The plain data that were validated.
+    report : callable
+        Receives path, whether the key is meant, and the sentence.
+    """
+    groups: dict[Path, list[ErrorDetails]] = {}
+    for details in error.errors(include_url=False):
+        if _is_of_another_branch(details, kind, data):
+            continue
+        groups.setdefault(path_into(data, details), []).append(details)
+    for path, group in groups.items():
+        _report_group(path, group, kind, data, report)
+
+
+def path_into(data: Any, details: ErrorDetails) -> Path:
+    """Return the path into the data that an error speaks of, without the names of union branches in its ``loc``."""
+    path: Path = ()
+    location = details["loc"]
+    for depth, part in enumerate(location):
+        inside_list = isinstance(data, list | tuple) and isinstance(part, int) and part < len(data)
+        if inside_list or (isinstance(data, Mapping) and part in data):
+            path, data = (*path, part), data[part]
+        elif details["type"] == "missing" and depth == len(location) - 1:
+            path = (*path, part)
+    if details["type"] == "union_tag_invalid":
+        path = (*path, *_tag_key(data, details["ctx"]["tag"]))
+    return path
+
+
+def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
+    """Return whether an error comes from trying a structure that the value does not claim to be."""
+    path: Path = ()
+    value = data
+    for part in details["loc"]:
+        if isinstance(value, Mapping) and part in value:
+            path, value = (*path, part), value[part]
+            continue
+        found = fields.owner(kind, path, data)
+        info = found[0].model_fields[found[1]] if found else None
+        claimed = fields.structure(info, value) if info else None
+        if info and claimed and part in {one.__name__ for one in fields.structures(info)} - {claimed.__name__}:
+            return True
+    return False
+
+
+def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
+    return [key for key, value in data.items() if str(value) == tag][:1]
+
+
+def value_at(data: Any, path: Path) -> Any:
+    """Return the plain value at a path."""
+    for part in path:
+        data = data[part]
+    return data
+
+
+def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], data: Any, report: Report) -> None:
+    first = group[0]
+    own = next((details for details in group if details["type"] in ("value_error", "assertion_error")), None)
+    if own is not None:
+        what = str(own["ctx"]["error"])
+        report((*path, *_entry(value_at(data, path), what)), False, what)
+    elif first["type"] == "missing":
+        report(path, False, _missing(path, kind, data))
+    elif first["type"] == "extra_forbidden":
+        report(path, True, f"unknown key{did_you_mean(path[-1], _known(path, kind, data))}")
+    else:
+        value = value_at(data, path)
+        wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
+        report(path, False, f"expected {wanted}, got {shown(value)}{_hint(group, value)}")
+
+
+def _entry(value: Any, what: str) -> Path:
+    """Return the index of the entry of a list that a sentence quotes."""
+    entries = value if isinstance(value, list) else []
+    return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
+
+
+def _hint(group: list[ErrorDetails], value: Any) -> str:
+    types = {details["type"] for details in group}
+    if isinstance(value, str):
+        hint = did_you_mean(value, [choice for details in group for choice in _choices(details)])
+        return hint if "mean" in hint else ""
+    if isinstance(value, float) and value.is_integer() and types & {"int_type", "int_from_float"}:
+        return f" (write {value:.0f})"
+    if isinstance(value, dict) and types & {"float_type", "int_type"}:
+        return " (a range is {linear: [a, b, n]} or {geometric: [a, b, n]})"
+    return ""
+
+
+def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any) -> str:
+    error, context = details["type"], details.get("ctx", {})
+    unit = fields.unit_at(kind, path, data)
+    if error in _BOUNDS:
+        key, words = _BOUNDS[error]
+        bound = context[key]
+        noun = "whole number" if isinstance(bound, int) else "number"
+        behind = f" {unit}" if bound and unit not in (None, "1") else ""
+        return f"a {noun} {words} {plain(bound)}{behind}"
+    if error == "float_type" and unit is not None:
+        return expected(unit)
+    if context.get("class_name") == "DataFile":
+        return "the name of a file"
+    if error in ("literal_error", "enum"):
+        return str(context["expected"])
+    if error == "union_tag_invalid":
+        return _listed(_choices(details))
+    if error in ("union_tag_not_found", "model_type", "model_attributes_type"):
+        return _kinds(path, kind, data)
+    if error in ("too_short", "too_long"):
+        size, words = ("min_length", "at least") if error == "too_short" else ("max_length", "at most")
+        return f"{words} {context[size]} {'entry' if context[size] == 1 else 'entries'}"
+    return _KINDS.get(error) or re.sub(r"^(Input|Value) should be ", "", details["msg"])
+
+
+def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return ``a mapping with shape: 'cone' or 'plane'`` for a parameter that has several structures."""
+    found = fields.owner(kind, path, data)
+    structures = fields.structures(found[0].model_fields[found[1]]) if found else ()
+    keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
+    if not keys:
+        return "a mapping"
+    name = keys[0][0]
+    return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
+
+
+def plain(number: float) -> str:
+    """Return a number as short as it can be written."""
+    return str(number) if isinstance(number, int) else f"{number:.12g}"
+
+
+def _choices(details: ErrorDetails) -> list[str]:
+    context = details.get("ctx", {})
+    return re.findall(r"'([^']*)'", str(context.get("expected_tags") or context.get("expected") or ""))
+
+
+def _listed(words: Iterable[str]) -> str:
+    quoted = [repr(word) for word in words]
+    return " or ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
+
+
+def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
+    found = fields.owner(kind, path, data)
+    if found is None:
+        return "missing"
+    description = found[0].model_fields[found[1]].description
+    unit = fields.unit_at(kind, path, data)
+    return ", ".join(filter(None, ["missing", unit and f"expected {expected(unit)}"])) + (
+        f": {description}" if description else ""
+    )
+
+
+def _known(path: Path, kind: type[BaseModel], data: Any) -> list[str]:
+    inner: type[BaseModel] | None = kind
+    for depth, part in enumerate(path[:-1]):
+        info = inner.model_fields.get(str(part)) if inner else None
+        if isinstance(part, int):
+            continue
+        inner = fields.structure(info, value_at(data, path[: depth + 1])) if info else None
+    return list(inner.model_fields) if inner else []

@@ -1,0 +1,82 @@
+"""Problems of a campaign file: where each stands, what is wrong, and what was probably meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from mdr_dask.errors import CampaignError
+
+Path = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, order=True)
+class Place:
+    """A position in a file; lines and columns count from 1."""
+
+    source: str
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, order=True)
+class Problem:
+    """One thing wrong: its place, the key it concerns and a sentence."""
+
+    place: Place
+    where: str
+    what: str
+
+    def __str__(self) -> str:
+        where = f"{self.where}: " if self.where else ""
+        return f"{self.place.source}:{self.place.line}:{self.place.column}: {where}{self.what}"
+
+
+class Problems:
+    """Problems collected so far, at most one for each place and key."""
+
+    def __init__(self) -> None:
+        self._found: dict[tuple[Place, str], Problem] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._found)
+
+    def add(self, place: Place, where: str, what: str) -> None:
+        """Note a problem, unless the same key already has one at this place."""
+        self._found.setdefault((place, where), Problem(place, where, what))
+
+    def raise_if_any(self) -> None:
+        """Raise one `CampaignError` with all problems, those of the file read first in front, by line."""
+        if self._found:
+            sources = list(dict.fromkeys(place.source for place, _ in self._found))
+            ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))
+            raise CampaignError(*map(str, ordered))
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """Return ``outputs[1]`` for ``("outputs", 1)``."""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def did_you_mean(word: Any, known: Sequence[str]) -> str:
+    """Return a hint in parentheses, with a leading blank: the nearest known word, or all of them if they are few."""
+    folded = {name.casefold(): name for name in known}
+    near = get_close_matches(str(word).casefold(), list(folded), n=1)
+    if near:
+        return f" (did you mean {folded[near[0]]!r}?)"
+    return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""
+
+
+def shown(value: Any) -> str:
+    """Return a value as a message quotes it."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return "a mapping" if value else "an empty mapping"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,173 @@
+"""From the text of a campaign file to a checked `Campaign`."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+from typing import Any
+
+from pydantic import ValidationError
+
+from mdr_dask import models
+from mdr_dask.campaign.definition import Campaign, Replication, Series, Tolerance
+from mdr_dask.campaign.document import Document, parse
+from mdr_dask.campaign.expand import expand
+from mdr_dask.campaign.messages import report_errors
+from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
+from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
+from mdr_dask.campaign.units import to_si
+from mdr_dask.errors import CampaignError
+from mdr_dask.models.base import Model
+
+
+def load(path: str | FilePath) -> Campaign:
+    """Read a campaign file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The YAML file; files that it names are looked for beside it.
+
+    Raises
+    ------
+    CampaignError
+        With every problem of the file, by line: ``force.yaml:12:12: parameters.hurst: expected a number of at most 1,
+        got 1.2``.
+    """
+    try:
+        text = FilePath(path).read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CampaignError(f"{path}:1:1: expected UTF-8 text, got byte {error.object[error.start]:#x}") from None
+    except OSError as error:
+        raise CampaignError(f"{path}: cannot read the campaign: {error.strerror}") from None
+    return loads(text, str(path), str(FilePath(path).parent))
+
+
+def loads(text: str, source: str, directory: str) -> Campaign:
+    """Read a campaign from its text.
+
+    Parameters
+    ----------
+    text : str
+        YAML 1.2.
+    source : str
+        The name that it has in messages.
+    directory : str
+        Where files that it names are looked for.
+
+    Raises
+    ------
+    CampaignError
+        With every problem of the text, by line.
+    """
+    problems = Problems()
+    document = parse(text, source, problems)
+    if not isinstance(document.data, dict):
+        if not problems:
+            what = f"expected a mapping with the keys name, model and parameters, got {shown(document.data)}"
+            problems.add(document.place(()), "", what)
+        problems.raise_if_any()
+    spec, wrong = _spec(document, problems)
+    model = None if "model" in wrong else _model(document, spec, problems)
+    if model is None:
+        problems.raise_if_any()
+    assert model is not None
+    series = () if wrong & {"parameters", "series", "sampling"} else expand(document, model, spec, directory, problems)
+    outputs = _outputs(document, spec, model, problems)
+    replication = _replication(document, spec, model, outputs, problems)
+    _check_blocks(document, spec, series, problems)
+    problems.raise_if_any()
+    return Campaign(
+        name=spec.name,
+        model=model.name,
+        seed=spec.seed,
+        replication=replication,
+        series=series,
+        outputs=outputs,
+        accuracy=spec.accuracy,
+        store=spec.store.path or f"results/{spec.name}.zarr",
+        blocks=dict(spec.store.blocks),
+        text=text,
+        source=source,
+    )
+
+
+def _spec(document: Document, problems: Problems) -> tuple[CampaignSpec, set[str]]:
+    """Return the checked keys and the names of those that are wrong, which then have a stand-in."""
+    wrong: set[str] = set()
+
+    def report(path: Path, key: bool, what: str) -> None:
+        wrong.add(str(path[0]))
+        problems.add(document.key_place(path) if key else document.place(path), dotted(path), what)
+
+    context = {"to_si": to_si}
+    try:
+        return CampaignSpec.model_validate(document.data, context=context), wrong
+    except ValidationError as error:
+        report_errors(error, CampaignSpec, document.data, report)
+    stand_in: dict[str, Any] = {"name": "unnamed", "model": "none", "parameters": {}}
+    stand_in |= {key: value for key, value in document.data.items() if key not in wrong}
+    return CampaignSpec.model_validate(stand_in, context=context), wrong
+
+
+def _model(document: Document, spec: CampaignSpec, problems: Problems) -> Model[Any] | None:
+    if spec.model in models.NAMES:
+        return models.load(spec.model)
+    problems.add(
+        document.place(("model",)), "model", f"unknown model {spec.model!r}{did_you_mean(spec.model, models.NAMES)}"
+    )
+    return None
+
+
+def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems: Problems) -> tuple[str, ...]:
+    if spec.outputs is None:
+        return tuple(output.name for output in model.outputs if output.default)
+    names = [output.name for output in model.outputs]
+    for index, name in enumerate(spec.outputs):
+        path = ("outputs", index)
+        if name not in names:
+            problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")
+        elif name in spec.outputs[:index]:
+            problems.add(document.place(path), dotted(path), f"this output is given twice: {name}")
+    return tuple(name for name in names if name in spec.outputs)
+
+
+def _replication(
+    document: Document, spec: CampaignSpec, model: Model[Any], outputs: tuple[str, ...], problems: Problems
+) -> Replication:
+    wanted = spec.realisations
+    if not isinstance(wanted, AdaptiveSpec):
+        return Replication(wanted, wanted, {})
+    if wanted.at_least > wanted.at_most:
+        path: Path = ("realisations", "at_most")
+        what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
+        problems.add(document.place(path), dotted(path), what)
+    until = {}
+    for name, tolerance in wanted.until.items():
+        path = ("realisations", "until", name)
+        if name not in outputs:
+            problems.add(document.key_place(path), dotted(path), f"not among the outputs{did_you_mean(name, outputs)}")
+            continue
+        try:
+            until[name] = _tolerance(tolerance, model.output(name).unit)
+        except ValueError as error:
+            problems.add(document.place(path), dotted(path), str(error))
+    return Replication(wanted.at_least, wanted.at_most, until)
+
+
+def _tolerance(given: float | str | ToleranceSpec, unit: str) -> Tolerance:
+    if isinstance(given, ToleranceSpec):
+        absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
+        tolerance = Tolerance(given.relative, absolute)
+    else:
+        tolerance = Tolerance(relative=to_si(given, "1") if isinstance(given, str) else given)
+    if min(tolerance.relative, tolerance.absolute) < 0 or tolerance == Tolerance():
+        raise ValueError("expected a tolerance above 0")
+    return tolerance
+
+
+def _check_blocks(document: Document, spec: CampaignSpec, series: tuple[Series, ...], problems: Problems) -> None:
+    dims = list(dict.fromkeys([*(axis.dim for one in series for axis in one.axes), "realisation"]))
+    for name in spec.store.blocks if series else ():
+        if name not in dims:
+            path = ("store", "blocks", name)
+            problems.add(document.key_place(path), dotted(path), f"unknown dimension{did_you_mean(name, dims)}")

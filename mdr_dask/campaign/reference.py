@@ -1,0 +1,219 @@
+"""The reference of the campaign file: ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from mdr_dask import models
+from mdr_dask.campaign import fields
+from mdr_dask.campaign.messages import plain
+from mdr_dask.campaign.spec import CampaignSpec
+from mdr_dask.campaign.units import DEFINITIONS
+from mdr_dask.models.base import DataFile, Model, unit_of
+
+_HEAD = """\
+# The campaign file
+
+A campaign file is YAML 1.2. It names a model, gives its parameters, says which of them vary, and what is wanted.
+Every problem in a file is reported at once as `file:line:column: where: what, got value (hint)`.
+Made by `python -m mdr_dask.campaign.reference > docs/campaign-file.md`; do not edit. `mdr-dask schema` prints the same
+as a JSON schema, with which editors complete and check as you type: put
+`# yaml-language-server: $schema=campaign.schema.json` in the first line.
+
+```yaml
+name: force-sweep
+model: sliding_friction
+seed: 2013
+realisations: 200                  # or {at_least: 20, at_most: 2000, until: {friction_coefficient: 1 %}}
+parameters:
+  length: 20 mm                    # a bare number is SI; a text carries its unit
+  hurst: 0.7
+  normal_force: {geometric: [1 mN, 100 N, 20]}
+  velocity: {geometric: [1e-4, 1e2, 36]}
+series:                            # optional: each replaces some parameters, and has its own group in the store
+  roughness: {rms_roughness: {geometric: [1 nm, 10 um, 20]}}
+  spacing: {points: [2000, 5000, 20000]}
+outputs: [friction_coefficient, contact_fraction]
+```
+"""
+
+_VARIATION = """\
+## What varies
+
+| written | means |
+|---|---|
+| `[1 N, 3 N, 10 N]` | these values; not for a parameter that is itself a list |
+| `{values: [...]}` | the same, and inside structured parameters the only way to write it |
+| `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
+| `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
+| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | whole structured values, named in the store as they are written |
+| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | one entry of a structure; its axis is `indenter_angle` |
+
+The ends of a range are exact, the values between are rounded to 14 digits, so that decades are decades. Ranges of
+whole numbers are rounded to whole numbers, each once.
+
+With `series`, each series is the `parameters` with some replaced wholly; without, the campaign is one series without
+a name.
+
+| `sampling` | means |
+|---|---|
+| `grid` | all values of each with all values of the others: one dimension for each varied parameter |
+| `zip` | the first values together, the second values together, ...: one dimension `case` |
+| `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
+| `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
+| `{table: cases.csv}` | a case for each line of a CSV file |
+
+All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
+`{geometric: [a, b]}` uniform in the logarithm. Drawn points depend on the file only, by `seed`; a larger `sobol` keeps
+the points of a smaller one. The headings of a table are names of parameters and perhaps units:
+`velocity [mm/s],indenter.angle [deg]`.
+"""
+
+
+def reference_page() -> str:
+    """Return the page as it stands in ``docs/campaign-file.md``."""
+    parts = [_HEAD, "## Keys\n", _table(_rows(CampaignSpec, "key")), _VARIATION, _units()]
+    parts += [_model(models.load(name)) for name in models.NAMES]
+    return "\n".join(parts)
+
+
+def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return parameter, unit, default, allowed values and meaning of every parameter of a model, nested ones too."""
+    return list(_rows(model.parameters, "parameter"))
+
+
+def output_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return output, unit, own dimensions, whether it is a default, and meaning of every output of a model."""
+    return [
+        {
+            "output": output.name,
+            "unit": output.unit,
+            "dimensions": ", ".join(output.dims),
+            "default": "yes" if output.default else "no",
+            "meaning": output.long_name,
+        }
+        for output in model.outputs
+    ]
+
+
+def _model(model: Model[Any]) -> str:
+    summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
+    tables = [_table(parameter_rows(model)), _table(output_rows(model))]
+    return "\n".join([f"## `{model.name}`", "", summary, "", *tables])
+
+
+def _table(rows: Iterable[dict[str, str]]) -> str:
+    rows = list(rows)
+    name = next(iter(rows[0]))
+    lines = [f"| {' | '.join(rows[0])} |", "|---" * len(rows[0]) + "|"]
+    lines += [f"| {' | '.join([f'`{row[name]}`', *list(row.values())[1:]])} |" for row in rows]
+    return "\n".join([*lines, ""])
+
+
+def _units() -> str:
+    lines = [re.sub(r"; offset: [0-9.]+", "", line) for line in DEFINITIONS.split("\n") if line]
+    prefixes = [line.split("=")[-1].strip().rstrip("-") for line in lines if line.split("=")[0].strip().endswith("-")]
+    names = [_symbols(line) for line in lines if not line.split("=")[0].strip().endswith("-")]
+    return "\n".join(
+        [
+            "## Units",
+            "",
+            "A number without a unit is in SI. With a unit it is a text, `20 mm`, `10 mPa s`, `5 1/mm`, `870 kg/m^3`;",
+            "the unit has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`.",
+            "",
+            f"Prefixes: {', '.join(f'`{prefix}`' for prefix in prefixes)}, and their names.",
+            "",
+            f"Units: `%`, {', '.join(names)}.",
+            "",
+        ]
+    )
+
+
+def _symbols(line: str) -> str:
+    name, _, *others = (part.strip() for part in line.split("="))
+    return "/".join(f"`{word}`" for word in [name, *others] if word != "_")
+
+
+def _rows(parameters: type[BaseModel], first: str, before: str = "", condition: str = "") -> Iterator[dict[str, str]]:
+    properties = parameters.model_json_schema()["properties"]
+    for name, info in parameters.model_fields.items():
+        if name in fields.fixed(parameters):
+            continue
+        structures = [structure for structure in fields.structures(info) if structure is not DataFile]
+        yield {
+            first: f"{before}{name}",
+            "unit": unit_of(parameters, name) or "",
+            "default": _default(info),
+            "allowed": " or ".join(filter(None, [_allowed(properties[name]), *map(_shape, structures)])),
+            "meaning": f"{condition}{info.description or ''}",
+        }
+        for structure in structures:
+            yield from _rows(structure, first, f"{before}{name}.", _condition(structure))
+
+
+def _condition(structure: type[BaseModel]) -> str:
+    fixed = ", ".join(f"{key}: {value}" for key, value in fields.fixed(structure).items())
+    return f"({fixed}) " if fixed else ""
+
+
+def _shape(structure: type[BaseModel]) -> str:
+    fixed = fields.fixed(structure)
+    entries = [f"{key}: {fixed[key]}" if key in fixed else key for key in structure.model_fields]
+    return f"{{{', '.join(entries)}}}"
+
+
+def _default(info: FieldInfo) -> str:
+    if info.is_required():
+        return "required"
+    value = info.get_default(call_default_factory=True, validated_data={})
+    return "" if value is None or value == {} else _yaml(value)
+
+
+def _yaml(value: Any) -> str:
+    if isinstance(value, BaseModel):
+        return _yaml(value.model_dump(exclude_none=True))
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {_yaml(inner)}" for key, inner in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_yaml, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return plain(value) if isinstance(value, float) else str(value)
+
+
+def _allowed(node: dict[str, Any]) -> str:
+    for key in ("anyOf", "oneOf"):
+        if key in node:
+            return " or ".join(dict.fromkeys(filter(None, map(_allowed, node[key]))))
+    if "enum" in node or "const" in node:
+        return ", ".join(map(str, node.get("enum", [node.get("const")])))
+    kind = node.get("type")
+    if kind == "array":
+        return f"list, each: {_allowed(node.get('items', {}))}"
+    if kind in ("number", "integer"):
+        return " ".join(filter(None, [_NOUNS[kind], ", ".join(_bounds(node))]))
+    return _NOUNS.get(str(kind), "")
+
+
+_NOUNS = {
+    "number": "number",
+    "integer": "whole number",
+    "boolean": "true, false",
+    "string": "text",
+    "object": "mapping",
+}
+
+
+def _bounds(node: dict[str, Any]) -> list[str]:
+    signs = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
+    return [f"{sign} {plain(node[key])}" for key, sign in signs.items() if key in node]
+
+
+if __name__ == "__main__":
+    sys.stdout.write(reference_page())

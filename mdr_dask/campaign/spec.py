@@ -1,0 +1,116 @@
+"""The keys of a campaign file, as far as they do not depend on the model."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag
+
+from mdr_dask.models.base import Parameters, quantity
+
+
+def _usable_as_file_name(name: str) -> str:
+    if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) or name.endswith("."):
+        raise ValueError(f"expected letters, digits, '-', '_' and '.' only, for it names a file, got {name!r}")
+    return name
+
+
+FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
+
+
+class ToleranceSpec(Parameters):
+    """How narrow the standard error of an output has to be; either part is enough."""
+
+    relative: float = quantity("1", "part of the mean, such as 1 %", default=0.0, ge=0)
+    absolute: float | str = Field(0.0, description="in the unit of the output, such as 2 um")
+
+
+class AdaptiveSpec(Parameters):
+    """Realisations until the standard errors are narrow enough."""
+
+    at_least: int = Field(20, ge=2, description="realisations that every case gets")
+    at_most: int = Field(description="realisations after which a case is left as it is", ge=2)
+    until: dict[str, float | str | ToleranceSpec] = Field(
+        min_length=1, description="standard error wanted of each output named: 1 %, or {relative: 1 %, absolute: 2 um}"
+    )
+
+
+class SobolSpec(Parameters):
+    """Scrambled Sobol points."""
+
+    sobol: int = Field(ge=1, le=10**6, description="number of cases, spread evenly by a scrambled Sobol sequence")
+
+
+class LatinHypercubeSpec(Parameters):
+    """A Latin hypercube."""
+
+    latin_hypercube: int = Field(
+        ge=1, le=10**6, description="number of cases, one in each of as many strips of every range"
+    )
+
+
+class TableSpec(Parameters):
+    """Cases from a file."""
+
+    table: str = Field(
+        description="CSV file, relative to the campaign file: a column for each varied parameter, headed by its "
+        "dotted name and perhaps a unit, such as velocity [mm/s]"
+    )
+
+
+def _sampling_kind(value: Any) -> str:
+    if isinstance(value, dict) and len(value) == 1:
+        return str(next(iter(value)))
+    return "name"
+
+
+Sampling = Annotated[
+    Annotated[Literal["grid", "zip"], Tag("name")]
+    | Annotated[SobolSpec, Tag("sobol")]
+    | Annotated[LatinHypercubeSpec, Tag("latin_hypercube")]
+    | Annotated[TableSpec, Tag("table")],
+    Discriminator(_sampling_kind, custom_error_type="sampling", custom_error_message=(
+        "Input should be 'grid', 'zip', {sobol: n}, {latin_hypercube: n} or {table: cases.csv}"
+    )),
+]  # fmt: skip
+
+Realisations = Annotated[
+    Annotated[int, Field(ge=1), Tag("number")] | Annotated[AdaptiveSpec, Tag("mapping")],
+    Discriminator(lambda value: "mapping" if isinstance(value, dict | AdaptiveSpec) else "number"),
+]
+
+
+class StoreSpec(Parameters):
+    """Where results go."""
+
+    path: str | None = Field(
+        None, min_length=1, description="path or URL of the Zarr store; results/<name>.zarr if not given"
+    )
+    blocks: dict[str, Annotated[int, Field(ge=1)]] = Field(
+        default_factory=dict, description="chunk length along an axis or along realisation; chosen if not given"
+    )
+
+
+class CampaignSpec(Parameters):
+    """A campaign file."""
+
+    name: FileName = Field(description="name of the campaign, and of its store if that has no path")
+    model: str = Field(description="what is computed")
+    seed: int = Field(0, ge=0, description="every random number follows from it")
+    realisations: Realisations = Field(1, description="independent rough lines computed for each case")
+    parameters: dict[str, Any] = Field(
+        description="parameters of the model, varied by a list, {linear: [a, b, n]}, {geometric: [a, b, n]} or "
+        "{values: [...]}"
+    )
+    series: dict[FileName, dict[str, Any]] | None = Field(
+        None, min_length=1, description="groups of cases by name, each replacing some of the parameters above"
+    )
+    sampling: Sampling = Field("grid", description="how varied parameters are combined")
+    accuracy: float | None = quantity(
+        "1", "error allowed for the outputs, as a part of their value", default=None, gt=0, lt=1
+    )
+    outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
+        None, description="arrays that are computed and stored; those marked as default if not given"
+    )
+    store: StoreSpec = Field(default_factory=StoreSpec, description="where results go")

@@ -1,0 +1,248 @@
+"""How one parameter varies: ranges, lists and spreads, found in the data and turned into SI values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NoReturn
+
+import numpy as np
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from mdr_dask.campaign import fields
+from mdr_dask.campaign.document import Document
+from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
+from mdr_dask.campaign.units import expected, to_si
+
+#: More values than this on one axis are a mistake in the file, not a study.
+MOST_VALUES = 10**6
+RANGES = ("linear", "geometric", "values")
+_DIGITS = 14
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a value came from: a path of the document, or a cell of a table; and the name that messages give it."""
+
+    name: str
+    place: Place
+    path: Path | None = None
+
+
+@dataclass(frozen=True)
+class Item:
+    """One value of a varied parameter, as written or in SI; inner ones lie between the ends of a range."""
+
+    value: Any
+    label: str
+    origin: Origin
+    inner: bool = False
+
+
+@dataclass(frozen=True)
+class Spread:
+    """An interval from which values are drawn, evenly in the value or in its logarithm."""
+
+    low: float
+    high: float
+    geometric: bool
+    whole: bool
+
+    def at(self, shares: Any) -> list[float]:
+        """Return the values at shares of the interval between 0 and 1."""
+        if self.geometric:
+            values = self.low * (self.high / self.low) ** shares
+        else:
+            values = self.low + (self.high - self.low) * shares
+        values = np.clip(values, min(self.low, self.high), max(self.low, self.high))
+        return [_tidy(value, self.whole) for value in values]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A varied parameter: its path in the parameters, and its values or the interval that they are drawn from."""
+
+    path: tuple[str, ...]
+    origin: Origin
+    items: tuple[Item, ...] = ()
+    spread: Spread | None = None
+
+    def drawn(self, shares: Any) -> Variation:
+        """Return this variation with values drawn at shares of its interval."""
+        assert self.spread is not None
+        return replace(self, items=tuple(Item(value, f"{value:g}", self.origin) for value in self.spread.at(shares)))
+
+
+def find(
+    document: Document,
+    parameters: type[BaseModel],
+    data: Mapping[str, Any],
+    paths: Mapping[str, Path],
+    drawn: bool,
+    problems: Problems,
+) -> tuple[Variation, ...]:
+    """Return the varied parameters, in the order of the data.
+
+    Parameters
+    ----------
+    document : Document
+        The file.
+    parameters : type
+        The parameter set of the model.
+    data : mapping
+        Plain data of the parameters by name.
+    paths : mapping of str to path
+        Where in the document each of them stands.
+    drawn : bool
+        Whether ranges are intervals to draw from, written without a count.
+    problems : Problems
+        Receives malformed ranges and empty lists; what varies so has neither items nor an interval.
+    """
+    search = _Search(document, parameters, data, drawn, problems)
+    return tuple(found for name, value in data.items() for found in search.top(name, value, paths[name]))
+
+
+class _MalformedError(Exception):
+    """A range that has been reported."""
+
+
+@dataclass(frozen=True)
+class _Search:
+    document: Document
+    parameters: type[BaseModel]
+    data: Mapping[str, Any]
+    drawn: bool
+    problems: Problems
+
+    def top(self, name: str, value: Any, at: Path) -> Iterator[Variation]:
+        """Yield what varies in one parameter of the model; at this level a plain list varies too."""
+        info = self._field((name,))
+        if isinstance(value, list) and info is not None and not fields.holds_list(info):
+            yield self._variation((name,), at, lambda: self._listed(value, at, at))
+        else:
+            yield from self._below((name,), value, at)
+
+    def _below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
+        info = self._field(path)
+        if info is None or not isinstance(value, dict):
+            return
+        structures = fields.structures(info)
+        kinds = [key for key in value if key in RANGES and not any(key in kind.model_fields for kind in structures)]
+        if kinds and (len(value) == 1 or not structures):
+            yield self._variation(path, at, lambda: self._range(path, value, at))
+        else:
+            for key, inner in value.items():
+                yield from self._below((*path, key), inner, (*at, key))
+
+    def _variation(self, path: tuple[str, ...], at: Path, read: Callable[[], Spread | list[Item]]) -> Variation:
+        origin = self._origin(at, at)
+        try:
+            content = read()
+        except _MalformedError:
+            return Variation(path, origin)
+        if isinstance(content, Spread):
+            return Variation(path, origin, spread=content)
+        return Variation(path, origin, tuple(content))
+
+    def _listed(self, values: Any, at: Path, name: Path) -> list[Item]:
+        if not isinstance(values, list):
+            self._complain(at, f"expected a list of values, got {shown(values)}", name)
+        if self.drawn:
+            self._complain(
+                at, "expected one value, {linear: [a, b]} or {geometric: [a, b]} with this sampling, got a list", name
+            )
+        if not values:
+            self._complain(at, "expected at least one value, got []", name)
+        places = [(*at, index) for index in range(len(values))]
+        return [
+            Item(value, self.document.flow(place), self._origin(place, name))
+            for value, place in zip(values, places, strict=True)
+        ]
+
+    def _range(self, path: tuple[str, ...], value: dict[str, Any], name: Path) -> Spread | list[Item]:
+        if len(value) != 1:
+            self._complain(name, f"expected one of linear, geometric, values alone, got {', '.join(value)}", name)
+        [(kind, content)] = value.items()
+        at = (*name, kind)
+        if kind == "values":
+            return self._listed(content, at, name)
+        spread = self._spread(path, kind, content, at)
+        return spread if self.drawn else self._items(spread, content, at)
+
+    def _spread(self, path: tuple[str, ...], kind: str, content: Any, at: Path) -> Spread:
+        size, wanted = (2, "[first, last]") if self.drawn else (3, "[first, last, count]")
+        if not isinstance(content, list) or len(content) != size:
+            hint = " (the sampling says how many)" if self.drawn else ""
+            self._complain(at, f"expected {wanted}, got {shown(content)}{hint}", at[:-1])
+        low, high = (self._end(path, kind, content[index], (*at, index)) for index in range(2))
+        if low == high:
+            self._complain(at, f"expected two different ends, got {shown(content[0])} and {shown(content[1])}", at[:-1])
+        info = self._field(path)
+        return Spread(low, high, kind == "geometric", info is not None and fields.holds_whole_numbers(info))
+
+    def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
+        name, count = at[:-1], content[2]
+        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
+            self._complain(
+                (*at, 2), f"expected a whole number from 2 to {MOST_VALUES} of values, got {shown(count)}", name
+            )
+        numbers = spaced(spread, count)
+        if len(numbers) < (2 if spread.whole else count):
+            self._complain(at, f"expected ends far enough apart for {count} values", name)
+        first, last = (numbers[0], numbers[-1]) if spread.whole else content[:2]
+        inner = [Item(number, f"{number:g}", self._origin(at, name), inner=True) for number in numbers[1:-1]]
+        ends = [
+            Item(end, self.document.flow((*at, index)), self._origin((*at, index), name))
+            for index, end in enumerate((first, last))
+        ]
+        return [ends[0], *inner, ends[1]]
+
+    def _end(self, path: tuple[str, ...], kind: str, value: Any, at: Path) -> float:
+        unit, name, number = fields.unit_at(self.parameters, path, self.data) or "1", at[:-2], np.nan
+        if isinstance(value, str):
+            try:
+                number = to_si(value, unit)
+            except ValueError as error:
+                self._complain(at, str(error), name)
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            self._complain(at, f"expected {expected(unit)}, got {shown(value)}", name)
+        else:
+            number = float(value)
+        if not np.isfinite(number):
+            self._complain(at, f"expected a finite number, got {shown(value)}", name)
+        if kind == "geometric" and number <= 0:
+            self._complain(at, f"expected an end above 0 of a geometric range, got {shown(value)}", name)
+        return number
+
+    def _field(self, path: tuple[str, ...]) -> FieldInfo | None:
+        found = fields.owner(self.parameters, path, self.data)
+        return found[0].model_fields[found[1]] if found else None
+
+    def _origin(self, path: Path, name: Path) -> Origin:
+        return Origin(dotted(name), self.document.place(path), path)
+
+    def _complain(self, at: Path, what: str, name: Path) -> NoReturn:
+        self.problems.add(self.document.place(at), dotted(name), what)
+        raise _MalformedError
+
+
+def spaced(spread: Spread, count: int) -> list[float]:
+    """Return values from one end to the other: the ends exact, the others to 14 digits, so that decades are decades.
+
+    Parameters
+    ----------
+    spread : Spread
+        The interval; a whole one gives whole numbers, each once, perhaps fewer than `count`.
+    count : int
+        Number of values, at least 2.
+    """
+    inner = spread.at(np.arange(1, count - 1) / (count - 1))
+    ends = [_tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
+    return list(dict.fromkeys([ends[0], *inner, ends[1]]))
+
+
+def _tidy(value: float, whole: bool, exact: bool = False) -> float:
+    if whole:
+        return round(value)
+    return float(value) if exact else float(f"{value:.{_DIGITS}g}")

@@ -1,0 +1,54 @@
+"""The command line: the only room that prints or exits."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from mdr_dask import __version__
+from mdr_dask.cli.campaigns import check, models, run, schema
+from mdr_dask.cli.results import aggregate, fit, plot, show, status
+
+INTERRUPTED = 130
+
+
+@click.group(context_settings={"auto_envvar_prefix": "MDR_DASK", "help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="mdr-dask")
+def cli() -> None:
+    """Parameter studies for tribology with the method of dimensionality reduction.
+
+    \b
+    mdr-dask check campaigns/quickstart.yaml     is the file right, and what will it cost?
+    mdr-dask run campaigns/quickstart.yaml       run it, or whatever of it is not there yet
+    mdr-dask show results/quickstart.zarr        look at results, while it runs too
+    mdr-dask plot results/quickstart.zarr        draw the figures
+
+    Every option can also be set as an environment variable MDR_DASK_<COMMAND>_<OPTION>.
+    Exit codes: 0 all done, 1 ran but some cases failed, 2 not run, 130 interrupted.
+    """
+
+
+for command in (models, check, run, status, show, aggregate, fit, plot, schema):
+    cli.add_command(command)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    from mdr_dask.errors import MdrDaskError
+
+    try:
+        result = cli.main(arguments, prog_name="mdr-dask", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("interrupted; nothing is lost: the same command goes on where this one stopped", err=True)
+        return INTERRUPTED
+    except MdrDaskError as error:
+        click.echo(str(error), err=True)
+        return 2
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+    return result if isinstance(result, int) else 0

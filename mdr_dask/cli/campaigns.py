@@ -1,0 +1,207 @@
+"""Commands around a campaign file: models, check, run, schema."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdr_dask.cli.printing import print_json, print_rows
+from mdr_dask.cli.progress import reporter, seconds
+
+if TYPE_CHECKING:
+    from mdr_dask.execute import Progress, Resources
+    from mdr_dask.plan import Estimate
+
+CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.argument("name", required=False)
+@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+def models(name: str | None, form: str | None) -> None:
+    """List the models, or the parameters and outputs of one.
+
+    \b
+    mdr-dask models
+    mdr-dask models sliding_friction
+    """
+    from mdr_dask import models as room
+    from mdr_dask.campaign.reference import output_rows, parameter_rows
+
+    if name is None:
+        rows = [{"model": known, "summary": room.load(known).summary} for known in room.NAMES]
+        _print_left(rows, form)
+        return
+    if name not in room.NAMES:
+        raise click.UsageError(f"no model {name!r}; known: {', '.join(room.NAMES)}")
+    model = room.load(name)
+    if form == "json":
+        print_json({"model": name, "parameters": parameter_rows(model), "outputs": output_rows(model)})
+        return
+    click.echo(f"{name}: {model.summary}\n\nparameters")
+    _print_left(parameter_rows(model), None)
+    click.echo("\noutputs")
+    _print_left(output_rows(model), None)
+
+
+def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
+    if form == "json":
+        print_json(rows)
+        return
+    widths = {key: max(len(key), *(len(row[key]) for row in rows)) for key in rows[0]}
+    for row in [{key: key for key in rows[0]}, *rows]:
+        click.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
+
+
+@click.command()
+@click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
+@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+def check(campaigns: tuple[Path, ...], form: str | None) -> None:
+    """Check campaign files and say what each will cost; all problems at once, exit code 2 if there are any.
+
+    \b
+    mdr-dask check campaigns/*.yaml
+    """
+    from mdr_dask.campaign import load
+    from mdr_dask.errors import CampaignError
+    from mdr_dask.plan import estimate
+
+    rows, problems = [], []
+    for path in campaigns:
+        try:
+            campaign = load(path)
+            rows.append({"campaign": str(path), "model": campaign.model, **_costs(estimate(campaign))})
+        except CampaignError as error:
+            problems += list(error.args)
+    if rows:
+        print_rows(rows, {"bytes": "B", "seconds": "s"}, form or "table")
+    if problems:
+        raise CampaignError(*problems)
+
+
+def _costs(estimate: Estimate) -> dict[str, Any]:
+    return {
+        "cases": estimate.cases,
+        "realisations": estimate.realisations,
+        "results": estimate.results,
+        "solves": estimate.solves,
+        "blocks": estimate.blocks,
+        "bytes": estimate.bytes,
+        "seconds": float(estimate.seconds),
+    }
+
+
+@click.command()
+@click.argument("campaign", type=CAMPAIGN)
+@click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
+@click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one a core).")
+@click.option("--workers", type=click.IntRange(min=1), help="Start a local Dask cluster of so many processes.")
+@click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
+@click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
+@click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
+def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options: Any) -> int:
+    """Run a campaign into its store, or whatever of it is not there yet.
+
+    Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
+
+    \b
+    mdr-dask run campaigns/quickstart.yaml
+    mdr-dask run campaigns/friction_force.yaml --workers 2
+    mdr-dask run campaigns/friction_force.yaml --scheduler tcp://head:8786
+    """
+    from mdr_dask.campaign import load
+    from mdr_dask.plan import estimate
+
+    study = load(campaign)
+    url = options["url"] or study.store
+    costs = estimate(study)
+    if dry_run:
+        _print_plan(study.name, url, costs, form)
+        return 0
+    from mdr_dask import execute
+
+    resources = _resources(options)
+    with reporter(quiet) as report:
+        progress = execute.run(study, url, resources, report, options["retry_failed"])
+    _print_outcome(url, progress, resources, form)
+    return 1 if progress.failed else 0
+
+
+def _print_plan(name: str, url: str, costs: Estimate, form: str | None) -> None:
+    if form == "json":
+        print_json({"campaign": name, "store": url, **_costs(costs)})
+        return
+    click.echo(f"{name} -> {url}")
+    click.echo(f"{costs.cases} cases x {costs.realisations} realisations = {costs.results} results")
+    click.echo(f"{costs.solves} solves remain after sharing, in {costs.blocks} blocks")
+    click.echo(f"{costs.bytes / 2**20:.3g} MiB uncompressed, about {seconds(costs.seconds)} on one core")
+
+
+def _resources(options: dict[str, Any]) -> Resources:
+    from mdr_dask.execute import Resources
+
+    chosen = [name for name in ("threads", "workers", "scheduler", "cluster") if options[name] is not None]
+    if len(chosen) > 1:
+        raise click.UsageError(f"expected one of --{', --'.join(chosen)}, got {len(chosen)} of them")
+    cluster = options["cluster"] and _read_cluster(options["cluster"])
+    return Resources(options["threads"], options["workers"], options["scheduler"], cluster)
+
+
+def _read_cluster(path: Path) -> dict[str, Any]:
+    from ruamel.yaml import YAML
+    from ruamel.yaml.error import YAMLError
+
+    try:
+        document = YAML(typ="safe", pure=True).load(path.read_text())
+    except YAMLError as error:
+        raise click.UsageError(f"{path}: not YAML: {error}") from None
+    known = {"class", "arguments", "scale"}
+    if not isinstance(document, dict) or "class" not in document or not document.keys() <= known:
+        raise click.UsageError(f"{path}: expected the keys class, arguments and scale, got {document!r}")
+    return document
+
+
+def _print_outcome(url: str, progress: Progress, resources: Resources, form: str | None) -> None:
+    if form == "json":
+        from dataclasses import asdict
+
+        print_json({"store": url, **asdict(progress)})
+        return
+    fresh = progress.done + progress.failed
+    if not fresh and not progress.not_needed:
+        click.echo(f"{url}: all {progress.kept} results are there already; nothing to do")
+        return
+    kept = f"{progress.kept} kept, " if progress.kept else ""
+    spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
+    click.echo(f"{url}: {kept}{progress.done} done, {progress.failed} failed{spared}")
+    click.echo(
+        f"{seconds(progress.wall_seconds)}: {progress.solves} solves in {progress.blocks} blocks, "
+        f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
+        err=True,
+    )
+    if progress.failed:
+        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+
+
+@click.command()
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a file instead of stdout.")
+def schema(output: Path | None) -> None:
+    """Print the JSON schema of campaign files, for completion and checks in an editor.
+
+    \b
+    mdr-dask schema -o campaign.schema.json
+    """
+    import json
+
+    from mdr_dask.campaign import json_schema
+
+    text = json.dumps(json_schema(), indent=1) + "\n"
+    if output:
+        output.write_text(text)
+    else:
+        click.echo(text, nl=False)

@@ -1,0 +1,107 @@
+"""Results to a terminal, a pipe, JSON or CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Row = dict[str, Any]
+
+
+def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
+    """Print rows as an aligned table, as CSV, or as one JSON document with units.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        All with the same keys.
+    units : dict of str to str
+        Unit of each column that has one.
+    form : str
+        ``table``, ``csv`` or ``json``.
+    limit : int, optional
+        Most rows of a table; the rest is counted in a last line on stderr.
+    """
+    if form == "json":
+        print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
+        return
+    names = list(rows[0]) if rows else list(units)
+    titles = [f"{name} [{units[name]}]" if units.get(name, "1") not in ("1", "") else name for name in names]
+    if form == "csv":
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(titles)
+        writer.writerows([row[name] for name in names] for row in rows)
+        click.echo(text.getvalue(), nl=False)
+        return
+    shown = rows[:limit] if limit else rows
+    cells = [titles, *([_short(row[name]) for name in names] for row in shown)]
+    widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
+    for line in cells:
+        click.echo("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
+    if len(shown) < len(rows):
+        click.echo(f"... {len(rows) - len(shown)} more rows (--limit 0 prints all)", err=True)
+
+
+def print_json(document: Any) -> None:
+    """Print one JSON document."""
+    click.echo(json.dumps(document, indent=1, default=_plain))
+
+
+def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
+    """Turn a Dataset into rows, one for each point of its dimensions, and the units of the columns.
+
+    Variables that lack a dimension are repeated along it; fixed coordinates are left out.
+    """
+    dims = [str(dim) for dim in dataset.sizes]
+    names = [str(name) for name in dataset.data_vars]
+    along = [str(name) for name, coord in dataset.coords.items() if coord.ndim == 1 and name not in dims]
+    frame = dataset.drop_vars([name for name, c in dataset.coords.items() if c.ndim == 0])
+    columns = {name: frame[name] for name in (*dims, *along, *names)}
+    shape = dataset.sizes
+    flat = {n: _spread(c, dims, shape) for n, c in columns.items()}
+    rows = [dict(zip(flat, values, strict=True)) for values in zip(*flat.values(), strict=True)]
+    return rows, {name: str(column.attrs.get("units", "1")) for name, column in columns.items()}
+
+
+def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
+    missing = {dim: shape[dim] for dim in dims if dim not in column.dims}
+    values: list[Any] = column.expand_dims(missing).transpose(*dims).to_numpy().ravel().tolist()
+    return values
+
+
+def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
+    """Join each mean and its standard error into one column for a reader: ``0.1234 +- 0.0005``."""
+    outputs = [name.removesuffix("_mean") for name in units if name.endswith("_mean")]
+    kept = [name for name in units if name.removesuffix("_mean").removesuffix("_standard_error") not in outputs]
+    joined = [
+        {name: row[name] for name in kept}
+        | {name: _with_error(row[f"{name}_mean"], row[f"{name}_standard_error"]) for name in outputs}
+        for row in rows
+    ]
+    return joined, {name: units[name] for name in kept} | {name: units[f"{name}_mean"] for name in outputs}
+
+
+def _with_error(mean: float, error: float) -> str:
+    return f"{mean:.4g} +- {error:.1g}"
+
+
+def _short(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else str(value)

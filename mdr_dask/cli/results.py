@@ -1,0 +1,253 @@
+"""Commands around a store: status, show, aggregate, fit, plot."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdr_dask.cli import selection
+from mdr_dask.cli.printing import print_json, print_rows, table, with_errors
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+STATISTICS = ("mean", "standard_deviation", "standard_error", "quantile", "interval", "count")
+
+store_argument = click.argument("store")
+series_option = click.option("--series", help="Name of the series, where the campaign has any.")
+select_option = click.option(
+    "--select", "selections", multiple=True, metavar="NAME=VALUE", help="Nearest value or range A:B of an axis; repeat."
+)
+json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
+csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
+limit_option = click.option("--limit", default=40, show_default=True, help="Most rows of a table; 0 for all.")
+
+
+@click.command()
+@store_argument
+@click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
+@json_option
+def status(store: str, failures: bool, form: str | None) -> None:
+    """Say how far a store is, while it is being filled too.
+
+    \b
+    mdr-dask status results/quickstart.zarr
+    mdr-dask status results/quickstart.zarr --failures
+    """
+    from mdr_dask import store as room
+
+    groups = room.datasets(store)
+    rows = [_count(name, dataset) for name, dataset in groups.items()]
+    if not failures:
+        print_rows(rows, {}, form or "table")
+        return
+    found = [message for name in groups for record in room.records(store, name) for message in _told(name, record)]
+    if form == "json":
+        print_json(found)
+        return
+    for reason in dict.fromkeys(message["message"] for message in found):
+        alike = [message for message in found if message["message"] == reason]
+        click.echo(f"{len(alike)} x {alike[0]['status']}: {reason}")
+        click.echo(f"    {_shared(alike)}")
+    if not found:
+        click.echo("no failures")
+
+
+def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:
+    from mdr_dask.models.base import Status
+
+    states = dataset["status"].to_numpy()
+    counts = {state.name.lower(): int((states == state).sum()) for state in Status}
+    return {"series": name or "-", "results": states.size, **counts}
+
+
+def _told(series: str, record: dict[str, Any]) -> list[dict[str, Any]]:
+    return [{"series": series, "attempt": record["attempt"], **message} for message in record["messages"]]
+
+
+def _shared(messages: list[dict[str, Any]]) -> str:
+    """Return the range that each varied parameter takes among the messages."""
+    parts = []
+    for path in messages[0]["case"]:
+        values = sorted({message["case"].get(path) for message in messages}, key=lambda v: (str(type(v)), v))
+        if len(values) == 1:
+            parts.append(f"{path} = {_brief(values[0])}")
+        else:
+            parts.append(f"{path} {_brief(values[0])} .. {_brief(values[-1])} ({len(values)} values)")
+    return ", ".join(parts) or "the only case"
+
+
+def _brief(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+@click.command()
+@store_argument
+@click.argument("outputs", nargs=-1)
+@series_option
+@select_option
+@click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Over realisations; repeat.")
+@click.option("--realisations", "raw", is_flag=True, help="Show every realisation, not a statistic.")
+@limit_option
+@json_option
+@csv_option
+def show(
+    store: str,
+    outputs: tuple[str, ...],
+    series: str | None,
+    selections: tuple[str, ...],
+    statistic: tuple[str, ...],
+    raw: bool,
+    limit: int,
+    form: str | None,
+) -> None:
+    """Show results as a table: means and standard errors, or every realisation.
+
+    \b
+    mdr-dask show results/quickstart.zarr friction_coefficient
+    mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s:1 m/s' --csv
+    """
+    from mdr_dask import store as room
+    from mdr_dask.aggregate import aggregate as reduce
+
+    dataset = selection.group(room.datasets(store), series)
+    wanted = selection.select(selection.outputs(dataset, outputs), selections)
+    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error"))
+    rows, units = table(shown)
+    if not (raw or statistic or form):
+        rows, units = with_errors(rows, units)
+    print_rows(rows, units, form or "table", limit)
+
+
+@click.command()
+@store_argument
+@series_option
+@click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these; repeat.")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write to FILE.zarr, FILE.nc or FILE.csv.")
+@limit_option
+@json_option
+@csv_option
+def aggregate(
+    store: str, series: str | None, statistic: tuple[str, ...], output: Path | None, limit: int, form: str | None
+) -> None:
+    """Reduce every output over its realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+
+    \b
+    mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
+    """
+    from mdr_dask import store as room
+    from mdr_dask.aggregate import aggregate as reduce
+
+    reduced = reduce(selection.group(room.datasets(store), series), statistic or STATISTICS)
+    if output is None:
+        rows, units = table(reduced)
+        print_rows(rows, units, form or "table", limit)
+        return
+    _write(reduced, output)
+    click.echo(f"{output}: {len(reduced.data_vars)} variables over {dict(reduced.sizes)}")
+
+
+def _write(dataset: xr.Dataset, path: Path) -> None:
+    from mdr_dask.store import save
+
+    if path.suffix == ".csv":
+        rows, units = table(dataset)
+        with path.open("w") as stream, contextlib.redirect_stdout(stream):
+            print_rows(rows, units, "csv")
+    elif path.suffix in (".zarr", ".nc"):
+        save(dataset, path)
+    else:
+        raise click.UsageError(f"expected a file that ends in .zarr, .nc or .csv, got {str(path)!r}")
+
+
+@click.command()
+@store_argument
+@click.argument("names", nargs=-1)
+@limit_option
+@json_option
+@csv_option
+def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> None:
+    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
+
+    \b
+    mdr-dask fit results/friction_force.zarr
+    mdr-dask fit results/friction_force.zarr zone1 --json
+    """
+    from mdr_dask import fit as room
+    from mdr_dask import store as stores
+
+    model = stores.attributes(store)["model"]
+    known = room.available(model)
+    if not names:
+        _list(model, {name: law.summary for name, law in known.items()})
+        return
+    _require_known(names, list(known), f"law for {model}")
+    groups = stores.datasets(store)
+    for name in names:
+        rows, units = table(known[name].compute(groups))
+        if len(names) > 1 and not form:
+            click.echo(f"{name}: {known[name].summary}")
+        print_rows(rows, units, form or "table", limit)
+
+
+def _list(model: str, summaries: dict[str, str]) -> None:
+    if not summaries:
+        click.echo(f"none for {model}")
+    width = max(map(len, summaries), default=0)
+    for name, summary in summaries.items():
+        click.echo(f"{name.ljust(width)}  {summary}")
+
+
+def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
+    for name in names:
+        if name not in known:
+            raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")
+
+
+@click.command()
+@store_argument
+@click.argument("names", nargs=-1)
+@click.option("--all", "everything", is_flag=True, help="Draw every figure that the store has the data for.")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
+@click.option("--format", "suffix", default="png", show_default=True, help="png, pdf or svg.")
+def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | None, suffix: str) -> None:
+    """Draw figures from a store; without a name, say which figures there are.
+
+    \b
+    mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
+    mdr-dask plot results/friction_force.zarr --all -o figures
+    """
+    from mdr_dask import plots as room
+    from mdr_dask import store as stores
+    from mdr_dask.errors import DataError
+
+    model = stores.attributes(store)["model"]
+    known = room.available(model)
+    if not names and not everything:
+        _list(model, {name: figure.summary for name, figure in known.items()})
+        return
+    _require_known(names, list(known), f"figure of {model}")
+    groups = stores.datasets(store)
+    for name in names or tuple(known):
+        try:
+            figure = known[name].draw(groups)
+        except DataError as error:
+            if not everything:
+                raise
+            click.echo(f"{name}: left out: {error}", err=True)
+            continue
+        path = _figure_path(output, f"{Path(store).stem}-{name}.{suffix}", single=len(names) == 1)
+        figure.savefig(path, dpi=150)
+        click.echo(str(path))
+
+
+def _figure_path(output: Path | None, name: str, single: bool) -> Path:
+    if single and output is not None and output.suffix:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        return output
+    folder = output or Path("figures")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / name

@@ -1,0 +1,96 @@
+"""What a case is before its roughness: contact, film, oil, layer; and the friction that follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mdr_dask.models.mixed_lubrication.lines import Source, source_of
+
+if TYPE_CHECKING:
+    from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
+    from mdr_dask.physics.film import HertzLine
+
+
+@dataclass(frozen=True)
+class Operation:
+    """What a case is before any roughness: contact, film, and how the layer stands to the unit lines."""
+
+    case: MixedLubrication
+    source: Source
+    contact: HertzLine
+    E_star: float
+    film: float
+    viscosity: float
+    alpha: float
+    scale: float  # heights of the lines in m
+    spacing: float
+    window: int
+    strength: float  # of the layer, for lines in units of `scale`
+    warning: str
+
+    @property
+    def level(self) -> float:
+        """Film thickness in units of the lines."""
+        return self.film / self.scale
+
+
+def operation_of(case: MixedLubrication) -> Operation:
+    """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours."""
+    from mdr_dask.physics import breakthrough, film, oil
+
+    data, source = case.oil_data(), source_of(case)
+    viscosity = float(data.dynamic(case.temperature))
+    alpha = case.pressure_viscosity
+    if isinstance(alpha, str):
+        correlation = data.correlation if alpha == "oil" else alpha
+        alpha = float(oil.pressure_viscosity(correlation, data.kinematic(case.temperature), viscosity))
+    E_star = case.contact_modulus()
+    radius = case.roller_radius / 2
+    velocity = case.rotation_speed * case.roller_radius
+    line_load = case.normal_force / case.roller_width
+    groups = film.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
+    formula = film.FORMULAS[case.film_formula]
+    contact = case.dry_contact(case.normal_force)
+    spacing = source.spacing(case)
+    scale = case.rms_roughness or 1.0
+    return Operation(
+        case=case,
+        source=source,
+        contact=contact,
+        E_star=E_star,
+        film=case.film_thickness or float(formula(*groups)) * radius,
+        viscosity=viscosity,
+        alpha=alpha,
+        scale=scale,
+        spacing=spacing,
+        window=breakthrough.window_points(float(contact.half_width), spacing, source.points),
+        strength=float(breakthrough.layer_strength(case.layer_shear_strength, E_star, case.layer_thickness)) / scale,
+        warning="" if case.film_thickness else formula.outside(*(float(group) for group in groups)),
+    )
+
+
+def fixed_values(operation: Operation) -> dict[str, float]:
+    """Return the outputs that no roughness enters."""
+    rms = operation.scale * operation.source.combined_rms()
+    half_width = float(operation.contact.half_width)
+    return {"film": operation.film, "film_ratio": operation.film / rms, "contact_half_width": half_width}
+
+
+def friction(operation: Operation, share: float) -> float:
+    """Return the coefficient of friction: solid over the share of the width in intimate contact, film elsewhere."""
+    from mdr_dask.physics import film, oil
+
+    case = operation.case
+    sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
+    if sliding == 0:
+        return 0.0
+    law = oil.barus if case.viscosity_law == "barus" else oil.roelands
+    liquid = film.fluid_friction(
+        operation.contact,
+        operation.film,
+        sliding,
+        lambda pressure: law(pressure, operation.viscosity, operation.alpha),
+        case.eyring_stress,
+    )
+    return share * case.boundary_friction + (1 - share) * liquid

@@ -1,0 +1,136 @@
+"""The parameters of mixed lubrication, with units, bounds and meanings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from mdr_dask.models.base import NamedFile, Parameters, quantity
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.film import HertzLine
+    from mdr_dask.physics.oil import Oil
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class OilData(Parameters):
+    """An oil by the numbers of its data sheet."""
+
+    temperature_1: float = quantity("K", "first temperature of the two viscosities", gt=0)
+    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", gt=0)
+    temperature_2: float = quantity("K", "second temperature of the two viscosities", gt=0)
+    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", gt=0)
+    density: float = quantity("kg/m^3", "density at density_temperature", gt=0)
+    density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
+    correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
+        default="gold_mineral", description="pressure-viscosity correlation"
+    )
+    lowest_temperature: float | None = quantity("K", "where the data begin; the lower of the two", default=None, gt=0)
+    highest_temperature: float | None = quantity("K", "where the data end; the higher of the two", default=None, gt=0)
+
+    @model_validator(mode="after")
+    def _falls(self) -> Self:
+        from mdr_dask.physics.oil import walther_constants
+
+        walther_constants(self.temperature_1, self.viscosity_1, self.temperature_2, self.viscosity_2)
+        return self
+
+
+class MixedLubrication(Parameters):
+    """Two equal rough rollers pressed together on an oil film; the defaults are the twin-disc rig of the thesis."""
+
+    normal_force: float = quantity("N", "normal force F_N on the rollers", gt=0)
+    rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", gt=0)
+    temperature: float = quantity("K", "temperature of rollers and oil", gt=0)
+    slide_roll_ratio: float = quantity(
+        "1", "creep (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
+    )
+    rms_roughness: Positive | None = quantity(
+        "m", "rms height of each roller; needed unless profiles are given", default=None
+    )
+    hurst: float = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
+    points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
+    longest_wavelength: Positive | Literal["auto"] = quantity(
+        "m", "wavelength above which there is no roughness; auto is 2a at cutoff_force", default="auto"
+    )
+    cutoff_force: float = quantity(
+        "N", "normal force whose contact width is the longest wavelength", default=1600, gt=0
+    )
+    shortest_wavelength: Positive | Literal["auto"] = quantity(
+        "m", "wavelength below which there is no roughness; auto is ten spacings of the points", default="auto"
+    )
+    profile_1: NamedFile | None = Field(default=None, description="measured line of roller 1: two columns x, z in m")
+    profile_2: NamedFile | None = Field(default=None, description="measured line of roller 2: two columns x, z in m")
+    layer_thickness: float = quantity("m", "critical thickness h_c of the boundary layer", default=5e-9, gt=0)
+    layer_shear_strength: float = quantity("Pa", "limiting shear stress tau0 of the boundary layer", default=1e6, ge=0)
+    oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
+        default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet"
+    )
+    pressure_viscosity: (
+        Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
+    ) = quantity("1/Pa", "pressure-viscosity coefficient alpha, or the correlation that gives it", default="oil")
+    film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson"] = Field(
+        default="pan_hamrock", description="where the film thickness comes from"
+    )
+    film_thickness: Positive | None = quantity("m", "film thickness, instead of the formula's", default=None)
+    edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
+        default="part", description="what becomes of a cluster that the edge of the contact cuts"
+    )
+    roller_radius: float = quantity("m", "radius of each roller", default=0.05, gt=0)
+    roller_width: float = quantity("m", "length L' of the contact line", default=0.01, gt=0)
+    young_modulus: float = quantity("Pa", "Young's modulus of the rollers", default=210e9, gt=0)
+    poisson_ratio: float = quantity("1", "Poisson's ratio of the rollers", default=0.3, ge=0, le=0.5)
+    resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
+    boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
+    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", default=5e6, gt=0)
+    viscosity_law: Literal["barus", "roelands"] = Field(
+        default="barus", description="viscosity under pressure, for the friction of the film"
+    )
+    trace_points: int = quantity("1", "angles of contact_length_trace in a turn", default=3600, ge=2, le=10**6)
+    measured: NamedFile | None = Field(
+        default=None, description="table of measured contact probabilities, for the fit `breakthrough`"
+    )
+
+    @model_validator(mode="after")
+    def _holds_together(self) -> Self:
+        from mdr_dask.models.mixed_lubrication.lines import problem_of
+
+        problem = problem_of(self)
+        if problem:
+            raise ValueError(problem)
+        return self
+
+    def oil_data(self) -> Oil:
+        """Return the oil, whether named or given."""
+        from mdr_dask.physics import oil
+
+        data = self.oil
+        if isinstance(data, str):
+            return oil.OILS[data]
+        low, high = sorted((data.temperature_1, data.temperature_2))
+        return oil.Oil(
+            data.temperature_1,
+            data.viscosity_1,
+            data.temperature_2,
+            data.viscosity_2,
+            data.density,
+            data.density_temperature,
+            data.correlation,
+            data.lowest_temperature or low,
+            data.highest_temperature or high,
+            "campaign file",
+        )
+
+    def dry_contact(self, force: float) -> HertzLine:
+        """Return the Hertzian contact of the smooth rollers under a normal force in N."""
+        from mdr_dask.physics import film
+
+        return film.hertz_line(force / self.roller_width, self.contact_modulus(), self.roller_radius / 2)
+
+    def contact_modulus(self) -> float:
+        """Return E* of the rollers in Pa."""
+        from mdr_dask.physics import film
+
+        return float(film.reduced_modulus(*(self.young_modulus, self.poisson_ratio) * 2))

@@ -1,0 +1,430 @@
+"""Steady friction of a viscoelastic body that slides over a rough line (thesis chapter 3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.sliding import Scheme, Steady
+
+IntArray = NDArray[np.intp]
+
+ACCURACY = 0.01  # where the campaign does not say
+FINEST = 64  # oversampling beyond which `auto` gives up
+SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
+CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
+NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
+ARRAYS = 30  # arrays of the length of the line that a solution holds
+CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
+
+
+class Plane(Parameters):
+    """A nominally flat body: the rough line alone, periodic."""
+
+    shape: Literal["plane"] = "plane"
+
+
+class Cone(Parameters):
+    """A cone, rough or smooth."""
+
+    shape: Literal["cone"]
+    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return math.tan(self.angle), 1.0
+
+
+class Parabola(Parameters):
+    """A paraboloid, which stands for a sphere."""
+
+    shape: Literal["parabola"]
+    radius: float = quantity("m", "radius of curvature R at the apex", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return 1 / (2 * self.radius), 2.0
+
+
+class Power(Parameters):
+    """A body of revolution c r^n."""
+
+    shape: Literal["power"]
+    exponent: float = quantity("1", "exponent n of the body c r^n", ge=1, le=100)
+    coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return self.coefficient, self.exponent
+
+
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
+
+
+class SlidingFriction(Parameters):
+    """A Kelvin body under a load, sliding at constant speed over a self-affine line."""
+
+    length: float = quantity("m", "length L of the line, and period of its roughness", gt=0)
+    points: int = quantity(
+        "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
+    )
+    oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
+        "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
+    )
+    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
+    rms_roughness: float = quantity("m", "rms height h of the roughness", ge=0)
+    rolloff_wavelength: float | None = quantity(
+        "m", "wavelength above which the spectrum is constant", default=None, gt=0
+    )
+    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
+    shear_modulus: float = quantity("Pa", "static shear modulus G of the incompressible Kelvin body", gt=0)
+    relaxation_time: float = quantity("s", "relaxation time tau = eta / G of the Kelvin body", gt=0)
+    normal_force: float = quantity("N", "normal force F_N", gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v", gt=0)
+    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
+    scheme: Literal["hermite", "piecewise_linear", "backward_euler"] = Field(
+        default="hermite",
+        description="exact sweep over cubic or straight cells, or the papers' time steps",
+    )
+
+
+OUTPUTS = (
+    Output("friction_coefficient", "1", "coefficient of friction"),
+    Output("indentation_depth", "m", "penetration of the mean line into the undeformed body"),
+    Output("contact_fraction", "1", "length in contact over length of the line"),
+    Output("contact_slope", "1", "rms slope of the line over the contact"),
+    Output("rms_slope", "1", "spectral rms slope of the line"),
+    Output("discretisation_error", "1", "estimated relative error of the friction coefficient"),
+)
+
+
+@dataclass(frozen=True)
+class _Line:
+    """What fixes a line but for its phases, in units of its length and rms height."""
+
+    hurst: float
+    points: int
+    rolloff: float
+    longest: float
+    coefficient: float  # of the indenter c |x|^n, 0 for a plane
+    exponent: float
+
+    def amplitudes(self) -> FloatArray:
+        """Return the amplitudes of its harmonics."""
+        from mdr_dask.physics import roughness
+
+        return roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Cases on one realisation of a line, in units of its length and rms height."""
+
+    line: _Line
+    phase: FloatArray
+    scheme: Scheme
+    reaches: FloatArray  # v tau / L
+    loads: FloatArray  # F_N / (4 G L h)
+    contact: bool  # whether fraction and slope of the contact are wanted
+
+    def only(self, cases: NDArray[np.bool_]) -> _Task:
+        """Return some of the cases."""
+        return replace(self, reaches=self.reaches[cases], loads=self.loads[cases])
+
+    def nodes(self, oversampling: int) -> tuple[FloatArray, FloatArray]:
+        """Return heights and slopes of the roughness on a grid."""
+        from mdr_dask.physics import roughness
+
+        amplitude, count = self.line.amplitudes(), self.line.points * oversampling
+        height = roughness.line(amplitude, self.phase, count)
+        slope = roughness.line(amplitude, self.phase, count, 1)
+        if self.line.coefficient == 0:
+            return height, slope
+        return np.append(height, height[0]), np.append(slope, slope[0])
+
+    def solve(self, height: FloatArray, slope: FloatArray, scheme: Scheme) -> Steady:
+        """Solve the cases on a grid."""
+        from mdr_dask.physics import sliding
+
+        cases = (self.reaches, self.loads, scheme, self.contact)
+        if self.line.coefficient == 0:
+            return sliding.steady_sliding(height, slope, *cases)
+        return sliding.steady_indenter(height, slope, self.line.coefficient, self.line.exponent, *cases)
+
+    def on_grid(self, oversampling: int) -> Steady:
+        """Solve the cases on one grid, without an estimate of the error."""
+        return self.solve(*self.nodes(oversampling), self.scheme)
+
+    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
+        """Solve the cases on one grid and estimate the relative error of their friction.
+
+        The exact sweep on a fine grid is compared with the two grids that hold every other node: two, because one may
+        agree by accident. Anything else is compared with the exact sweep on a grid twice as fine.
+        """
+        height, slope = self.nodes(oversampling)
+        steady = self.solve(height, slope, self.scheme)
+        if self.scheme != "hermite" or oversampling % 2 or self.line.points * oversampling < 32:
+            finer = self.solve(*self.nodes(2 * oversampling), "hermite")
+            return steady, SAFETY_FINER * _difference(steady, finer)
+        even = _difference(self.solve(height[::2], slope[::2], self.scheme), steady)
+        if self.line.coefficient:
+            return steady, SAFETY_EVEN * even
+        odd = _difference(self.solve(height[1::2], slope[1::2], self.scheme), steady)
+        return steady, SAFETY_BOTH * np.maximum(even, odd)
+
+    def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
+        """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
+        oversampling = 2 if self.scheme == "hermite" else 1
+        steady, error = self.with_error(oversampling)
+        while oversampling < FINEST:
+            wanting = ~(error <= accuracy) & (steady.status == 0)
+            if not np.any(wanting):
+                break
+            oversampling *= 2
+            finer, error[wanting] = self.only(wanting).with_error(oversampling)
+            steady = steady.replaced(wanting, finer)
+        return steady, error
+
+
+def _difference(one: Steady, other: Steady) -> FloatArray:
+    with np.errstate(all="ignore"):
+        change: FloatArray = np.abs(one.drag / other.drag - 1)
+    return change
+
+
+def _canonical(number: FloatArray) -> FloatArray:
+    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
+    mantissa, exponent = np.frexp(number)
+    rounded: FloatArray = np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
+    return rounded
+
+
+def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
+    return np.asarray(block.column(path), dtype=np.float64)
+
+
+def _harmonic(block: Block[SlidingFriction], path: str) -> FloatArray:
+    """Return length / wavelength for every case, 0 where no wavelength is given."""
+    wavelengths = [np.inf if value is None else float(value) for value in block.column(path)]
+    return _canonical(_number(block, "length") / np.array(wavelengths))
+
+
+@dataclass(frozen=True)
+class _Cases:
+    """The cases of a block as dimensionless numbers; only these decide a solution."""
+
+    loads: FloatArray  # F_N / (4 G L h)
+    reaches: FloatArray  # v tau / L
+    height: FloatArray  # h
+    length: FloatArray  # L
+    keys: list[tuple[_Line, int | str, Scheme]]
+
+    def groups(self) -> Iterator[tuple[tuple[_Line, int | str, Scheme], IntArray]]:
+        """Yield the cases that share rough lines and grids."""
+        members: dict[tuple[_Line, int | str, Scheme], list[int]] = {}
+        for j in np.flatnonzero(self.height > 0):
+            members.setdefault(self.keys[j], []).append(int(j))
+        for key, indices in members.items():
+            yield key, np.array(indices)
+
+
+def _shapes(block: Block[SlidingFriction]) -> list[tuple[float, float]]:
+    """Return coefficient and exponent of the line c |x|^n of every case, 0 and 1 for a plane."""
+    from mdr_dask.physics.indenter import mapped
+
+    shapes = []
+    varied = any(path.split(".")[0] == "indenter" for path in block.columns)
+    for j in range(block.cases if varied else 1):
+        indenter = (block.case(j) if varied else block.parameters).indenter
+        coefficient, exponent = (0.0, 1.0) if isinstance(indenter, Plane) else indenter.power_law()
+        shapes.append((mapped(exponent) * coefficient, exponent))
+    return shapes if varied else shapes * block.cases
+
+
+def _cases(block: Block[SlidingFriction]) -> _Cases:
+    length, height = _number(block, "length"), _number(block, "rms_roughness")
+    coefficient, exponent = np.array(_shapes(block)).T
+    with np.errstate(all="ignore"):
+        loads = _number(block, "normal_force") / (4 * _number(block, "shear_modulus") * length * height)
+        reaches = _number(block, "velocity") * _number(block, "relaxation_time") / length
+        coefficient = coefficient * length**exponent / height
+    columns = (
+        _number(block, "hurst").tolist(),
+        block.column("points").tolist(),
+        _harmonic(block, "rolloff_wavelength").tolist(),
+        _harmonic(block, "longest_wavelength").tolist(),
+        _canonical(coefficient).tolist(),
+        exponent.tolist(),
+    )
+    lines = [_Line(*numbers) for numbers in zip(*columns, strict=True)]
+    keys = list(zip(lines, block.column("oversampling").tolist(), block.column("scheme").tolist(), strict=True))
+    return _Cases(_canonical(loads), _canonical(reaches), height, length, keys)
+
+
+@dataclass
+class _Answer:
+    """The result of a block while it fills."""
+
+    block: Block[SlidingFriction]
+    values: dict[str, FloatArray]
+    status: NDArray[np.int8]
+    messages: dict[tuple[int, int], str]
+    solves: int = 0
+
+    def put(self, members: IntArray, realisation: int, found: dict[str, Any], state: NDArray[np.int8]) -> None:
+        """Write cases of one realisation, and why those with a state other than 0 failed."""
+        from mdr_dask.physics import sliding
+
+        for name in self.block.outputs:
+            self.values[name][members, realisation] = np.where(state == 0, found[name], np.nan)
+        self.status[members, realisation] = STATUS[state]
+        for j in np.flatnonzero(state):
+            self.messages[int(members[j]), realisation] = sliding.MESSAGES[int(state[j])]
+
+    def warn(self, members: IntArray, sentence: str) -> None:
+        """Note a sentence for cases in every realisation."""
+        self.messages.update({(int(j), r): sentence for j in members for r in range(self.status.shape[1])})
+
+
+def compute(block: Block[SlidingFriction]) -> Result:
+    """Solve the cases of a block, each different one once."""
+    shape = (block.cases, len(block.realisations))
+    values = {name: np.full(shape, np.nan) for name in block.outputs}
+    answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
+    cases = _cases(block)
+    _smooth(cases, answer)
+    for key, members in cases.groups():
+        try:
+            key[0].amplitudes()
+        except ValueError as problem:
+            answer.warn(members, str(problem))
+            continue
+        _rough(key, members, cases, answer)
+    return Result(answer.values, answer.status, answer.messages, answer.solves)
+
+
+def _rough(key: tuple[_Line, int | str, Scheme], members: IntArray, cases: _Cases, answer: _Answer) -> None:
+    """Solve the cases of one group in every realisation."""
+    from mdr_dask.physics import roughness
+
+    line, oversampling, scheme = key
+    block = answer.block
+    slope = roughness.spectral_slope(line.amplitudes())
+    numbers = np.stack([cases.reaches[members], cases.loads[members]])
+    (reaches, loads), which = np.unique(numbers, axis=1, return_inverse=True)
+    height = cases.height[members]
+    scale = height / cases.length[members]
+    contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
+    accuracy = ACCURACY if block.accuracy is None else block.accuracy
+    for r, realisation in enumerate(block.realisations):
+        phase = roughness.phases(block.seed, realisation, line.points // 2)
+        task = _Task(line, phase, scheme, reaches, loads, contact)
+        if oversampling == "auto":
+            steady, error = task.to_accuracy(accuracy)
+        elif "discretisation_error" in block.outputs:
+            steady, error = task.with_error(int(oversampling))
+        else:
+            steady, error = task.on_grid(int(oversampling)), np.full(loads.size, np.nan)
+        answer.solves += loads.size
+        found = {
+            "friction_coefficient": (steady.drag / loads)[which] * scale,
+            "indentation_depth": steady.depth[which] * height,
+            "contact_fraction": steady.contact_fraction[which],
+            "contact_slope": steady.contact_slope[which] * scale,
+            "rms_slope": slope * scale,
+            "discretisation_error": error[which],
+        }
+        answer.put(members, r, found, steady.status[which])
+        if oversampling == "auto":
+            for j in np.flatnonzero((steady.status == 0) & ~(error <= accuracy)):
+                for member in members[which == j]:
+                    answer.messages[int(member), r] = f"estimated error {error[j]:.1e} on the finest grid"
+
+
+def _smooth(cases: _Cases, answer: _Answer) -> None:
+    """Solve the cases without roughness in closed form."""
+    from mdr_dask.physics import indenter, sliding
+
+    members = np.flatnonzero(cases.height == 0)
+    if not members.size:
+        return
+    block, length = answer.block, cases.length[members]
+    shapes = np.array(_shapes(block))[members]
+    loads = (_number(block, "normal_force") / (4 * _number(block, "shear_modulus")))[members]
+    found = dict.fromkeys(block.outputs, np.zeros(members.size))
+    found |= {"indentation_depth": loads / length, "contact_fraction": np.ones(members.size)}
+    state = np.zeros(members.size, np.int8)
+    body = shapes[:, 0] > 0
+    if np.any(body):
+        state_of = np.empty((members.size, indenter.COLUMNS))
+        state_of[:] = np.nan
+        solved = np.empty((int(body.sum()), indenter.COLUMNS))
+        indenter.smooth(loads[body], (cases.reaches[members] * length)[body], shapes[body, 0], shapes[body, 1], solved)
+        state_of[body] = solved
+        depth, drag, a, b, stretch = state_of.T
+        outside = np.maximum(a, b) > 0.5 * length
+        state = np.where(body & np.isnan(depth), sliding.NOT_CONVERGED, np.where(outside, sliding.OUTSIDE_LINE, 0))
+        found["friction_coefficient"] = np.where(body, drag / loads, 0.0)
+        found["indentation_depth"] = np.where(body, depth, found["indentation_depth"])
+        found["contact_fraction"] = np.where(body, (a + b) / length, 1.0)
+        found["contact_slope"] = np.where(body, np.sqrt(stretch / (a + b)), 0.0)
+        found["discretisation_error"] = np.full(members.size, CLOSED_FORM)
+    answer.solves += members.size
+    for r in range(len(block.realisations)):
+        answer.put(members, r, found, state.astype(np.int8))
+
+
+STATUS = np.array([Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.FAILED], dtype=np.int8)
+
+
+def distinct(block: Block[SlidingFriction]) -> int:
+    """Return how many different cases a block holds, over all realisations."""
+    cases = _cases(block)
+    rough = cases.height > 0
+    different = set(zip(cases.keys, cases.loads.tolist(), cases.reaches.tolist(), rough, strict=True))
+    smooth = np.count_nonzero(~rough)
+    return len([case for case in different if case[-1]]) * len(block.realisations) + int(smooth)
+
+
+def seconds(block: Block[SlidingFriction]) -> float:
+    """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
+    cases = _cases(block)
+    total = 1e-4
+    for (line, oversampling, scheme), members in cases.groups():
+        numbers = np.stack([cases.reaches[members], cases.loads[members]])
+        solves = np.unique(numbers, axis=1).shape[1]
+        grid = 4 if oversampling == "auto" else int(oversampling)
+        checks = 2.5 if oversampling == "auto" or "discretisation_error" in block.outputs else 1
+        nodes = line.points * grid
+        sweep = NODE_STEPPED * nodes if scheme == "backward_euler" else NODE_SWEPT * line.points * grid**0.5
+        total += len(block.realisations) * checks * (NODE_LINE * nodes + solves * sweep)
+    return total
+
+
+def memory(block: Block[SlidingFriction]) -> float:
+    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
+    grid = [FINEST if value == "auto" else 2 * int(value) for value in block.column("oversampling")]
+    return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
+
+
+MODEL = Model(
+    name="sliding_friction",
+    version=1,
+    summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
+    parameters=SlidingFriction,
+    outputs=OUTPUTS,
+    compute=compute,
+    seconds=seconds,
+    whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
+    distinct=distinct,
+    memory=memory,
+)

@@ -1,0 +1,98 @@
+"""Self-affine rough lines: spectra with an exact rms height, phases from a counter-based stream, lines by FFT."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+FloatArray = NDArray[np.float64]
+
+
+def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 0.0) -> FloatArray:
+    """Return the amplitudes of a self-affine line of unit rms height.
+
+    Parameters
+    ----------
+    modes : int
+        Number M of harmonics: the cut-off wavelength is length / M.
+    hurst : float
+        Hurst exponent H, 0..1: A_k ~ k^(-H - 1/2), that is C_1D ~ q^(-2H - 1).
+    rolloff : float
+        Harmonic number length / wavelength below which the spectrum is constant; 0 for none.
+    longest : float
+        Harmonic number length / wavelength below which there is no roughness; 0 for none.
+
+    Returns
+    -------
+    array, shape (modes,)
+        A_k for k = 1..M with sum A_k^2 / 2 = 1 (thesis 2.3).
+
+    Raises
+    ------
+    ValueError
+        If no harmonic is left between the long and the short cut-off.
+    """
+    k = np.arange(1, modes + 1, dtype=np.float64)
+    amplitude = np.maximum(k, rolloff) ** (-hurst - 0.5)
+    amplitude[k < longest * (1 - 1e-12)] = 0.0
+    power = np.sum(amplitude**2) / 2
+    if not power > 0:
+        raise ValueError(f"expected the longest wavelength above the cut-off wavelength, got no harmonic of {modes}")
+    unit: FloatArray = amplitude / np.sqrt(power)
+    return unit
+
+
+def spectral_slope(amplitude: FloatArray) -> float:
+    """Return the rms slope of a line of unit length, sqrt(sum (A_k q_k)^2 / 2) with q_k = 2 pi k.
+
+    Parameters
+    ----------
+    amplitude : array, shape (modes,)
+        Amplitudes of the harmonics, in any unit of height.
+    """
+    q = 2 * np.pi * np.arange(1, amplitude.size + 1)
+    return float(np.sqrt(np.sum((amplitude * q) ** 2) / 2))
+
+
+def phases(seed: int, realisation: int, modes: int) -> FloatArray:
+    """Return the phases of a realisation in [0, 2 pi), shape (modes,).
+
+    They depend on the seed and the index of the realisation only; a longer spectrum begins with the same phases, so
+    that lines of any Hurst exponent, rms height or cut-off are common random numbers (thesis Fig. 2.6).
+    """
+    generator: np.random.Generator = np.random.Generator(
+        np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,)))
+    )
+    phase: FloatArray = 2 * np.pi * generator.random(modes)
+    return phase
+
+
+def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
+    """Return h(x) = sum A_k cos(2 pi k x + phi_k) or a derivative of it at x = 0, 1/nodes, ..., by FFT.
+
+    Parameters
+    ----------
+    amplitude, phase : array, shape (modes,)
+        The harmonics k = 1..modes.
+    nodes : int
+        Number of nodes, at least twice the number of modes.
+    derivative : int
+        Order of the derivative with respect to x, where the line has unit length; exact at the nodes.
+
+    Raises
+    ------
+    ValueError
+        If the grid does not resolve the shortest wavelength.
+    """
+    modes = int(amplitude.size)
+    if nodes < 2 * modes:
+        raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
+    spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
+    spectrum[1 : modes + 1] = amplitude * np.exp(1j * phase) * (0.5 * nodes)
+    if derivative:
+        spectrum[1 : modes + 1] *= (2j * np.pi * np.arange(1, modes + 1)) ** derivative
+    if nodes == 2 * modes:
+        spectrum[-1] = 2 * spectrum[-1].real
+    heights: FloatArray = fft.irfft(spectrum, nodes)
+    return heights

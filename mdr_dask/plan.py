@@ -1,0 +1,316 @@
+"""From a campaign to templates (what the store will hold) and blocks (what has to be computed)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask import models
+from mdr_dask.campaign import Axis, Campaign, Series
+from mdr_dask.errors import CampaignError
+from mdr_dask.models.base import Block, Coordinate, Model, Output
+
+#: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
+BLOCK_SECONDS = 1.0
+#: Small studies are cut into about so many blocks, so that there is something to share among workers ...
+FEW_BLOCKS = 16
+#: ... but never into blocks of less work than this.
+LEAST_SECONDS = 0.1
+#: Largest chunk of one array.
+CHUNK_BYTES = 64 * 2**20
+#: More cases than this are a mistake in the file, not a study.
+MOST_CASES = 10**9
+
+BlockIndex = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Template:
+    """Shape, chunks and coordinates of one group of the store, before anything is computed.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        Where it comes from.
+    series : Series
+        Parameters and axes of the group.
+    sizes : mapping of str to int
+        Length of each case dimension, then of ``realisation``.
+    chunks : mapping of str to int
+        Length of a block along each of them.
+    outputs : tuple of Output
+        The arrays, without ``status``.
+    extra : mapping of str to Coordinate
+        Dimensions that outputs have beyond case and realisation.
+    """
+
+    campaign: Campaign
+    series: Series
+    sizes: Mapping[str, int]
+    chunks: Mapping[str, int]
+    outputs: tuple[Output, ...]
+    extra: Mapping[str, Coordinate]
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Case dimensions, then ``realisation``."""
+        return tuple(self.sizes)
+
+    @property
+    def cases(self) -> int:
+        """Number of cases."""
+        return math.prod(size for dim, size in self.sizes.items() if dim != "realisation")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of ``status``."""
+        return tuple(self.sizes.values())
+
+    @property
+    def grid(self) -> tuple[int, ...]:
+        """Number of blocks along each dimension."""
+        return tuple(math.ceil(size / self.chunks[dim]) for dim, size in self.sizes.items())
+
+    def extra_shape(self, output: Output) -> tuple[int, ...]:
+        """Shape that an output has beyond case and realisation."""
+        return tuple(self.extra[dim].values.size for dim in output.dims)
+
+    @property
+    def bytes(self) -> int:
+        """Size of all arrays, uncompressed."""
+        each = sum(8 * math.prod(self.extra_shape(output)) for output in self.outputs)
+        return math.prod(self.shape) * (each + 1)
+
+    def block_indices(self) -> Iterator[BlockIndex]:
+        """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""
+        *cases, realisations = (range(count) for count in self.grid)
+        for last in realisations:
+            for index in itertools.product(*cases):
+                yield (*index, last)
+
+    def region(self, index: BlockIndex) -> tuple[slice, ...]:
+        """Return the slices of the arrays that a block fills."""
+        return tuple(
+            slice(i * self.chunks[dim], min((i + 1) * self.chunks[dim], size))
+            for i, (dim, size) in zip(index, self.sizes.items(), strict=True)
+        )
+
+    def block(self, index: BlockIndex) -> Block[Any]:
+        """Return the work of a block: its cases in C order of their dimensions."""
+        return self._block(dict(zip(self.dims, self.region(index), strict=True)))
+
+    def _block(self, region: Mapping[str, slice]) -> Block[Any]:
+        case_dims = self.dims[:-1]
+        shape = tuple(region[dim].stop - region[dim].start for dim in case_dims)
+        columns = {}
+        for axis in self.series.axes:
+            position = case_dims.index(axis.dim)
+            along = self._values[axis.path][region[axis.dim]]
+            spread = along.reshape([-1 if i == position else 1 for i in range(len(shape))])
+            columns[axis.path] = np.broadcast_to(spread, shape).ravel()
+        realisations = region["realisation"]
+        return Block(
+            parameters=self.series.parameters,
+            columns=columns,
+            cases=math.prod(shape),
+            realisations=tuple(range(realisations.start, realisations.stop)),
+            seed=self.campaign.seed,
+            outputs=tuple(output.name for output in self.outputs),
+            accuracy=self.campaign.accuracy,
+        )
+
+    @cached_property
+    def _values(self) -> dict[str, NDArray[Any]]:
+        return {axis.path: _as_array(axis) for axis in self.series.axes}
+
+    def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
+        """Return a block of the given lengths at a relative position (0 first, 1 last), for estimates."""
+        region = {}
+        for dim, size in self.sizes.items():
+            start = round(position * (size - chunks[dim]))
+            region[dim] = slice(start, start + chunks[dim])
+        return self._block(region)
+
+
+def _as_array(axis: Axis) -> NDArray[Any]:
+    if axis.labels is None:
+        return np.array(axis.values)
+    column = np.empty(len(axis.values), dtype=object)
+    column[:] = axis.values
+    return column
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What a campaign will cost, as ``run --dry-run`` prints it."""
+
+    cases: int
+    realisations: int
+    results: int
+    solves: int
+    blocks: int
+    bytes: int
+    seconds: float
+
+
+def templates(
+    campaign: Campaign, realisations: int, stored_chunks: Mapping[str, Mapping[str, int]] | None = None
+) -> tuple[Template, ...]:
+    """Lay out every series of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        A checked campaign.
+    realisations : int
+        Number of realisations to lay out.
+    stored_chunks : mapping of series name to chunk lengths, optional
+        Layout of the groups that exist already.
+
+    Raises
+    ------
+    CampaignError
+        If a series is too large to be run; every such series is named.
+    """
+    model = models.load(campaign.model)
+    known = stored_chunks or {}
+    laid_out = []
+    problems = []
+    for series in campaign.series:
+        sizes = {**series.sizes, "realisation": realisations}
+        if math.prod(sizes.values()) > MOST_CASES:
+            problems.append(_too_many(campaign, series, sizes))
+            continue
+        outputs = tuple(model.output(name) for name in campaign.outputs)
+        empty = Template(campaign, series, sizes, {}, outputs, model.coordinates(series.parameters))
+        chunks = known.get(series.name) or _choose_chunks(empty, model)
+        template = Template(campaign, series, sizes, chunks, outputs, empty.extra)
+        problems += _memory_problems(template, model)
+        laid_out.append(template)
+    if problems:
+        raise CampaignError(*problems)
+    return tuple(laid_out)
+
+
+def _too_many(campaign: Campaign, series: Series, sizes: Mapping[str, int]) -> str:
+    counts = " x ".join(f"{size} {dim}" for dim, size in sizes.items())
+    where = f"series.{series.name}" if series.name else "parameters"
+    return f"{campaign.source}: {where}: expected at most {MOST_CASES:.0e} results, got {counts}"
+
+
+def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
+    smallest = dict.fromkeys(template.sizes, 1)
+    needed = max(model.memory(template.sample(smallest, position)) for position in (0.0, 1.0))
+    limit = available_memory()
+    if needed <= limit:
+        return []
+    return [
+        f"{template.campaign.source}: one case needs about {needed / 2**30:.3g} GiB of memory, "
+        f"expected at most the {limit / 2**30:.3g} GiB of this machine (fewer points, or less oversampling)"
+    ]
+
+
+def available_memory() -> float:
+    """Return the memory of this machine (or of the limit it was given) in bytes."""
+    from distributed.system import MEMORY_LIMIT
+
+    return float(MEMORY_LIMIT)
+
+
+def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
+    """Fill a block with work: shared axes whole, then realisations, then the other axes."""
+    whole = {axis.dim for axis in template.series.axes if _is_whole(axis, model.whole)}
+    chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
+    limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
+    goal = _block_seconds(template, model, chunks)
+    for dim in sorted(whole, key=lambda dim: -template.sizes[dim]):
+        while chunks[dim] > 1 and (
+            math.prod(chunks.values()) > limit or _mean_seconds(template, model, chunks) > 4 * goal
+        ):
+            chunks[dim] = math.ceil(chunks[dim] / 2)
+    for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
+        room = min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values()))
+        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], int(room))))
+    return {
+        **chunks,
+        **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items() if dim in template.sizes},
+    }
+
+
+def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
+    parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
+    total = parts * _mean_seconds(template, model, chunks)
+    return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
+
+
+def _is_whole(axis: Axis, whole: tuple[str, ...]) -> bool:
+    return any(axis.path == path or axis.path.startswith(path + ".") for path in whole)
+
+
+def _part(template: Template, dim: str, most: int) -> int:
+    """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
+
+    Where rounds add realisations, parts divide a round, so that every round fills whole blocks.
+    """
+    size = template.sizes[dim]
+    replication = template.campaign.replication
+    if dim == "realisation" and replication.until:
+        return max(part for part in range(1, most + 1) if math.gcd(part, replication.at_least) == part)
+    return math.ceil(size / math.ceil(size / most))
+
+
+def _bytes_per_result(template: Template) -> int:
+    return 8 * max((math.prod(template.extra_shape(output)) for output in template.outputs), default=1)
+
+
+def _mean_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
+    return float(np.mean([model.seconds(template.sample(chunks, position)) for position in (0.0, 0.5, 1.0)]))
+
+
+def estimate(campaign: Campaign) -> Estimate:
+    """Return what a campaign will cost, without running it.
+
+    Raises
+    ------
+    CampaignError
+        If it is too large to be run.
+    """
+    model = models.load(campaign.model)
+    realisations = campaign.replication.at_least
+    parts = [_estimate_series(template, model) for template in templates(campaign, realisations)]
+    return Estimate(
+        cases=sum(part.cases for part in parts),
+        realisations=realisations,
+        results=sum(part.results for part in parts),
+        solves=sum(part.solves for part in parts),
+        blocks=sum(part.blocks for part in parts),
+        bytes=sum(part.bytes for part in parts),
+        seconds=sum(part.seconds for part in parts),
+    )
+
+
+def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
+    """Go through the blocks of the first realisations; the other ones are alike."""
+    seconds, solves = 0.0, 0
+    for index in itertools.product(*(range(count) for count in template.grid[:-1])):
+        block = template.block((*index, 0))
+        seconds += model.seconds(block)
+        alone = replace(block, realisations=block.realisations[:1])
+        solves += model.distinct(alone) if model.distinct else block.cases
+    realisations = template.sizes["realisation"]
+    return Estimate(
+        cases=template.cases,
+        realisations=realisations,
+        results=template.cases * realisations,
+        solves=solves * realisations,
+        blocks=math.prod(template.grid),
+        bytes=template.bytes,
+        seconds=seconds * realisations / template.chunks["realisation"],
+    )

@@ -1,0 +1,66 @@
+"""How many realisations each case needs: whole rounds, until its standard error meets every tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.models.base import Status
+
+#: Each round adds about this share of the realisations there are.
+GROWTH = 0.5
+
+
+def rounds(replication: Replication) -> Iterator[int]:
+    """Yield the number of realisations after each round: multiples of ``at_least``, the last one ``at_most``."""
+    count = replication.at_least
+    yield count
+    while replication.until and count < replication.at_most:
+        count += replication.at_least * math.ceil(GROWTH * count / replication.at_least)
+        count = min(count, replication.at_most)
+        yield count
+
+
+def needs_more(
+    values: Mapping[str, NDArray[np.float64]], status: NDArray[np.int8], until: Mapping[str, Tolerance]
+) -> NDArray[np.bool_]:
+    """Say which cases need another round.
+
+    Parameters
+    ----------
+    values : mapping of str to array, shape (..., realisations)
+        The outputs that have a tolerance.
+    status : int8 array, shape (..., realisations)
+        The ledger; only cases that are done count.
+    until : mapping of str to Tolerance
+        Largest standard error of the mean, by output.
+
+    Returns
+    -------
+    bool array, shape (...)
+        True where the standard error of some output is above its tolerance or not known yet; a case that never succeeds
+        is not tried for ever.
+    """
+    done = status == Status.DONE
+    count = done.sum(axis=-1)
+    wide = np.zeros(count.shape, dtype=bool)
+    for name, tolerance in until.items():
+        mean, error = mean_and_error(values[name], done)
+        wide |= ~(error <= np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean)))
+    return np.asarray(wide & (count > 0))
+
+
+def mean_and_error(
+    values: NDArray[np.float64], valid: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return mean and standard error over the last axis of the valid values; NaN where there are too few."""
+    count = valid.sum(axis=-1)
+    mean = np.where(valid, values, 0.0).sum(axis=-1) / np.maximum(count, 1)
+    squares = np.where(valid, values - mean[..., None], 0.0) ** 2
+    variance = squares.sum(axis=-1) / np.maximum(count - 1, 1)
+    error = np.sqrt(variance / np.maximum(count, 1))
+    return np.where(count > 0, mean, np.nan), np.where(count > 1, error, np.nan)

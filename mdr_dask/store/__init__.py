@@ -1,0 +1,40 @@
+"""The Zarr layout of a study: the only room that knows Zarr.
+
+A group holds one array for every output and ``status``, the ledger, over (axes..., realisation, ...), and a coordinate
+for every parameter. The driver lays arrays out; a block is written by whoever computed it, one whole chunk of every
+array, ``status`` last. Readers see consolidated metadata, which is replaced in one write.
+"""
+
+from mdr_dask.store.blocks import (
+    attempts,
+    ledger,
+    read_block,
+    records,
+    values,
+    write_record,
+    write_status,
+    write_values,
+)
+from mdr_dask.store.files import attributes, exists, lock
+from mdr_dask.store.identity import Stored, reconcile
+from mdr_dask.store.layout import lay_out
+from mdr_dask.store.reading import datasets, save
+
+__all__ = [
+    "Stored",
+    "attempts",
+    "attributes",
+    "datasets",
+    "exists",
+    "lay_out",
+    "ledger",
+    "lock",
+    "read_block",
+    "reconcile",
+    "records",
+    "save",
+    "values",
+    "write_record",
+    "write_status",
+    "write_values",
+]

@@ -1,0 +1,90 @@
+"""The schema agrees with what is read, and the reference names everything."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import pytest
+from ruamel.yaml import YAML
+
+from mdr_dask import models
+from mdr_dask.campaign import json_schema, reference
+from mdr_dask.campaign.spec import CampaignSpec
+
+VALID = Path(__file__).parent / "valid"
+INVALID = Path(__file__).parent / "invalid"
+
+
+@pytest.fixture(name="validator")
+def _validator(rubbing, monkeypatch):
+    monkeypatch.setattr(models, "NAMES", (rubbing.name,))
+    content = json.loads(json.dumps(json_schema()))
+    jsonschema.Draft202012Validator.check_schema(content)
+    return jsonschema.Draft202012Validator(content)
+
+
+def plain(text):
+    return YAML(typ="safe", pure=True).load(text)
+
+
+@pytest.mark.parametrize("path", sorted(VALID.glob("*.yaml")), ids=lambda path: path.stem)
+def test_schema_accepts_valid_files(validator, path):
+    assert not [error.message for error in validator.iter_errors(plain(path.read_text()))]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "unknown_key",
+        "unknown_parameter",
+        "unknown_nested_key",
+        "hurst_above_one",
+        "empty_axis",
+        "unknown_model",
+        "missing_keys",
+        "unknown_output",
+        "range_count_of_half",
+        "range_misspelt",
+        "unknown_sampling",
+        "misspelt_shape",
+        "number_or_word",
+        "realisations_of_none",
+        "negative_seed",
+        "series_empty",
+    ],
+)
+def test_schema_refuses_what_needs_no_units(validator, name):
+    assert list(validator.iter_errors(plain((INVALID / f"{name}.yaml").read_text())))
+
+
+def test_reference_names_every_key_parameter_and_output(rubbing, monkeypatch):
+    monkeypatch.setattr(models, "NAMES", (rubbing.name,))
+    page = reference.reference_page()
+    for name in [*CampaignSpec.model_fields, *rubbing.parameters.model_fields]:
+        assert f"| `{name}` |" in page
+    for output in rubbing.outputs:
+        assert f"| `{output.name}` |" in page
+    assert "| `indenter.angle` | rad | required | number > 0, < 1.5 | (shape: cone) inclination of the flank |" in page
+    assert "| `hurst` | 1 | 0.7 | number ≥ 0, ≤ 1 | Hurst exponent |" in page
+    assert "| `moduli` | Pa | [1000000] | list, each: number | moduli of the Prony series |" in page
+
+
+def test_rows_say_what_a_command_prints(rubbing):
+    rows = {row["parameter"]: row for row in reference.parameter_rows(rubbing)}
+    assert rows["oversampling"]["allowed"] == "whole number ≥ 1 or auto"
+    assert rows["indenter"]["default"] == "{shape: plane}"
+    assert rows["profile"] | {"meaning": ""} == {
+        "parameter": "profile", "unit": "", "default": "", "allowed": "text", "meaning": ""
+    }  # fmt: skip
+    assert [row["output"] for row in reference.output_rows(rubbing)] == [output.name for output in rubbing.outputs]
+
+
+def test_tables_have_as_many_cells_in_every_row(rubbing, monkeypatch):
+    monkeypatch.setattr(models, "NAMES", (rubbing.name,))
+    tables = re.findall(r"(?:^\|.*\n)+", reference.reference_page(), flags=re.MULTILINE)
+    assert len(tables) == 5
+    for table in tables:
+        assert len({len(re.split(r"(?<!\\)\|", row)) for row in table.splitlines()}) == 1

@@ -1,0 +1,15 @@
+import pytest
+import toy as toy_model
+
+
+@pytest.fixture
+def toy(monkeypatch):
+    """The toy model, known to the runner for the length of a test."""
+    toy_model.register(monkeypatch)
+    toy_model.COMPUTED.clear()
+    return toy_model
+
+
+@pytest.fixture
+def url(tmp_path):
+    return str(tmp_path / "study.zarr")

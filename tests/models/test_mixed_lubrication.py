@@ -1,0 +1,275 @@
+"""The model of mixed lubrication: values, invariances, sharing, bad input, warnings."""
+
+import itertools
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.models import load
+from mdr_dask.models.base import Block, Status
+
+MODEL = load("mixed_lubrication")
+RPM = 2 * np.pi / 60
+ALL = tuple(output.name for output in MODEL.outputs)
+#: A small line for what is exact at any size: 2a is 105 to 420 um, the line 6.3 mm.
+SMALL = {
+    "rms_roughness": 2e-7,
+    "points": 20_000,
+    "roller_radius": 1e-3,
+    "roller_width": 0.01,
+    "normal_force": 100.0,
+    "rotation_speed": 10.0,
+    "temperature": 333.15,
+    "film_thickness": 4e-7,
+    "cutoff_force": 100.0,
+    "trace_points": 100,
+}
+
+
+def block(outputs=ALL, realisations=(0,), seed=2013, columns=None, **changes):
+    columns = {name: np.asarray(column) for name, column in (columns or {}).items()}
+    cases = len(next(iter(columns.values()))) if columns else 1
+    return Block(MODEL.parameters(**SMALL | changes), columns, cases, tuple(realisations), seed, tuple(outputs))
+
+
+def refused(**changes):
+    with pytest.raises(ValidationError) as caught:
+        MODEL.parameters(**SMALL | changes)
+    (error,) = caught.value.errors()
+    return error["msg"]
+
+
+def test_every_output_has_the_declared_shape_and_no_gaps():
+    result = MODEL.compute(block(realisations=(0, 1), slide_roll_ratio=0.1))
+    sizes = {name: c.values.size for name, c in MODEL.coordinates(block().parameters).items()}
+    assert set(result.values) == set(ALL)
+    for output in MODEL.outputs:
+        assert result.values[output.name].shape == (1, 2, *(sizes[dim] for dim in output.dims))
+        assert np.all(np.isfinite(result.values[output.name])), output.name
+    assert np.all(result.status == Status.DONE)
+
+
+@pytest.mark.parametrize("slip", [0.0, 0.2])
+def test_values_do_not_depend_on_block_or_neighbours(slip):
+    """Bitwise: the whole block, and each of its cases and realisations alone."""
+    columns = dict(
+        zip(
+            ("film_thickness", "rms_roughness", "layer_thickness"),
+            np.array(list(itertools.product([3e-7, 5e-7], [1.5e-7, 2e-7], [5e-9, 8e-9]))).T,
+            strict=True,
+        )
+    )
+    whole = block(columns=columns, realisations=(0, 3), slide_roll_ratio=slip)
+    together = MODEL.compute(whole)
+    for index, position in itertools.product(range(whole.cases), range(2)):
+        alone = MODEL.compute(whole.part(index, whole.realisations[position]))
+        for name, values in together.values.items():
+            np.testing.assert_array_equal(values[index, position], alone.values[name][0, 0], err_msg=name)
+
+
+def test_seed_and_realisation_make_the_lines():
+    def probability(**keys):
+        return MODEL.compute(block(["contact_length"], **keys)).values["contact_length"][0, 0]
+
+    assert probability(realisations=(5,)) == probability(realisations=(5,))
+    assert probability(realisations=(5,)) != probability(realisations=(6,))
+    assert probability(realisations=(5,), seed=1) != probability(realisations=(5,))
+
+
+@pytest.mark.parametrize("factor", [2.0**-3, 2.0**4])
+def test_scaling_all_lengths_by_a_power_of_two_changes_no_bit(factor):
+    """Heights and lengths by f, forces by f^2 at the same stress: every pure number stays, every length scales."""
+    lengths = ("rms_roughness", "roller_radius", "roller_width", "film_thickness", "layer_thickness")
+    one = MODEL.compute(block(layer_thickness=5e-9)).values
+    changes = {name: (SMALL | {"layer_thickness": 5e-9})[name] * factor for name in lengths}
+    forces = {name: SMALL[name] * factor**2 for name in ("normal_force", "cutoff_force")}
+    other = MODEL.compute(block(**changes, **forces)).values
+    assert one["breakthrough_probability"] > 0
+    for name in ("breakthrough_probability", "load_share", "film_ratio"):
+        np.testing.assert_array_equal(one[name], other[name])
+    np.testing.assert_array_equal(one["contact_length_trace"] * factor, other["contact_length_trace"])
+
+
+def test_only_the_ratio_of_layer_strength_and_thickness_matters():
+    one, other = (
+        MODEL.compute(block(layer_shear_strength=tau, layer_thickness=h)).values
+        for tau, h in ((1e6, 5e-9), (4e6, 20e-9))
+    )
+    np.testing.assert_array_equal(one["contact_length"], other["contact_length"])
+
+
+def test_a_stronger_or_thinner_layer_breaks_less():
+    strengths = MODEL.compute(block(columns={"layer_shear_strength": [0.0, 1e6, 1e7, 1e14]})).values["contact_length"]
+    assert np.all(np.diff(strengths[:, 0]) <= 0)
+    assert strengths[0, 0] > strengths[-1, 0] == 0
+
+
+def test_trace_agrees_with_its_mean():
+    """The trace on as many angles as points has the mean and the share that the scalar outputs say."""
+    values = MODEL.compute(block(trace_points=20_000)).values
+    trace = values["contact_length_trace"][0, 0]
+    assert np.mean(trace > 0) == pytest.approx(values["breakthrough_probability"][0, 0], rel=1e-12)
+    assert np.mean(trace) == pytest.approx(values["contact_length"][0, 0], rel=1e-12)
+    assert values["contact_resistance"][0, 0] == pytest.approx(2e-7 / np.mean(trace), rel=1e-12)
+
+
+def test_profiles_overlap_where_there_is_contact():
+    values = MODEL.compute(block()).values
+    upper, lower = values["upper_profile"][0, 0], values["lower_profile"][0, 0]
+    inside = np.abs(MODEL.coordinates(block().parameters)["position"].values) < 0.95
+    assert np.any(lower[inside] > upper[inside])
+    assert np.mean(upper[inside]) - np.mean(lower[inside]) == pytest.approx(4e-7, abs=3e-7)
+
+
+def test_smooth_surfaces_stand_the_film_apart_and_open_outside_the_contact():
+    values = MODEL.compute(block(rms_roughness=1e-13)).values
+    gap = values["upper_profile"][0, 0] - values["lower_profile"][0, 0]
+    inside = np.abs(MODEL.coordinates(block().parameters)["position"].values) < 1
+    np.testing.assert_allclose(gap[inside], 4e-7, atol=1e-12)
+    assert np.all(np.diff(gap[~inside & (np.arange(gap.size) > gap.size / 2)]) > 0)
+
+
+def test_pure_rolling_has_no_friction_and_creep_has_the_film_s():
+    values = MODEL.compute(block(columns={"slide_roll_ratio": [0.0, 0.1, -0.1]}, film_thickness=5e-6)).values
+    assert values["breakthrough_probability"].tolist() == [[0.0]] * 3
+    still, forward, backward = values["friction_coefficient"][:, 0]
+    assert still == 0.0
+    assert forward == backward > 0.0
+    assert np.isinf(values["contact_resistance"]).all()
+
+
+def test_creep_keeps_the_probability_of_the_rig():
+    """800 N, 100 rpm, 80 C: both means of 4 turns have a standard error of about a point."""
+    rig = MODEL.parameters(normal_force=800.0, rotation_speed=100 * RPM, temperature=353.15, rms_roughness=2e-7)
+    columns = {"slide_roll_ratio": np.array([0.0, 0.05])}
+    found = MODEL.compute(Block(rig, columns, 2, (0, 1, 2, 3), 2013, ("breakthrough_probability",)))
+    still, moving = found.values["breakthrough_probability"]
+    error = np.hypot(still.std(ddof=1), moving.std(ddof=1)) / 2
+    assert abs(still.mean() - moving.mean()) < 4 * error + 0.002
+    assert still.mean() == pytest.approx(0.717, abs=0.04)
+
+
+def test_discretisation_error_is_the_step_to_the_halved_grid():
+    """The difference to every second point is computed on the halved line itself."""
+    fine = MODEL.compute(block(shortest_wavelength=1e-5)).values
+    coarse = MODEL.compute(block(points=10_000, shortest_wavelength=1e-5)).values
+    step = fine["breakthrough_probability"] - coarse["breakthrough_probability"]
+    # the lines agree to rounding, and the window of the coarse line may be a point shorter
+    assert fine["discretisation_error"] == pytest.approx(step, abs=0.02)
+
+
+def test_only_outputs_asked_for_are_returned():
+    result = MODEL.compute(block(["film"]))
+    assert list(result.values) == ["film"]
+
+
+def test_oil_of_the_campaign_equals_the_named_one():
+    own = {
+        "temperature_1": 313.15,
+        "viscosity_1": 335e-6,
+        "temperature_2": 373.15,
+        "viscosity_2": 38.3e-6,
+        "density": 0.860 * 999.016,
+        "density_temperature": 288.705555,
+        "correlation": "gold_polyalphaolefin",
+    }
+    named, given = (
+        MODEL.compute(block(["film"], film_thickness=None, oil=oil)).values["film"][0, 0]
+        for oil in ("mobilgear_shc_xmp_320", own)
+    )
+    assert named == given
+
+
+def test_alpha_thickens_the_film_by_the_formula_s_power():
+    films = MODEL.compute(
+        block(["film"], film_thickness=None, columns={"pressure_viscosity": np.array([1e-8, 2e-8])})
+    ).values["film"][:, 0]
+    assert films[1] / films[0] == pytest.approx(2**0.470, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"temperature": 293.15}, "expected a temperature within the oil's data, 313.15 to 373.15 K, got 293.15 K"),
+        ({"rotation_speed": 0.0}, "Input should be greater than 0"),
+        ({"normal_force": 2e8}, "the contact is wider than the line: expected 2a of at most 0.006283 m, got 0.0"),
+        (
+            {"longest_wavelength": 1e-6, "shortest_wavelength": 1e-5},
+            "expected the longest wavelength above the shortest",
+        ),
+        ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two spacings"),
+        ({"rms_roughness": None}, "expected rms_roughness, or the measured profiles of both rollers"),
+        ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
+    ],
+)
+def test_bad_input_gives_one_error(changes, message):
+    assert message in refused(**changes)
+
+
+def test_a_bad_case_among_good_ones_is_data():
+    result = MODEL.compute(block(columns={"temperature": [333.15, 293.15]}, realisations=(0, 1)))
+    assert result.status.tolist() == [[Status.DONE] * 2, [Status.FAILED] * 2]
+    assert np.isnan(result.values["film"][1]).all()
+    assert "got 293.15 K" in result.messages[1, 0]
+    assert "got 293.15 K" in result.messages[1, 1]
+
+
+def test_film_formula_out_of_range_is_a_warning():
+    result = MODEL.compute(block(film_thickness=None, normal_force=1.0))
+    assert result.status[0, 0] == Status.DONE
+    assert "film formula Pan-Hamrock (central): W = " in result.messages[0, 0]
+
+
+def test_thin_films_and_loaded_asperities_are_warned_of():
+    result = MODEL.compute(block(film_thickness=1e-8, rms_roughness=2e-5))
+    assert "overlaps merge into clusters" in result.messages[0, 0]
+    assert "asperities carry" in result.messages[0, 0]
+
+
+def write_profile(path, spacing, heights):
+    path.write_text("# x, z in m\n" + "".join(f"{i * spacing:.9e}, {z:.9e}\n" for i, z in enumerate(heights)))
+    return str(path)
+
+
+def profiles(tmp_path, spacing_2=1e-6, size_2=4000):
+    generator = np.random.default_rng(1)
+    one = np.convolve(generator.normal(size=4008), np.ones(9) / 9, "valid") * 6e-7
+    two = np.convolve(generator.normal(size=size_2 + 8), np.ones(9) / 9, "valid") * 6e-7
+    return {
+        "profile_1": write_profile(tmp_path / "one.csv", 1e-6, one + 1e-5 + 1e-4 * 1e-6 * np.arange(4000)),
+        "profile_2": write_profile(tmp_path / "two.csv", spacing_2, two),
+        "rms_roughness": None,
+    }
+
+
+def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
+    files = profiles(tmp_path, size_2=3900)
+    result = MODEL.compute(block(realisations=(0, 1, 2), **files))
+    values = result.values["contact_length"][0]
+    assert np.all(result.status == Status.DONE)
+    assert len(set(values.tolist())) == 3  # the second line is turned against the first
+    # the tilt and mean of the file are gone: combined rms of two moving averages of nine
+    assert result.values["film_ratio"][0, 0] == pytest.approx(4e-7 / (6e-7 / 3 * np.sqrt(2)), rel=0.1)
+    scaled = MODEL.compute(block(**files | {"rms_roughness": 2e-7})).values["film_ratio"][0, 0]
+    assert scaled == pytest.approx(4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3)  # the cut line is not quite of unit rms
+
+
+def test_bad_profiles_give_one_error(tmp_path):
+    assert "expected profiles of the same spacing, got 1e-06 m and 2e-06 m" in refused(**profiles(tmp_path, 2e-6))
+    files = profiles(tmp_path)
+    assert "expected the profiles of both rollers or of none" in refused(profile_1=files["profile_1"])
+    (tmp_path / "bad.csv").write_text("x, z\n1, 2\n")
+    assert "two columns of numbers" in refused(**files | {"profile_2": str(tmp_path / "bad.csv")})
+    write_profile(tmp_path / "uneven.csv", 1e-6, np.zeros(100))
+    text = (tmp_path / "uneven.csv").read_text().splitlines()
+    (tmp_path / "uneven.csv").write_text("\n".join([*text[:50], *text[51:]]))
+    assert "evenly spaced, rising places" in refused(**files | {"profile_2": str(tmp_path / "uneven.csv")})
+    assert "wider than the line" in refused(**files | {"normal_force": 1e7})
+
+
+def test_time_estimate_grows_with_cases_points_and_creep():
+    small = MODEL.seconds(block())
+    assert MODEL.seconds(block(columns={"normal_force": np.full(50, 100.0)})) > small
+    assert MODEL.seconds(block(points=200_000)) > small
+    assert MODEL.seconds(block(slide_roll_ratio=0.1)) > small

@@ -1,0 +1,125 @@
+"""Identities of the steady state, and an independent march in time."""
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics import roughness, sliding
+
+SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
+EXACT = SCHEMES[:2]
+
+
+def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
+    amplitude = roughness.amplitudes(modes, hurst)
+    phase = roughness.phases(seed, realisation, modes)
+    nodes = 2 * modes * oversampling
+    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    return height, slope, roughness.spectral_slope(amplitude)
+
+
+def friction(height, slope, reach, load, scheme):
+    reaches, loads = np.broadcast_arrays(np.atleast_1d(reach).astype(float), np.atleast_1d(load).astype(float))
+    steady = sliding.steady_sliding(height, slope, reaches, loads, scheme)
+    assert np.all(steady.status == sliding.CONVERGED)
+    return steady.drag / loads
+
+
+def march(height, reach, depth, turns=3):
+    """Step elements through the line in time by backward Euler, without any trick of the solver."""
+    n, decay = height.size, reach * height.size / (1 + reach * height.size)
+    u = 0.0
+    for _ in range(turns):
+        normal = drag = 0.0
+        for i in range(n):
+            w, free = height[i] + depth, decay * u
+            force = w + reach * n * (w - u) if w > free else 0.0
+            normal += force / n
+            drag += force * (height[i] - height[i - 1])
+            u = max(w, free)
+    return normal, drag
+
+
+@pytest.mark.parametrize("hurst", [0, 0.7, 1])
+@pytest.mark.parametrize("reach", [1e-5, 1e-3, 1e-1])
+@pytest.mark.parametrize("load", [0.01, 0.3, 5.0])
+def test_backward_euler_agrees_with_time_stepping(hurst, reach, load):
+    height, _, _ = rough(50, hurst, 1)
+    steady = sliding.steady_sliding(height, None, np.array([reach]), np.array([load]), "backward_euler")
+    normal, drag = march(height, reach, steady.depth[0], turns=3 + int(20 * reach))
+    # both do the same arithmetic in another order
+    assert normal == pytest.approx(load, rel=1e-10)
+    assert drag == pytest.approx(steady.drag[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("reach", [1e-3, 1e-1])
+@pytest.mark.parametrize("load", [0.1, 2.0])
+def test_exact_sweep_agrees_with_fine_time_steps(reach, load):
+    height, slope, _ = rough(20, 0.7, 32)
+    best = friction(height, slope, reach, load, "hermite")[0]
+    fine, _, _ = rough(20, 0.7, 2048)
+    coarse, finer = (friction(line, None, reach, load, "backward_euler")[0] for line in (fine[::2], fine))
+    # first order: one Richardson step removes the error of the time steps but for terms of second order
+    assert best == pytest.approx(2 * finer - coarse, rel=2e-3)
+
+
+@pytest.mark.parametrize("hurst", [0, 0.5, 1])
+def test_full_contact_is_exact(hurst):
+    height, slope, gradient = rough(500, hurst, 2)
+    reach = np.geomspace(1e-9, 1e-2, 8)
+    load = 2 * np.max(np.abs(height)) + 2 * reach * np.max(np.abs(slope))
+    # thesis eq. 3.14: F_x / (4 G) = v tau grad^2 for a line of unit length
+    expected = reach * gradient**2 / load
+    assert friction(height, slope, reach, load, "hermite") == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("scheme", EXACT)
+@pytest.mark.parametrize("load", [1e-3, 0.1, 2.0])
+def test_friction_has_no_floor_at_low_velocity(scheme, load):
+    height, slope, _ = rough(200, 0.3)
+    reach = np.geomspace(1e-14, 1e-6, 9)
+    mu = friction(height, slope, reach, load, scheme)
+    # v -> 0: mu / v tends to a constant; the slowest are 1e8 times slower than the fastest
+    assert mu[:-1] / reach[:-1] == pytest.approx(mu[0] / reach[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_load_is_met_by_the_displacement_marched_at_the_depth_found(scheme):
+    height, slope, _ = rough(100, 0.5, 8)
+    steady = sliding.steady_sliding(height, slope, np.array([1e-2]), np.array([0.5]), scheme)
+    normal, _ = march(height, 1e-2, steady.depth[0])
+    # another discretisation of the same state: first order in the cell
+    assert normal == pytest.approx(0.5, rel=2e-2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_heights_scale_out(scheme):
+    height, slope, _ = rough(100, 0.7)
+    reach, load = np.geomspace(1e-5, 1e1, 7), 0.4
+    one = friction(height, slope, reach, load, scheme)
+    scaled = friction(height * 1e-6, slope * 1e-6, reach, load * 1e-6, scheme) * 1e6
+    assert scaled == pytest.approx(one, rel=1e-7)
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 0.8), ("piecewise_linear", 1.8), ("hermite", 2.5)])
+def test_order_of_convergence(scheme, order):
+    lines = {factor: rough(50, 0.7, factor)[:2] for factor in (4, 16, 64)}
+    reach, load = np.geomspace(1e-4, 1e-1, 7), 0.5
+    mu = {factor: friction(*line, reach, load, scheme) for factor, line in lines.items()}
+    reference = friction(*lines[64], reach, load, "hermite")
+    errors = [np.sqrt(np.mean((mu[factor] / reference - 1) ** 2)) for factor in (4, 16)]
+    assert np.log(errors[0] / errors[1]) / np.log(4) > order
+
+
+def test_bad_numbers_are_a_status():
+    height, slope, _ = rough()
+    bad = np.array([np.nan, np.inf, 0.0, -1.0])
+    steady = sliding.steady_sliding(height, slope, np.append(bad, np.ones(4)), np.append(np.ones(4), bad))
+    assert np.all(steady.status == sliding.INVALID)
+    assert np.all(np.isnan(steady.drag))
+    height[3] = np.nan
+    assert sliding.steady_sliding(height, slope, np.ones(1), np.ones(1)).status[0] == sliding.INVALID
+
+
+def test_hermite_needs_slopes():
+    with pytest.raises(ValueError, match="expected slopes at the nodes"):
+        sliding.steady_sliding(np.zeros(32), None, np.ones(1), np.ones(1))

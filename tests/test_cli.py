@@ -1,0 +1,201 @@
+"""The command line as a user meets it: exit codes, streams, tables, JSON, and what survives a kill."""
+
+import csv
+import io
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_execute import digests
+
+from mdr_dask.cli import main
+
+CAMPAIGN = """\
+name: small
+model: sliding_friction
+seed: 7
+realisations: 8
+parameters:
+  length: 20 mm
+  points: 500
+  hurst: 0.7
+  rms_roughness: 0.5 um
+  shear_modulus: 10 MPa
+  relaxation_time: 1 ms
+  normal_force: [0.1 N, 10 N]
+  velocity: {geometric: [1 mm/s, 1 m/s, 4]}
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "small.yaml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture
+def filled(campaign, capsys) -> str:
+    assert main(["run", str(campaign), "--quiet"]) == 0
+    capsys.readouterr()
+    return "results/small.zarr"
+
+
+def test_run_then_run_again(campaign, capsys):
+    assert main(["run", str(campaign)]) == 0
+    first = capsys.readouterr()
+    assert first.out == "results/small.zarr: 64 done, 0 failed\n"
+    assert "blocks" in first.err
+    assert main(["run", str(campaign)]) == 0
+    assert capsys.readouterr().out == "results/small.zarr: all 64 results are there already; nothing to do\n"
+
+
+def test_dry_run_says_what_would_be_done_and_writes_nothing(campaign, capsys):
+    assert main(["run", str(campaign), "--dry-run"]) == 0
+    assert "8 cases x 8 realisations = 64 results" in capsys.readouterr().out
+    assert not Path("results").exists()
+
+
+def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):
+    campaign.write_text(CAMPAIGN.replace("hurst: 0.7", "hurst: 1.2").replace("points: 500", "points: many"))
+    assert main(["run", str(campaign)]) == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert f"{campaign}:7:" in streams.err
+    assert f"{campaign}:8:" in streams.err
+    assert not Path("results").exists()
+
+
+def test_a_case_too_large_for_the_memory_is_refused(campaign, capsys):
+    campaign.write_text(CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"))
+    assert main(["check", str(campaign)]) == 2
+    assert "GiB of memory" in capsys.readouterr().err
+
+
+def test_wrong_options_are_named(campaign, filled, capsys):
+    assert main(["run", str(campaign), "--workers", "1", "--threads", "2"]) == 2
+    assert "expected one of --threads, --workers" in capsys.readouterr().err
+    assert main(["show", filled, "friction"]) == 2
+    assert "did you mean 'friction_coefficient'?" in capsys.readouterr().err
+    assert main(["show", filled, "--select", "velocity=1 kg"]) == 2
+    assert "velocity" in capsys.readouterr().err
+    assert main(["show", "nowhere.zarr"]) == 2
+    assert "no store here" in capsys.readouterr().err
+
+
+def test_show_selects_with_units_and_prints_csv_and_json(filled, capsys):
+    arguments = ["show", filled, "friction_coefficient", "--select", "normal_force=100 mN"]
+    assert main([*arguments, "--select", "velocity=5 mm/s:1 km/s", "--csv"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert [float(row["velocity [m/s]"]) for row in rows] == pytest.approx([0.01, 0.1, 1.0])
+    assert main([*arguments, "--json", "--statistic", "mean"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["units"]["normal_force"] == "N"
+    means = xr.open_zarr(filled).friction_coefficient.sel(normal_force=0.1).mean("realisation")
+    np.testing.assert_allclose([row["friction_coefficient_mean"] for row in document["rows"]], means, rtol=1e-12)
+
+
+def test_status_counts_and_lists_failures(campaign, capsys):
+    assert main(["run", str(campaign), "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["status", "results/small.zarr", "--json"]) == 0
+    row = json.loads(capsys.readouterr().out)["rows"][0]
+    assert (row["results"], row["done"], row["missing"]) == (64, 64, 0)
+    assert main(["status", "results/small.zarr", "--failures"]) == 0
+    assert capsys.readouterr().out == "no failures\n"
+
+
+@pytest.mark.parametrize("suffix", [".nc", ".zarr", ".csv"])
+def test_aggregates_are_written_to_files(filled, tmp_path, capsys, suffix):
+    path = tmp_path / f"means{suffix}"
+    assert main(["aggregate", filled, "-o", str(path)]) == 0
+    if suffix == ".csv":
+        assert "friction_coefficient_mean" in path.read_text().splitlines()[0]
+    else:
+        opened = xr.open_dataset(path, engine="scipy" if suffix == ".nc" else "zarr")
+        assert opened.friction_coefficient_interval.sizes["bound"] == 2
+        opened.close()
+
+
+def test_another_campaign_is_refused_by_the_store(campaign, filled, capsys):
+    campaign.write_text(CAMPAIGN.replace("0.5 um", "0.6 um"))
+    assert main(["run", str(campaign), "--quiet"]) == 2
+    assert "rms_roughness: 5e-07 in the store, 6e-07 in the campaign" in capsys.readouterr().err
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "mdr_dask", *arguments]
+
+
+@pytest.mark.slow
+def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path):
+    """SIGKILL at random moments, again and again, until a run gets through: no byte differs, no block is done twice."""
+    long = CAMPAIGN.replace("realisations: 8", "realisations: 96").replace("points: 500", "points: 20000")
+    campaign.write_text(long + "store: {path: killed.zarr, blocks: {realisation: 2}}\n")
+    kills = 0
+    for moment in np.random.default_rng(1).uniform(0.8, 2.5, 40):
+        with subprocess.Popen(command("run", str(campaign), "--quiet"), stdout=subprocess.DEVNULL) as process:
+            try:
+                process.wait(moment)
+                break
+            except subprocess.TimeoutExpired:
+                process.send_signal(signal.SIGKILL)
+                kills += 1
+    assert process.returncode == 0
+    assert kills >= 1
+    subprocess.run(command("run", str(campaign), "--quiet", "--store", "whole.zarr"), check=True, capture_output=True)
+    assert digests("killed.zarr") == digests("whole.zarr")
+
+
+@pytest.mark.slow
+def test_threads_and_worker_processes_give_the_same_bytes(campaign, tmp_path):
+    campaign.write_text(CAMPAIGN + "store: {path: x, blocks: {realisation: 2}}\n")
+    for name, options in {"threads": ["--threads", "2"], "one": ["--workers", "1"], "two": ["--workers", "2"]}.items():
+        subprocess.run(
+            command("run", str(campaign), "--quiet", "--store", f"{name}.zarr", *options),
+            check=True,
+            capture_output=True,
+        )
+    assert digests("threads.zarr") == digests("one.zarr") == digests("two.zarr")
+
+
+@pytest.mark.slow
+def test_a_running_scheduler_and_a_cluster_file_are_used(campaign, tmp_path):
+    from distributed import LocalCluster
+
+    campaign.write_text(CAMPAIGN)
+    Path("cluster.yaml").write_text(
+        "class: distributed.LocalCluster\narguments: {n_workers: 1, threads_per_worker: 1, dashboard_address: null}\n"
+        "scale: {n: 1}\n"
+    )
+    subprocess.run(
+        command("run", str(campaign), "--cluster", "cluster.yaml", "--store", "a.zarr"), check=True, capture_output=True
+    )
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+        options = ["--scheduler", cluster.scheduler_address, "--store", "b.zarr"]
+        subprocess.run(command("run", str(campaign), *options), check=True, capture_output=True)
+    assert digests("a.zarr") == digests("b.zarr")
+
+
+@pytest.mark.slow
+def test_interrupting_says_how_to_go_on_and_readers_may_look_meanwhile(campaign):
+    long = CAMPAIGN.replace("realisations: 8", "realisations: 400").replace("points: 500", "points: 20000")
+    campaign.write_text(long + "store: {path: live.zarr, blocks: {realisation: 1}}\n")
+    with subprocess.Popen(command("run", str(campaign)), stderr=subprocess.PIPE, text=True) as process:
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline and not list(Path("live.zarr").glob("status/c/*/*/*")):
+            time.sleep(0.05)
+        seen = xr.open_zarr("live.zarr")
+        assert seen.friction_coefficient.attrs["units"] == "1"
+        assert int((seen.status == 1).sum()) > 0
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "the same command goes on" in errors

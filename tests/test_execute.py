@@ -1,0 +1,257 @@
+"""The runner: every result once, the same bytes whatever happens, failures as data."""
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask import execute, store
+from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.execute import Progress, Resources
+from mdr_dask.models.base import Status
+from mdr_dask.store import layout
+
+
+def run(campaign, url, **options) -> Progress:
+    return execute.run(campaign, url, Resources(threads=2), lambda _: None, **options)
+
+
+def digests(url: str) -> dict[str, str]:
+    """Return the digest of every chunk: all bytes of a store that are not metadata or records."""
+    return {
+        str(path.relative_to(url)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(Path(url).rglob("*"))
+        if path.is_file() and path.suffix != ".json"
+    }
+
+
+def values(url: str, output: str = "height") -> xr.DataArray:
+    return store.datasets(url)[""][output].load()
+
+
+def test_a_run_fills_every_cell_with_the_value_of_its_parameters(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]), toy.axis("slope", [3.0, 5.0, 7.0]), noise=0.0)
+    progress = run(campaign, url)
+    assert (progress.done, progress.failed, progress.total) == (36, 0, 36)
+    found = values(url)
+    expected = found.position * found.slope
+    np.testing.assert_array_equal(found, expected.broadcast_like(found).transpose(*found.dims))
+
+
+def test_plain_xarray_reads_a_store_with_units_and_fixed_parameters(toy, url):
+    run(toy.campaign(toy.axis("position", [1.0, 2.0]), noise=0.25), url)
+    dataset = xr.open_zarr(url)
+    assert dataset.height.dims == ("position", "realisation")
+    assert dataset.height.attrs["units"] == dataset.position.attrs["units"] == "m"
+    assert float(dataset.noise) == 0.25
+    assert dataset.status.attrs["flag_meanings"].split()[Status.DONE] == "done"
+    assert dataset.attrs["campaign"] == "text"
+
+
+def test_series_are_groups_of_one_tree(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
+    far = replace(campaign.series[0], name="far", axes=(toy.axis("position", [10.0, 20.0, 30.0]),))
+    run(replace(campaign, series=(campaign.series[0], far)), url)
+    tree = xr.open_datatree(url, engine="zarr")
+    assert {name: node.sizes["position"] for name, node in tree.children.items()} == {"near": 2, "far": 3}
+    assert xr.open_zarr(url, group="far").height.attrs["units"] == "m"
+
+
+def test_a_second_run_computes_and_writes_nothing(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    run(campaign, url)
+    before = {path: path.stat().st_mtime_ns for path in Path(url).rglob("*")}
+    toy.COMPUTED.clear()
+    progress = run(campaign, url)
+    assert (progress.kept, progress.done, toy.COMPUTED) == (12, 0, [])
+    assert {path: path.stat().st_mtime_ns for path in Path(url).rglob("*")} == before
+
+
+@pytest.mark.parametrize("blocks", [{}, {"position": 1}, {"realisation": 4}, {"position": 2, "realisation": 1}])
+def test_values_do_not_depend_on_the_blocks(toy, tmp_path, blocks):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0, 4.0]), toy.axis("slope", [1.0, 2.0]))
+    urls = [str(tmp_path / name) for name in ("a.zarr", "b.zarr")]
+    run(campaign, urls[0])
+    run(replace(campaign, blocks=blocks), urls[1])
+    assert values(urls[0]).to_numpy().tobytes() == values(urls[1]).to_numpy().tobytes()
+
+
+def test_an_interrupted_run_goes_on_and_ends_with_the_same_bytes(toy, tmp_path):
+    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 4.0])), blocks={"realisation": 1, "position": 1})
+    whole, broken = (str(tmp_path / name) for name in ("whole.zarr", "broken.zarr"))
+    run(campaign, whole)
+
+    def interrupt(progress: Progress) -> None:
+        if progress.done == 7:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        execute.run(campaign, broken, Resources(threads=1), interrupt)
+    there = int((store.ledger(broken, "") == Status.DONE).sum())
+    assert 7 <= there < 18
+    toy.COMPUTED.clear()
+    progress = run(campaign, broken)
+    assert (progress.kept, progress.done, len(toy.COMPUTED)) == (there, 18 - there, 18 - there)
+    assert digests(whole) == digests(broken)
+
+
+def test_a_block_without_its_ledger_chunk_is_computed_again(toy, url):
+    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0])), blocks={"realisation": 2})
+    run(campaign, url)
+    before = digests(url)
+    (Path(url) / "status/c/0/1").unlink()
+    (Path(url) / "height/c/0/1").unlink()
+    assert run(campaign, url).done == 4
+    assert digests(url) == before
+
+
+def test_failures_are_recorded_counted_and_retried_on_request_only(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), fail_above=2.5)
+    assert run(campaign, url).failed == 6
+    assert np.isnan(values(url).sel(position=3.0)).all()
+    assert np.isfinite(values(url).sel(position=[1.0, 2.0])).all()
+    messages = [message for record in store.records(url, "") for message in record["messages"]]
+    assert {(m["case"]["position"], m["message"], m["status"]) for m in messages} == {
+        (3.0, "position above fail_above", "failed")
+    }
+    assert run(campaign, url).failed == 0
+    before = digests(url)
+    toy.COMPUTED.clear()
+    assert run(campaign, url, retry_failed=True).failed == 6
+    assert {position for position, _ in toy.COMPUTED} == {3.0}
+    assert digests(url) == before
+    assert set(store.attempts(url, "").values()) == {2}
+
+
+def test_an_exception_in_a_model_fails_its_own_case_only(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), raise_above=2.5)
+    assert run(campaign, url).failed == 6
+    clean = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    run(clean, url + "2")
+    np.testing.assert_array_equal(values(url).sel(position=[1.0, 2.0]), values(url + "2"))
+    record = next(store.records(url, ""))
+    assert record["messages"][0]["message"] == "RuntimeError: position too high"
+
+
+def test_more_values_and_more_realisations_extend_a_store(toy, url):
+    small = replace(toy.campaign(toy.axis("position", [1.0, 4.0]), toy.axis("slope", [1.0])), blocks={"realisation": 4})
+    run(small, url)
+    before = values(url)
+    large = toy.campaign(
+        toy.axis("position", [1.0, 2.0, 4.0]), toy.axis("slope", [0.5, 1.0]), realisations=Replication(9, 9, {})
+    )
+    toy.COMPUTED.clear()
+    progress = run(large, url)
+    assert (progress.kept, progress.done, len(toy.COMPUTED)) == (12, 42, 42)
+    after = values(url)
+    assert list(after.position) == [1.0, 2.0, 4.0]
+    np.testing.assert_array_equal(after.reindex_like(before), before)
+    run(large, url + "2")
+    np.testing.assert_array_equal(after, values(url + "2"))
+
+
+def test_a_new_series_leaves_the_old_one_untouched(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
+    run(campaign, url)
+    before = digests(url)
+    far = replace(campaign.series[0], name="far", axes=(toy.axis("position", [10.0]),))
+    run(replace(campaign, series=(campaign.series[0], far)), url)
+    after = digests(url)
+    assert {name: after[name] for name in before} == before
+    assert set(store.datasets(url)) == {"near", "far"}
+
+
+def test_series_grow_too(toy, url):
+    small = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
+    run(small, url)
+    large = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), name="near", realisations=Replication(9, 9, {}))
+    assert run(large, url).done == 27 - 12
+    assert xr.open_zarr(url, group="near").height.shape == (3, 9)
+    tree = xr.open_datatree(url, engine="zarr")
+    assert tree["near"].height.shape == (3, 9)
+    tree.close()
+
+
+def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
+    run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    before = digests(url), (Path(url) / "zarr.json").read_bytes()
+    other = replace(toy.campaign(toy.axis("position", [1.0, 2.0]), noise=0.75), seed=5)
+    with pytest.raises(
+        StoreError, match=r"seed: 1 in the store, 5 .*\n +noise: 0.5 in the store, 0.75 in the campaign"
+    ):
+        run(other, url)
+    with pytest.raises(StoreError, match=r"axes: \['position'\] in the store, \['slope'\] in the campaign"):
+        run(toy.campaign(toy.axis("slope", [1.0])), url)
+    assert (digests(url), (Path(url) / "zarr.json").read_bytes()) == before
+
+
+def test_a_foreign_group_is_refused(toy, url):
+    xr.Dataset({"a": ("x", [1.0])}).to_zarr(url, consolidated=False)
+    with pytest.raises(StoreError, match="not one that mdr_dask made"):
+        run(toy.campaign(toy.axis("position", [1.0])), url)
+
+
+def test_a_second_runner_is_refused_with_the_name_of_the_first(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0]))
+    with store.lock(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
+        run(campaign, url)
+    assert run(campaign, url).done == 6
+
+
+def test_readers_see_the_old_shape_until_a_grown_one_is_published(toy, url, monkeypatch):
+    run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    grown = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]))
+
+    def power_cut(*_: object) -> None:
+        raise OSError("no power")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(layout, "_publish", power_cut)
+        with pytest.raises(OSError, match="no power"):
+            run(grown, url)
+    seen = xr.open_zarr(url)
+    assert seen.sizes["position"] == seen.height.shape[0] == 2
+    assert run(grown, url).done == 6
+    assert xr.open_zarr(url).sizes["position"] == 3
+
+
+def test_rounds_go_on_for_the_cases_that_need_them(toy, url):
+    campaign = toy.campaign(
+        toy.axis("position", [1.0, 2.0]),
+        toy.axis("noise", [0.01, 0.2]),
+        realisations=Replication(5, 400, {"height": Tolerance(relative=0.01)}),
+    )
+    run(campaign, url)
+    dataset = store.datasets(url)[""]
+    done = (dataset.status == Status.DONE).sum("realisation")
+    assert (done.sel(noise=0.01) == 5).all()
+    assert (done.sel(noise=0.2) > 50).all()
+    height = dataset.height
+    error = height.std("realisation", ddof=1) / np.sqrt(height.notnull().sum("realisation"))
+    assert (error <= 0.01 * abs(height.mean("realisation"))).all()
+    toy.COMPUTED.clear()
+    assert run(campaign, url).done == 0
+    assert toy.COMPUTED == []
+    fixed = replace(campaign, replication=Replication(done.max().item(), done.max().item(), {}))
+    run(fixed, url)
+    run(fixed, url + "2")
+    np.testing.assert_array_equal(values(url)[..., : done.max().item()], values(url + "2"))
+
+
+def test_records_tell_times_and_solves(toy, url):
+    run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    record = json.loads((Path(url) / "status/records/0.0-1.json").read_text())
+    assert record["solves"] == 12
+    assert record["compute_seconds"] > 0
+
+
+def test_a_store_in_memory_works_like_one_on_disk(toy):
+    pytest.importorskip("fsspec")
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    assert run(campaign, "memory://study.zarr").done == 12
+    assert run(campaign, "memory://study.zarr").kept == 12

@@ -1,0 +1,82 @@
+"""What every change has to keep: formatting, types, imports, light start-up, current reference pages."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from mdr_dask.campaign.reference import reference_page
+
+from mdr_dask import campaign, fit, models, plots
+from mdr_dask.cli import cli
+from mdr_dask.cli.reference import commands_page
+
+ROOT = Path(__file__).parent.parent
+BESIDE_PYTHON = Path(sys.executable).parent
+
+
+def output_of(*command: str) -> str:
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["ruff format --check .", "ruff check .", "mypy", "lint-imports"],
+    ids=["format", "lint", "types", "imports"],
+)
+def test_tools_are_content(command):
+    name, *arguments = command.split()
+    output_of(str(BESIDE_PYTHON / name), *arguments)
+
+
+@pytest.mark.parametrize(
+    ("statement", "forbidden"),
+    [
+        ("import mdr_dask", {"dask", "distributed", "numba", "matplotlib", "scipy", "zarr", "xarray"}),
+        ("import mdr_dask.cli", {"dask", "numba", "matplotlib", "pydantic", "pint", "numpy", "xarray", "rich"}),
+        ("import mdr_dask.campaign", {"dask", "distributed", "numba", "matplotlib", "pint", "scipy", "xarray"}),
+    ],
+)
+def test_importing_loads_only_what_is_used(statement, forbidden):
+    loaded = output_of(sys.executable, "-c", f"import sys; {statement}; print(' '.join(sys.modules))").split()
+    assert not forbidden & set(loaded)
+
+
+@pytest.mark.parametrize("name", sorted(cli.commands))
+def test_every_command_has_help_an_example_and_a_place_in_the_docs(name):
+    command = cli.commands[name]
+    assert f"mdr-dask {name}" in (command.help or "")
+    assert all(option.help for option in command.params if isinstance(option, click.Option))
+    assert f"## mdr-dask {name}" in (ROOT / "docs/commands.md").read_text()
+
+
+def test_reference_pages_are_current():
+    assert (ROOT / "docs/commands.md").read_text() == commands_page()
+    assert (ROOT / "docs/campaign-file.md").read_text() == reference_page()
+    assert json.loads((ROOT / "docs/campaign.schema.json").read_text()) == campaign.json_schema()
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "campaigns").glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_campaign_of_the_house_is_right(path):
+    study = campaign.load(path)
+    assert study.name == path.stem
+
+
+def test_every_fit_and_figure_is_registered_for_a_model():
+    for room, folder in ((fit, "fit"), (plots, "plots")):
+        written = {path.stem for path in (ROOT / "mdr_dask" / folder).glob("*.py")} - {"__init__", "base"}
+        named = {name for name in written if not name.startswith("_")}
+        assert set(room.SUBJECTS) <= named
+        assert any(room.available(model) for model in models.NAMES)
+
+
+def test_the_first_two_shell_blocks_of_the_readme_are_one_command_line_each():
+    blocks = re.findall(r"^```sh\n(.*?)^```", (ROOT / "README.md").read_text(), flags=re.M | re.S)
+    assert all(len(block.strip().splitlines()) == 1 for block in blocks[:2])
+    assert "quickstart" in blocks[0]
+    assert "pytest" in blocks[1]

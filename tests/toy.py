@@ -1,0 +1,81 @@
+"""A model small enough to reason about: y = a x + noise of the realisation, with cases that fail on request."""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+
+import numpy as np
+
+from mdr_dask import models
+from mdr_dask.campaign import Axis, Campaign, Replication, Series, Tolerance
+from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, Result, Status, quantity
+
+
+class ToyParameters(Parameters):
+    slope: float = quantity("1", "slope of the line", default=2.0)
+    position: float = quantity("m", "where the line is read", default=1.0)
+    noise: float = quantity("1", "standard deviation over realisations", default=0.5, ge=0)
+    fail_above: float = quantity("m", "positions above it fail", default=1e9)
+    raise_above: float = quantity("m", "positions above it raise, in spite of the promise", default=1e9)
+
+
+COMPUTED: list[tuple[float, int]] = []
+
+
+def compute(block: Block[ToyParameters]) -> Result:
+    position, slope = block.column("position"), block.column("slope")
+    if (position > block.parameters.raise_above).any():
+        raise RuntimeError("position too high")
+    noise = np.array(
+        [
+            np.random.Generator(np.random.Philox(np.random.SeedSequence(block.seed, spawn_key=(r,)))).standard_normal()
+            for r in block.realisations
+        ]
+    )
+    COMPUTED.extend((float(x), r) for x in position for r in block.realisations)
+    y = (slope * position)[:, None] + block.column("noise")[:, None] * noise * position[:, None]
+    failed = np.broadcast_to((position > block.parameters.fail_above)[:, None], y.shape)
+    status = np.where(failed, Status.FAILED, Status.DONE).astype(np.int8)
+    values = {"height": np.where(failed, np.nan, y), "trace": np.where(failed, np.nan, y)[..., None] * np.arange(3.0)}
+    messages = {(int(i), int(j)): "position above fail_above" for i, j in zip(*np.nonzero(failed), strict=True)}
+    return Result({name: values[name] for name in block.outputs}, status, messages, solves=y.size)
+
+
+MODEL = Model(
+    name="toy",
+    version=1,
+    summary="a straight line with noise",
+    parameters=ToyParameters,
+    outputs=(
+        Output("height", "m", "height of the line"),
+        Output("trace", "m", "multiples of the height", ("multiple",), default=False),
+    ),
+    compute=compute,
+    seconds=lambda block: 1e-6 * block.cases * len(block.realisations),
+    coordinates=lambda _: {"multiple": Coordinate(np.arange(3.0), "1", "factor")},
+)
+
+
+def register(monkeypatch) -> None:
+    """Make ``model: toy`` known for the length of a test."""
+    module = ModuleType("mdr_dask.models.toy")
+    module.MODEL = MODEL
+    monkeypatch.setitem(sys.modules, "mdr_dask.models.toy", module)
+    monkeypatch.setattr(models, "NAMES", (*models.NAMES, "toy"))
+
+
+def axis(path: str, values, dim: str | None = None) -> Axis:
+    return Axis(path, path, dim or path, tuple(values), None, "m" if path == "position" else "1", path)
+
+
+SIX = Replication(6, 6, {})
+
+
+def campaign(*axes: Axis, name: str = "", realisations=SIX, outputs=("height",), **parameters) -> Campaign:
+    first = {a.path: a.values[0] for a in axes}
+    series = Series(name, ToyParameters(**{**parameters, **first}), axes)
+    return Campaign("toy", "toy", 1, realisations, (series,), tuple(outputs), None, "", {}, "text", "toy.yaml")
+
+
+__all__ = ["COMPUTED", "MODEL", "Replication", "Tolerance", "axis", "campaign", "register"]
