@@ -52,20 +52,28 @@ class FrettingWear(Parameters):
     method: Literal["limit", "fast", "exact", "literal"] = Field("fast", description="way to the worn profile")
     hold: Literal["depth", "force"] = Field("depth", description="what stays constant while the body wears")
     cycles: float = quantity("1", "number of cycles; N = cycles / N0 in a dimensionless campaign", ge=0, default=1.0)
-    stick_radius: float | None = quantity("1", "stick radius c over the first contact radius a0", gt=0, lt=1, default=None)
+    stick_radius: float | None = quantity(
+        "1", "stick radius c over the first contact radius a0", gt=0, lt=1, default=None
+    )
     amplitude: float | None = quantity("m", "amplitude U0 of the tangential oscillation", gt=0, default=None)
     curvature_radius: float | None = quantity("m", "radius of curvature of a parabola or power law", gt=0, default=None)
-    angle: float | None = quantity("rad", "inclination of a cone's flank against the surface", gt=0, lt=1.5, default=None)
+    angle: float | None = quantity(
+        "rad", "inclination of a cone's flank against the surface", gt=0, lt=1.5, default=None
+    )
     modulus: float | None = quantity("Pa", "effective normal modulus E*", gt=0, default=None)
     shear_modulus: float | None = quantity("Pa", "effective tangential modulus G*", gt=0, default=None)
     friction: float | None = quantity("1", "coefficient of friction", gt=0, default=None)
     load: float | None = quantity("N", "normal force of the virgin contact", gt=0, default=None)
     depth: float | None = quantity("m", "indentation depth of the virgin contact", gt=0, default=None)
     hardness: float | None = quantity("Pa", "hardness in the wear law", gt=0, default=None)
-    wear_coefficient: float | None = quantity("1", "wear coefficient k of the law V = k F u / hardness", ge=0, default=None)
+    wear_coefficient: float | None = quantity(
+        "1", "wear coefficient k of the law V = k F u / hardness", ge=0, default=None
+    )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
     tolerance: float = quantity("1", "error of the exact profile wanted, in d0", ge=1e-6, le=1e-2, default=1e-3)
-    cells: int = quantity("1", "cells of the grid of method literal, of hold force and of histories", ge=20, le=2000, default=200)
+    cells: int = quantity(
+        "1", "cells of the grid of method literal, of hold force and of histories", ge=20, le=2000, default=200
+    )
     friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
     wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
@@ -123,7 +131,9 @@ def compute(block: Block[FrettingWear]) -> Result:
     numbers, messages = _reduce(block)
     status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
     wanted = [name for name in block.outputs if name != "status"]
-    values = {name: np.full(status.shape + ((block.parameters.points,) if name in _OVER else ()), np.nan) for name in wanted}
+    values = {
+        name: np.full(status.shape + ((block.parameters.points,) if name in _OVER else ()), np.nan) for name in wanted
+    }
     _refuse_gross_slip(block, numbers, messages)
     for position in messages:
         status[position] = Status.FAILED
@@ -158,7 +168,9 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
     holds = set(block.columns.get("hold", [block.parameters.hold]))
     tables = any(isinstance(shape, TableShape) for shape in set(_shapes(block)))
     plain_load = holds == {"depth"} and not block.parameters.history and "history" not in block.columns
-    return methods <= {"limit", "fast"} and plain_load and not tables and not set(block.outputs) & {*_OVER, "worn_depth"}
+    return (
+        methods <= {"limit", "fast"} and plain_load and not tables and not set(block.outputs) & {*_OVER, "worn_depth"}
+    )
 
 
 def _shapes(block: Block[FrettingWear]) -> list[object]:
@@ -519,7 +531,13 @@ OUTPUTS = (
     Output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)", default=False),
     Output("worn_profile", "m", "worn profile f(r), from the virgin apex", ("radius",), default=False),
     Output("worn_image", "m", "worn one-dimensional image g(x)", ("position",), default=False),
-    Output("pressure", "Pa", "contact pressure p(r) (E* d0 / a0 = 1 in a dimensionless campaign)", ("radius",), default=False),
+    Output(
+        "pressure",
+        "Pa",
+        "contact pressure p(r) (E* d0 / a0 = 1 in a dimensionless campaign)",
+        ("radius",),
+        default=False,
+    ),
     Output("discretisation_error", "1", "error expected of the profile, over d0"),
 )
 

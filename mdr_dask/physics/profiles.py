@@ -188,7 +188,9 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
 def check_table(radius: FloatArray, height: FloatArray) -> None:
     """Raise ValueError unless a table of a profile starts at the axis, is finite and rises."""
     if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
-        raise ValueError(f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}")
+        raise ValueError(
+            f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
+        )
     if not (np.all(np.isfinite(radius)) and np.all(np.isfinite(height))):
         bad = int(np.argmin(np.isfinite(radius) & np.isfinite(height)))
         raise ValueError(f"a profile must be finite, got {radius[bad]!r}, {height[bad]!r} in row {bad + 1}")

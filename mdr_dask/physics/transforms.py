@@ -182,9 +182,7 @@ def pressure(
     return Estimate(np.where(inside, value, 0.0), np.where(inside, error, 0.0))
 
 
-def volume(
-    image: Function, radius: float, *, breaks: Sequence[float] = (), tolerance: float = 1e-10
-) -> Estimate:
+def volume(image: Function, radius: float, *, breaks: Sequence[float] = (), tolerance: float = 1e-10) -> Estimate:
     """Return the volume under a profile from its image: int_0^R 2 pi r f dr = 4 int_0^R g sqrt(R^2 - x^2) dx."""
     edges = _angles(np.array([radius]), breaks)
 

@@ -277,4 +277,3 @@ def _integral(function: Function, low: float, high: float) -> float:
 def _angle(x: FloatArray, radius: FloatArray) -> FloatArray:
     """Return arccos(x / r) without cancellation near x = r."""
     return np.asarray(np.arctan2(np.sqrt(np.maximum((radius - x) * (radius + x), 0.0)), x))
-

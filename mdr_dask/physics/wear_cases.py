@@ -176,5 +176,7 @@ def _fasts(n, c, cycles, xi, limit, abscissa, weight, result):  # type: ignore[n
         for piece in range(4):
             for k in range(abscissa.size):
                 width = cuts[piece + 1] - cuts[piece]
-                worn += weight[k] * width * _change(cuts[piece] + width * abscissa[k], n[case], c[case], at_c, eta, rest)
+                worn += (
+                    weight[k] * width * _change(cuts[piece] + width * abscissa[k], n[case], c[case], at_c, eta, rest)
+                )
         result[2, case] = 2.0 * (n[case] / (n[case] + 1.0) - worn)

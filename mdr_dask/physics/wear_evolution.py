@@ -393,5 +393,3 @@ def _extrapolate(time: float, past: Sequence[Moment]) -> FloatArray:
         others = [other.time for other in past if other is not moment]
         result += moment.unknowns * np.prod([(time - t) / (moment.time - t) for t in others])
     return result
-
-

@@ -33,9 +33,7 @@ class Fretted(Worn):
     steps: int = 0
 
 
-def exact(
-    profile: Profile, stick_radius: float, cycles: Sequence[float], tolerance: float = 1e-4
-) -> list[Fretted]:
+def exact(profile: Profile, stick_radius: float, cycles: Sequence[float], tolerance: float = 1e-4) -> list[Fretted]:
     """Return the worn contact after each number of cycles, by the exact rule df/dN = p (f - f_star) / eta.
 
     Parameters

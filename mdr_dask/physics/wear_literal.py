@@ -83,6 +83,4 @@ def _describe(profile: Profile, c: float, grid: UniformGrid, worn: FloatArray) -
     def change_slope(x: FloatArray) -> FloatArray:
         return np.asarray(np.interp(x, grid.nodes, slopes))
 
-    return Worn(
-        profile, c, a, a, worn_volume(change, c, a), grid.force(image, 1.0), np.nan, change, change_slope
-    )
+    return Worn(profile, c, a, a, worn_volume(change, c, a), grid.force(image, 1.0), np.nan, change, change_slope)

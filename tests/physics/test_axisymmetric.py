@@ -33,13 +33,21 @@ def test_identities_of_every_power(exponent):
     radius = contact.contact_radius(np.array([0.3 - h, 0.3 + h]), 1.7, exponent)
     slope = np.diff(contact.normal_force(radius, 1.7, exponent, 5.0))[0] / (2 * h)
     assert slope == pytest.approx(float(contact.stiffness(a, 5.0)), rel=1e-6)  # central difference
-    total = quad(lambda t: 2 * np.pi * a * np.sin(t) * contact.stress(a * np.sin(t), float(a), 1.7, exponent, 5.0)
-                 * a * np.cos(t), 0, np.pi / 2, limit=200)[0]
+    total = quad(
+        lambda t: (
+            2 * np.pi * a * np.sin(t) * contact.stress(a * np.sin(t), float(a), 1.7, exponent, 5.0) * a * np.cos(t)
+        ),
+        0,
+        np.pi / 2,
+        limit=200,
+    )[0]
     assert total == pytest.approx(float(force), rel=1e-7)  # the integrable peak at the axis limits quad
 
 
 def test_punch_carries_its_force():
-    total = quad(lambda t: 2 * np.pi * np.sin(t) * np.cos(t) * contact.punch_stress(np.sin(t), 1.0, 0.4, 2.0), 0, 1.5707963)[0]
+    total = quad(
+        lambda t: 2 * np.pi * np.sin(t) * np.cos(t) * contact.punch_stress(np.sin(t), 1.0, 0.4, 2.0), 0, 1.5707963
+    )[0]
     assert total == pytest.approx(2 * 2.0 * 0.4, rel=1e-6)  # F = 2 E a d; the last 3e-8 rad are cut
 
 
