@@ -1,4 +1,4 @@
-"""The transforms of the method of dimensionality reduction for bodies of revolution, by quadrature with an error estimate.
+"""The transforms of the method of dimensionality reduction for bodies of revolution, with an error estimate.
 
 Every integral is rewritten in the angle or hyperbolic angle that removes its square-root singularity, cut at the kinks
 and jumps of the profile, and summed by Gauss-Legendre rules whose number of nodes doubles until the answer stands.
@@ -118,7 +118,7 @@ def forward_transform(
     edges = _angles(x, breaks)
 
     def integrand(angle: FloatArray) -> FloatArray:
-        return slope(x[:, None, None] * np.sin(angle)) * x[:, None, None]
+        return np.asarray(slope(x[:, None, None] * np.sin(angle)) * x[:, None, None])
 
     value, error = _integrate(integrand, edges, tolerance)
     value += apex

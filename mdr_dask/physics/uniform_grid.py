@@ -111,7 +111,7 @@ def uniform_grid(cells: int, length: float) -> UniformGrid:
 
 
 def _arccosh_row(x: FloatArray, i: int) -> FloatArray:
-    return np.arccosh(np.maximum(x[i:] / x[i], 1.0))
+    return np.asarray(np.arccosh(np.maximum(x[i:] / x[i], 1.0)))
 
 
 def _arccosh(x: float, radius: FloatArray) -> FloatArray:

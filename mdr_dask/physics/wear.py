@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mdr_dask.physics.profiles import Profile, bisect
+from mdr_dask.physics.revolution import Profile, bisect
 from mdr_dask.physics.transforms import gauss, pressure
 
 FloatArray = NDArray[np.float64]
@@ -23,6 +24,9 @@ THESIS_XI = 0.8
 
 #: Widths of the pieces next to the stick border, where the rule builds a layer as thin as exp(-xi N / a).
 LAYER_GROWTH = 30.0
+
+#: Floor of exp(-xi N / a): the layer must not become thinner than numbers are.
+SMALLEST_REST = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +156,7 @@ def change_beyond(
     cuts = [c, *sorted(b for b in breaks if c < b < a), a]
     abscissa, weight = gauss(32 if len(cuts) < 6 else 12)
     total = np.zeros_like(position)
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
+    for low, high in pairwise(cuts):
         begin = np.arcsinh(np.sqrt(max((a - high) * (a + high), 0.0)) / s)
         end = np.arcsinh(np.sqrt((a - low) * (a + low)) / s)
         angle = begin[:, None] + (end - begin)[:, None] * abscissa
@@ -217,13 +221,13 @@ def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESI
         Factor of the order of one.
     """
     c, reach = stick_radius, limit_radius(profile, stick_radius)
-    rest = np.exp(-xi * cycles / reach)
+    rest = max(float(np.exp(-xi * cycles / reach)), SMALLEST_REST)
     eta = float(profile.rise(np.array(1.0), c))
 
     def change(x: FloatArray) -> FloatArray:
         start = profile.rise(x, c) / eta
         inside = eta * start * (1.0 - start) * (1.0 - rest) / (start + (1.0 - start) * rest)
-        return np.where(x <= 1.0, inside, (profile.image(x) - 1.0) * (rest - 1.0))
+        return np.asarray(np.where(x <= 1.0, inside, (profile.image(x) - 1.0) * (rest - 1.0)))
 
     def slope(x: FloatArray) -> FloatArray:
         start = profile.rise(x, c) / eta

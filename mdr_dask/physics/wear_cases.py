@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.physics.transforms import gauss
-from mdr_dask.physics.wear import LAYER_GROWTH
+from mdr_dask.physics.wear import LAYER_GROWTH, SMALLEST_REST
 
 FloatArray = NDArray[np.float64]
 
@@ -54,7 +54,9 @@ def fast_cases(
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
     flat = [np.array(part, dtype=float).ravel() for part in parts]
     result = np.empty((3, flat[0].size))
-    _fasts(*flat, *gauss(_NODES), result)
+    n, c, cycles_flat, xi_flat, limit = flat
+    abscissa, weight = gauss(_NODES)
+    _fasts(n, c, cycles_flat, xi_flat, limit, abscissa, weight, result)
     radius, volume, force = result.reshape((3, *parts[0].shape))
     return radius, volume, force
 
@@ -77,7 +79,7 @@ def _limits(n, c, abscissa, weight, result):  # type: ignore[no-untyped-def]
             high *= 1.5
         for _ in range(100):
             middle = 0.5 * (low + high)
-            if high - low < 4e-16 * middle or middle == low or middle == high:
+            if high - low < 4e-16 * middle or middle in (low, high):
                 break
             if _plateau(n[case], c[case], middle, abscissa, weight, 0) > 0.0:
                 low = middle
@@ -143,7 +145,7 @@ def _scar_integral(radius, moment, n, c, at_c, eta, rest, cuts, abscissa, weight
 def _fasts(n, c, cycles, xi, limit, abscissa, weight, result):  # type: ignore[no-untyped-def]
     cuts = np.empty(5)
     for case in range(n.size):
-        rest = math.exp(-xi[case] * cycles[case] / limit[case])
+        rest = max(math.exp(-xi[case] * cycles[case] / limit[case]), SMALLEST_REST)
         at_c = _power(c[case], n[case])
         eta = -math.expm1(n[case] * math.log(c[case]))
         steep = math.pow(at_c + eta * rest / (1.0 + rest), 1.0 / n[case])

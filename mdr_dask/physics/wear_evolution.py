@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from mdr_dask.physics.dense import solve_in_place
 from mdr_dask.physics.panels import Panels, interpolate
-from mdr_dask.physics.profiles import Profile
+from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.transforms import gauss
 
 FloatArray = NDArray[np.float64]
@@ -60,8 +60,13 @@ class Moment:
 class Problem(Protocol):
     """One kind of slip, as the equations of one step."""
 
-    panels: Panels
-    inner_radius: float
+    @property
+    def panels(self) -> Panels:
+        """Return the panels between the inner border and the edge."""
+
+    @property
+    def inner_radius(self) -> float:
+        """Return the radius of the inner border."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -118,7 +123,7 @@ class PartialSlip:
     def slip(self, unknowns: FloatArray) -> FloatArray:
         """Return s at the nodes."""
         y, factor, _ = self.split(unknowns)
-        return self.panels.inner @ (y * factor)
+        return np.asarray(self.panels.inner @ (y * factor))
 
     def pressure(self, unknowns: FloatArray) -> FloatArray:
         """Return p / eta at the nodes."""
@@ -129,7 +134,9 @@ class PartialSlip:
         """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
         slip = self.slip(unknowns)
         gain = np.log(np.maximum(slip, 1e-300)) - self.virgin_slip(unknowns[-1])
-        return np.append((gain - known - theta * self.pressure(unknowns))[:-1], gain[-1])
+        rows = gain - known - theta * self.pressure(unknowns)
+        rows[-1] = gain[-1]
+        return np.asarray(rows)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives by y."""
@@ -237,7 +244,7 @@ class GrossSlip:
 
     def _gain(self, unknowns: FloatArray) -> FloatArray:
         g, a, _ = self.split(unknowns)
-        return self.panels.full @ g - self.profile.height(self.radii(a))
+        return np.asarray(self.panels.full @ g - self.profile.height(self.radii(a)))
 
 
 def march(problem: Problem, end: float, tolerance: float) -> list[Moment]:
@@ -380,10 +387,11 @@ def _newton(
 def _backward_shares(times: Sequence[float]) -> FloatArray:
     """Return the weights of the derivative at times[0] of the polynomial through all the times."""
     t = np.asarray(times, dtype=float) - times[0]
-    powers = np.vander(t / t[-1], increasing=True).T
+    powers = np.ascontiguousarray(np.vander(t / t[-1], increasing=True).T)
     target = np.zeros(t.size)
     target[1] = 1.0 / t[-1]
-    return np.linalg.solve(powers, target)
+    solve_in_place(powers, target)
+    return target
 
 
 def _extrapolate(time: float, past: Sequence[Moment]) -> FloatArray:

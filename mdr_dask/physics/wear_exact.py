@@ -1,4 +1,4 @@
-"""Worn contacts by the exact evolution, with an error estimate: fretting at constant depth, sliding at depth or force."""
+"""Worn contacts by the exact evolution, with an error estimate: fretting at constant depth, and sliding."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics import wear_evolution as evolution
 from mdr_dask.physics.panels import Panels, graded_panels, interpolate
-from mdr_dask.physics.profiles import Profile
+from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.transforms import gauss
 from mdr_dask.physics.wear import Worn, check_stick_radius, limit_radius, worn_height, worn_volume
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.physics.profiles import Profile
+from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.uniform_grid import UniformGrid, uniform_grid
 
 FloatArray = NDArray[np.float64]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.physics.profiles import Profile
+from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.uniform_grid import UniformGrid, uniform_grid
 from mdr_dask.physics.wear import Worn, check_stick_radius, limit_radius, worn_volume
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from mdr_dask.physics import wear, wear_cases
-from mdr_dask.physics.profiles import PowerProfile, from_table
+from mdr_dask.physics.revolution import PowerProfile, from_table
 from mdr_dask.physics.transforms import forward_transform, power_factor
 
 PARABOLA, CONE = PowerProfile(2.0), PowerProfile(1.0)

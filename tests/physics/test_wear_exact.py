@@ -1,8 +1,10 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from mdr_dask.physics import wear, wear_evolution
-from mdr_dask.physics.profiles import PowerProfile, from_table
+from mdr_dask.physics.revolution import PowerProfile, from_table
 from mdr_dask.physics.wear_exact import exact, gross
 
 PARABOLA = PowerProfile(2.0)
@@ -50,7 +52,7 @@ def test_every_step_conserves_energy():
     energy = wear_evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
     volumes = []
     for m in moments:
-        y, factor, length = problem.split(m.unknowns)
+        y, _, length = problem.split(m.unknowns)
         r, a = problem.radii(m.edge), m.edge
         change = problem.eta * y - PARABOLA.rise(r, 0.455)
         volumes.append(2 * problem.panels.weights @ (change * np.sqrt(a * a - r * r) * length / r))
@@ -72,7 +74,7 @@ def test_pressure_carries_the_force(checked):
     edges = np.array([0, 0.455, a])
     total = 0.0
     x, w = np.polynomial.legendre.leggauss(60)
-    for low, high in zip(edges, edges[1:], strict=False):
+    for low, high in pairwise(edges):
         # both ends may be singular like a root or a power
         s = 0.5 * (1 + x)
         r = low + (high - low) * s**2 * (3 - 2 * s)

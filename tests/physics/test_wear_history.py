@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.profiles import PowerProfile
+from mdr_dask.physics.revolution import PowerProfile
 from mdr_dask.physics.uniform_grid import uniform_grid
 from mdr_dask.physics.wear_exact import exact, gross
 from mdr_dask.physics.wear_history import LoadBlock, history

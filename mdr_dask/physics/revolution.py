@@ -199,7 +199,8 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
     if np.any(np.diff(height) <= 0.0):
         bad = int(np.argmax(np.diff(height) <= 0.0))
         raise ValueError(
-            f"the profile must rise with the radius, got {height[bad + 1]!r} after {height[bad]!r} at r = {radius[bad + 1]!r}"
+            f"the profile must rise with the radius, got {height[bad + 1]!r} after {height[bad]!r} "
+            f"at r = {radius[bad + 1]!r}"
         )
 
 
