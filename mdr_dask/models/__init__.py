@@ -9,6 +9,7 @@ from mdr_dask.models.base import Model
 
 NAMES: tuple[str, ...] = (
     "sliding_friction",
+    "fretting_wear",
     "mixed_lubrication",
 )
 
