@@ -63,10 +63,12 @@ def compute(block: Block[MixedLubrication]) -> Result:
         case = block.case(index)
         problem = problem_of(case)
         if problem:
-            result.status[index] = Status.FAILED
-            result.messages.update({(index, r): problem for r in range(len(block.realisations))})
+            _refuse(result, index, Status.FAILED, problem)
             continue
         operation = operation_of(case)
+        if operation.problem:
+            _refuse(result, index, Status.NOT_CONVERGED, operation.problem)
+            continue
         groups.setdefault(operation.source, []).append((index, operation))
         _store(result, block, index, slice(None), fixed_values(operation))
     if set(block.outputs) - _UNROUGH:
@@ -88,6 +90,12 @@ def _empty(block: Block[MixedLubrication]) -> Result:
         name: np.full((*shape, *(sizes[dim] for dim in MODEL.output(name).dims)), np.nan) for name in block.outputs
     }
     return Result(values, np.full(shape, Status.MISSING, dtype=np.int8))
+
+
+def _refuse(result: Result, index: int, status: Status, why: str) -> None:
+    """Give up a case in all its realisations."""
+    result.status[index] = status
+    result.messages.update({(index, position): why for position in range(result.status.shape[1])})
 
 
 def _store(
