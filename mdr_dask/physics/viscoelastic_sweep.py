@@ -492,12 +492,32 @@ def solve_sliding(
         for i in range(nodes):
             penetration[i] = unknown[arms] + profile[i]
         pieces, end = sweep(
-            penetration, unknown[:arms], moduli, reach, times, stretch_of, amplitude_of, not periodic,
-            lengths, imbalance, totals, work,
+            penetration,
+            unknown[:arms],
+            moduli,
+            reach,
+            times,
+            stretch_of,
+            amplitude_of,
+            not periodic,
+            lengths,
+            imbalance,
+            totals,
+            work,
         )
         tangent(
-            lengths, pieces, moduli, reach, times, stretch_of, amplitude_of, memory_of, periodic,
-            change, row, scratch,
+            lengths,
+            pieces,
+            moduli,
+            reach,
+            times,
+            stretch_of,
+            amplitude_of,
+            memory_of,
+            periodic,
+            change,
+            row,
+            scratch,
         )
         total = totals[0] if periodic else totals[0] + totals[5]
         residual[columns - 1] = strain_area - total
