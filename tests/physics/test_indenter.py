@@ -17,7 +17,7 @@ def solve(load, reach, coefficient, exponent):
 
 @pytest.mark.parametrize("exponent", [1, 1.5, 2, 3])
 def test_mapping_keeps_the_load_of_the_body(exponent):
-    # F_N of a rigid body c r^n by Sneddon: 2 E* n/(n+1) d a with d = kappa_n c a^n; the half-space integral for kappa_n is Abel's
+    # the MDR rule itself: g(x) = |x| integral_0^|x| f'(r) / sqrt(x^2 - r^2) dr with f = r^n and r = x sin t
     abel, _ = quad(lambda t: exponent * np.sin(t) ** (exponent - 1), 0, np.pi / 2)
     assert indenter.mapped(exponent) == pytest.approx(abel, rel=1e-10)
 
