@@ -44,7 +44,8 @@ def test_laws_are_found_again_in_data_made_by_them(forces):
 def test_the_law_holds_as_stated(forces):
     found = FIT["friction-law"]({"": forces})
     assert np.all(found["rms_error"] <= found["rms_error_stated"] + 1e-9)
-    assert np.all(found["rms_error_stated"] < 0.25)
+    # physics note section 3: 8 % rms of the plateau; 12 short lines scatter by as much again
+    assert np.all(found["rms_error_stated"] < 0.16)
 
 
 def test_plateau_lies_near_root_two(forces):
