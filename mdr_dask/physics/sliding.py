@@ -235,7 +235,7 @@ def steady_sliding(
     guesses : array, shape (cases,), optional
         Depths to start the exact sweeps from; the answer does not depend on them while `close` is 0.
     close : float
-        Relative change of a guess that its tangent is trusted with instead of a search: for comparisons, not for results.
+        Relative change of a guess that its tangent is trusted with instead of a search: for comparisons only.
 
     Returns
     -------
