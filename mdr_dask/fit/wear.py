@@ -20,7 +20,7 @@ MODELS = ("fretting_wear",)
 
 
 def wear_coefficient(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Fit the wear coefficient, or in a dimensionless campaign the factor from cycles to N, by the campaign's method."""
+    """Fit the wear coefficient, or in a dimensionless campaign the factor from cycles to N."""
 
     def describe(parameters: FrettingWear) -> tuple[str, float, str]:
         if parameters.wear_coefficient:

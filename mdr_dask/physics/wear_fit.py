@@ -91,10 +91,12 @@ def fit_factor(predict: Callable[[float], FloatArray], measured: ArrayLike) -> F
     trials = np.linspace(-9.0, 9.0, 73)
     costs = [float(np.sum((predict(float(np.exp(trial))) - data) ** 2)) for trial in trials]
     start = trials[int(np.argmin(costs))]
-    found = least_squares(
-        lambda q: predict(float(np.exp(q[0]))) - data, [start], method="lm", x_scale=[0.1], xtol=1e-12, ftol=1e-14
-    )
-    slope = float(found.jac[:, 0] @ found.jac[:, 0])
+
+    def deviations(unknown: FloatArray) -> FloatArray:
+        return np.asarray(predict(float(np.exp(unknown[0]))) - data)
+
+    found = least_squares(deviations, [start], method="lm", x_scale=[0.1], xtol=1e-12, ftol=1e-14)
+    slope = float(np.sum(np.square(np.asarray(found.jac))))
     if slope <= 1e-12 * float(data @ data):
         raise ValueError("the measurements do not depend on the factor: the body is unworn, or worn to its limit")
     residual = float(np.sqrt(np.mean(found.fun**2)))

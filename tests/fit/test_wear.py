@@ -47,9 +47,15 @@ def test_interval_covers_the_truth_as_often_as_it_says():
 
 def test_wear_coefficient_from_a_table_of_volumes(tmp_path):
     true = 3.7e-4
-    settings = dict(
-        curvature_radius=0.01, modulus=115e9, shear_modulus=90e9, friction=0.6, amplitude=1e-6, load=50.0, hardness=2e9
-    )
+    settings = {
+        "curvature_radius": 0.01,
+        "modulus": 115e9,
+        "shear_modulus": 90e9,
+        "friction": 0.6,
+        "amplitude": 1e-6,
+        "load": 50.0,
+        "hardness": 2e9,
+    }
     cycles = np.geomspace(1e3, 3e5, 9)
     from mdr_dask.models.base import Block
 
@@ -59,7 +65,8 @@ def test_wear_coefficient_from_a_table_of_volumes(tmp_path):
     path = tmp_path / "volume.csv"
     noisy = volume * (1 + 0.02 * rng.normal(size=9))
     path.write_text(
-        "# measured\ncycles, volume\n" + "\n".join(f"{n!r},{v!r}" for n, v in zip(cycles.tolist(), noisy.tolist()))
+        "# measured\ncycles, volume\n"
+        + "\n".join(f"{n!r},{v!r}" for n, v in zip(cycles.tolist(), noisy.tolist(), strict=False))
     )
     result = wear_coefficient(group(case.model_copy(update={"wear_coefficient": 1e-4, "measured": named(path)})))
     assert result["wear_coefficient_low"][0] < true < result["wear_coefficient_high"][0]
@@ -72,7 +79,7 @@ def test_xi_from_a_profile(tmp_path):
     r = np.linspace(0, 1.4, 80)
     f = wear.fast(PARABOLA, 0.455, 3.0, 0.93).height(r)
     path = tmp_path / "profile.csv"
-    path.write_text("radius,height\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(r.tolist(), f.tolist())))
+    path.write_text("radius,height\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(r.tolist(), f.tolist(), strict=False)))
     result = best_xi(group(FrettingWear(stick_radius=0.455, cycles=3.0, measured=named(path))))
     assert result["xi"][0] == pytest.approx(0.93, rel=1e-3)
     assert result["residual"][0] < 1e-4
