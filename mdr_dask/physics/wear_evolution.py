@@ -128,7 +128,7 @@ class PartialSlip:
     def pressure(self, unknowns: FloatArray) -> FloatArray:
         """Return p / eta at the nodes."""
         y, _, length = self.split(unknowns)
-        return self.panels.outer @ y / np.sqrt(length)
+        return np.asarray(self.panels.outer @ y / np.sqrt(length))
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""

@@ -1,3 +1,5 @@
+import itertools
+
 import numpy as np
 import pytest
 
@@ -29,7 +31,7 @@ def test_order_of_convergence():
 
         errors.append(np.max(np.abs(half - j0(2 * panels.nodes) * np.cos(2 * panels.nodes))))
         print(order, panels.nodes.size, errors[-1])
-    assert all(later < 0.05 * earlier for earlier, later in zip(errors, errors[1:], strict=False))
+    assert all(later < 0.05 * earlier for earlier, later in itertools.pairwise(errors))
     assert errors[-1] < 1e-8
 
 
