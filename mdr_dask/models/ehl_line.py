@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, Self
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -93,27 +94,32 @@ OUTPUTS = (
 )
 
 
+def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
+    """Return W, U and G from one quantity of each pair.
+
+    Parameters
+    ----------
+    lookup : callable, str -> array or None
+        Gives the values of a parameter, None for one that is not given.
+    """
+    modulus = 2 * lookup("contact_modulus")
+    W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
+    if W is None:
+        W = lookup("line_load") / (modulus * lookup("radius"))
+    if U is None:
+        U = lookup("viscosity") * lookup("mean_velocity") / (modulus * lookup("radius"))
+    if G is None:
+        G = lookup("pressure_viscosity") * modulus
+    return W, U, G
+
+
 def _groups(block: Block[EhlLineParameters]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return W, U and G of every case."""
 
-    def column(name: str) -> FloatArray:
-        return block.column(name).astype(np.float64)
+    def lookup(name: str) -> FloatArray | None:
+        return None if getattr(block.parameters, name) is None else block.column(name).astype(np.float64)
 
-    modulus = 2 * column("contact_modulus")
-    parameters = block.parameters
-    if parameters.load_parameter is not None:
-        W = column("load_parameter")
-    else:
-        W = column("line_load") / (modulus * column("radius"))
-    if parameters.speed_parameter is not None:
-        U = column("speed_parameter")
-    else:
-        U = column("viscosity") * column("mean_velocity") / (modulus * column("radius"))
-    if parameters.material_parameter is not None:
-        G = column("material_parameter")
-    else:
-        G = column("pressure_viscosity") * modulus
-    return W, U, G
+    return groups(lookup)
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
@@ -234,6 +240,11 @@ def seconds(block: Block[EhlLineParameters]) -> float:
     return 0.02 * block.cases * max(1.0, ACCURACY / accuracy)
 
 
+def memory(_: Block[EhlLineParameters]) -> float:
+    """Return the memory of one solution on the finest grid allowed: three square matrices."""
+    return 3.0 * 8 * 1281**2
+
+
 def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
     """Return the positions of film and pressure."""
     return {"position": Coordinate(_positions(parameters), "1", "position over the half width x/a, flow to the right")}
@@ -250,4 +261,5 @@ MODEL = Model(
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
     distinct=distinct,
+    memory=memory,
 )

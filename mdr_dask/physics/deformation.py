@@ -62,6 +62,7 @@ def influence_matrix(points: FloatArray, nodes: FloatArray) -> FloatArray:
     return matrix
 
 
+@njit(nogil=True, cache=True)
 def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
     """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points (thesis eq. B.19).
 
@@ -79,4 +80,13 @@ def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_fi
     array, shape (m,)
         Film in units of ``a^2/R``.
     """
-    return np.asarray(central_film + 0.5 * points**2 + influence_matrix(points, nodes) @ pressure)
+    origin, row = np.empty(nodes.size), np.empty(nodes.size)
+    _influence_row(0.0, nodes, origin)
+    result = np.empty(points.size)
+    for i in range(points.size):
+        _influence_row(points[i], nodes, row)
+        total = 0.0  # summed here, as a threaded BLAS has other last bits with another number of threads
+        for j in range(nodes.size):
+            total += (origin[j] - row[j]) * pressure[j]
+        result[i] = central_film + 0.5 * points[i] ** 2 + total / pi
+    return result

@@ -230,8 +230,8 @@ def _eliminate_column(A: FloatArray, b: FloatArray, n: int, k: int, last: int) -
 
 
 @njit(nogil=True, cache=True)
-def _film(nodes: FloatArray, matrix: FloatArray, P: FloatArray, central: float, H: FloatArray) -> None:
-    """Fill the film at the nodes."""
+def nodal_film(nodes: FloatArray, matrix: FloatArray, P: FloatArray, central: float, H: FloatArray) -> None:
+    """Fill the film H at the nodes, given their matrix, the pressure and the film at ``X = 0``."""
     for i in range(P.size):
         total = central + 0.5 * nodes[i] ** 2
         for j in range(P.size):
@@ -336,7 +336,7 @@ def newton(
     state, R, H, step, row, scale = (np.empty((4, n)), np.empty(n), np.empty(n), np.zeros(n), np.empty(n), np.ones(n))
     by_pressure, by_film = np.empty((n, 4)), np.empty((n, 4))
     A, b, active = np.empty((n, n)), np.empty(n), np.empty(n, np.int64)
-    _film(nodes, matrix, P, central, H)
+    nodal_film(nodes, matrix, P, central, H)
     for steps in range(1, most + 1):
         _balance(nodes, liquid, K, P, H, state, R, by_pressure, by_film)
         for i in range(1, n - 1):
@@ -359,7 +359,7 @@ def newton(
         for i in range(n):
             P[i] = max(0.0, P[i] + share * step[i])
         central += share * change
-        _film(nodes, matrix, P, central, H)
+        nodal_film(nodes, matrix, P, central, H)
         if done:
             return CONVERGED, steps, central, H
         if not (central > 0.0 and np.min(H) > 0.0):

@@ -16,7 +16,15 @@ from numpy.typing import NDArray
 from mdr_dask.physics import ehl_grid
 from mdr_dask.physics.deformation import film as film_at
 from mdr_dask.physics.deformation import influence_matrix
-from mdr_dask.physics.ehl_newton import CONVERGED, FILM_COLLAPSED, SINGULAR, TOO_MANY_STEPS, Liquid, newton
+from mdr_dask.physics.ehl_newton import (
+    CONVERGED,
+    FILM_COLLAPSED,
+    SINGULAR,
+    TOO_MANY_STEPS,
+    Liquid,
+    newton,
+    nodal_film,
+)
 from mdr_dask.physics.film import limiting_films, moes_parameters
 from mdr_dask.physics.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 
@@ -236,12 +244,14 @@ def _solve_on(
     weights[:-1] += width / 2
     weights[1:] += width / 2
     matrix = influence_matrix(nodes, nodes)
+    gap = np.empty_like(nodes)
     status, total, state = TOO_MANY_STEPS, 0, GridSolution(nodes, pressure, pressure, central, 0)
     for clip, most in paces:
         trial = pressure.copy()
         trial[0] = trial[-1] = 0.0
         # a guess that leaves no film has no Newton step
-        lift = max(0.0, -0.9 * central - float(np.min(0.5 * nodes**2 + matrix @ trial)))
+        nodal_film(nodes, matrix, trial, central, gap)
+        lift = max(0.0, 0.1 * central - float(gap.min()))
         status, steps, found, film = newton(
             nodes, matrix, weights, case.liquid, case.film_number, trial, central + lift, clip, _TOLERANCE, most
         )

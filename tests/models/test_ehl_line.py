@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.ehl_line import MODEL, STEEL, EhlLineParameters, compute, coordinates, distinct, seconds
 
@@ -33,8 +32,7 @@ def block(
     return Block(parameters, columns, cases, tuple(range(realisations)), 1, outputs)
 
 
-def test_model_is_found_by_name() -> None:
-    assert load("ehl_line") is MODEL
+def test_outputs_have_names_of_their_own() -> None:
     assert len({output.name for output in MODEL.outputs}) == len(MODEL.outputs)
 
 

@@ -13,10 +13,10 @@ from mdr_dask.physics.ehl_newton import (
     TOO_MANY_STEPS,
     Liquid,
     _balance,
-    _film,
     _mobility,
     log_viscosity,
     newton,
+    nodal_film,
     solve_linear,
 )
 
@@ -110,7 +110,7 @@ def test_result_is_complementary_and_carries_the_load() -> None:
     assert status == CONVERGED
     n = nodes.size
     again, R = np.empty(n), np.empty(n)
-    _film(nodes, influence_matrix(nodes, nodes), P, central, again)
+    nodal_film(nodes, influence_matrix(nodes, nodes), P, central, again)
     assert np.array_equal(again, H)
     assert H.min() > 0
     _balance(nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))

@@ -158,6 +158,27 @@ def test_only_moes_numbers_count_without_density(W: float, U: float, G: float) -
     assert here.central_film == pytest.approx(there.central_film, rel=1e-9)  # rounding through the Newton iteration
 
 
+@pytest.mark.parametrize(
+    ("law", "central", "minimum"), [("barus", (0.97, 1.26), (1.02, 1.20)), ("roelands", (0.87, 1.23), (0.95, 1.15))]
+)
+def test_formulas_over_27_points(law: str, central: tuple[float, float], minimum: tuple[float, float]) -> None:
+    """Pan and Hamrock's regressions miss their own range by up to a quarter, as an independent solver found too."""
+    ratios = []
+    for W in (2.0452e-5, 1e-4, 5e-4):
+        for U in (1e-12, 1e-11, 1e-10):
+            for G in (2504.0, 3500.0, 5007.0):
+                found = solve(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
+                ratios.append(
+                    (
+                        in_radii(found.central_film, W) / float(film.PAN_HAMROCK_CENTRAL(W, U, G)),
+                        in_radii(found.minimum_film, W) / float(film.PAN_HAMROCK_MINIMUM(W, U, G)),
+                    )
+                )
+    lowest, highest = np.min(ratios, axis=0), np.max(ratios, axis=0)
+    assert central[0] < lowest[0] < 1 < 1.15 < highest[0] < central[1]
+    assert minimum[0] < lowest[1] < 1.05 < 1.1 < highest[1] < minimum[1]
+
+
 def test_ratio_of_films_is_that_of_the_thesis_without_density_and_higher_with_it() -> None:
     for W, U, G in ((2.0452e-5, 1e-11, 5007.0), (1e-4, 1e-11, 5000.0)):
         loose = solve(line_contact(W, U, G, E_STAR, compressible=False))
