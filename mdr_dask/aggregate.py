@@ -99,7 +99,9 @@ def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:
         With the dimension ``bound`` (``low``, ``high``) instead of ``realisation``, at the confidence `CONFIDENCE`;
         deviations are stretched by sqrt(n / (n - 1)), without which small ensembles are covered too rarely.
     """
-    return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(bound=np.array(["low", "high"], dtype=object))
+    return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(
+        bound=np.array(["low", "high"], dtype=object)
+    )
 
 
 def _bootstrap(values: NDArray[np.float64], seed: int) -> NDArray[np.float64]:

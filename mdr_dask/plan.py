@@ -238,7 +238,10 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
         room = min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values()))
         chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], int(room))))
-    return {**chunks, **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items()}}
+    return {
+        **chunks,
+        **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items() if dim in template.sizes},
+    }
 
 
 def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:

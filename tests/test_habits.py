@@ -8,9 +8,9 @@ from pathlib import Path
 
 import click
 import pytest
-from mdr_dask.campaign.reference import reference_page
 
 from mdr_dask import campaign, fit, models, plots
+from mdr_dask.campaign.reference import reference_page
 from mdr_dask.cli import cli
 from mdr_dask.cli.reference import commands_page
 
@@ -25,7 +25,9 @@ def output_of(*command: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", ["ruff format --check .", "ruff check .", "mypy", "lint-imports"], ids=lambda command: command.split()[0]
+    "command",
+    ["ruff format --check .", "ruff check .", "mypy", "lint-imports"],
+    ids=["format", "lint", "types", "imports"],
 )
 def test_tools_are_content(command):
     name, *arguments = command.split()

@@ -52,7 +52,7 @@ MODEL = Model(
         Output("trace", "m", "multiples of the height", ("multiple",), default=False),
     ),
     compute=compute,
-    seconds=lambda block: 1e-2 * block.cases * len(block.realisations),
+    seconds=lambda block: 1e-6 * block.cases * len(block.realisations),
     coordinates=lambda _: {"multiple": Coordinate(np.arange(3.0), "1", "factor")},
 )
 

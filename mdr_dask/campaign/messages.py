@@ -25,8 +25,6 @@ _KINDS = {
     "bool_type": "true or false",
     "string_type": "a text",
     "dict_type": "a mapping",
-    "model_type": "a mapping",
-    "model_attributes_type": "a mapping",
     "tuple_type": "a list",
     "list_type": "a list",
     "finite_number": "a finite number",
@@ -49,6 +47,8 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
     """
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
+        if _is_of_another_branch(details, kind, data):
+            continue
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         _report_group(path, group, kind, data, report)
@@ -67,6 +67,22 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
     if details["type"] == "union_tag_invalid":
         path = (*path, *_tag_key(data, details["ctx"]["tag"]))
     return path
+
+
+def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
+    """Return whether an error comes from trying a structure that the value does not claim to be."""
+    path: Path = ()
+    value = data
+    for part in details["loc"]:
+        if isinstance(value, Mapping) and part in value:
+            path, value = (*path, part), value[part]
+            continue
+        found = fields.owner(kind, path, data)
+        info = found[0].model_fields[found[1]] if found else None
+        claimed = fields.structure(info, value) if info else None
+        if info and claimed and part in {one.__name__ for one in fields.structures(info)} - {claimed.__name__}:
+            return True
+    return False
 
 
 def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
@@ -131,7 +147,7 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
         return str(context["expected"])
     if error == "union_tag_invalid":
         return _listed(_choices(details))
-    if error == "union_tag_not_found":
+    if error in ("union_tag_not_found", "model_type", "model_attributes_type"):
         return _kinds(path, kind, data)
     if error in ("too_short", "too_long"):
         size, words = ("min_length", "at least") if error == "too_short" else ("max_length", "at most")
@@ -144,7 +160,9 @@ def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
     found = fields.owner(kind, path, data)
     structures = fields.structures(found[0].model_fields[found[1]]) if found else ()
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
-    name = keys[0][0] if keys else ""
+    if not keys:
+        return "a mapping"
+    name = keys[0][0]
     return f"a mapping with {name}: {_listed(value for key, value in keys if key == name)}"
 
 

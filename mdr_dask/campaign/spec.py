@@ -39,13 +39,15 @@ class AdaptiveSpec(Parameters):
 class SobolSpec(Parameters):
     """Scrambled Sobol points."""
 
-    sobol: int = Field(ge=1, description="number of cases, spread evenly by a scrambled Sobol sequence")
+    sobol: int = Field(ge=1, le=10**6, description="number of cases, spread evenly by a scrambled Sobol sequence")
 
 
 class LatinHypercubeSpec(Parameters):
     """A Latin hypercube."""
 
-    latin_hypercube: int = Field(ge=1, description="number of cases, one in each of as many strips of every range")
+    latin_hypercube: int = Field(
+        ge=1, le=10**6, description="number of cases, one in each of as many strips of every range"
+    )
 
 
 class TableSpec(Parameters):

@@ -15,6 +15,8 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
 from mdr_dask.campaign.units import expected, to_si
 
+#: More values than this on one axis are a mistake in the file, not a study.
+MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values")
 _DIGITS = 14
 
@@ -181,8 +183,10 @@ class _Search:
 
     def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
         name, count = at[:-1], content[2]
-        if isinstance(count, bool) or not isinstance(count, int) or count < 2:
-            self._complain((*at, 2), f"expected a whole number of values of at least 2, got {shown(count)}", name)
+        if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
+            self._complain(
+                (*at, 2), f"expected a whole number from 2 to {MOST_VALUES} of values, got {shown(count)}", name
+            )
         numbers = spaced(spread, count)
         if len(numbers) < (2 if spread.whole else count):
             self._complain(at, f"expected ends far enough apart for {count} values", name)

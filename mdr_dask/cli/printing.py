@@ -62,11 +62,11 @@ def table(dataset: xr.Dataset) -> tuple[list[Row], dict[str, str]]:
 
     Variables that lack a dimension are repeated along it; fixed coordinates are left out.
     """
-    dims = list(dataset.sizes)
-    names = list(dataset.data_vars)
-    along = [name for name, coordinate in dataset.coords.items() if coordinate.ndim == 1 and name not in dims]
+    dims = [str(dim) for dim in dataset.sizes]
+    names = [str(name) for name in dataset.data_vars]
+    along = [str(name) for name, coord in dataset.coords.items() if coord.ndim == 1 and name not in dims]
     frame = dataset.drop_vars([name for name, c in dataset.coords.items() if c.ndim == 0])
-    columns = {dim: frame[dim] for dim in dims} | {str(n): frame[n] for n in along} | {str(n): frame[n] for n in names}
+    columns = {name: frame[name] for name in (*dims, *along, *names)}
     shape = dataset.sizes
     flat = {n: _spread(c, dims, shape) for n, c in columns.items()}
     rows = [dict(zip(flat, values, strict=True)) for values in zip(*flat.values(), strict=True)]

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from mdr_dask.errors import DataError
 
@@ -33,20 +33,6 @@ class Parameters(BaseModel):
     """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _to_si(cls, value: Any, info: ValidationInfo) -> Any:
-        """Convert ``'20 mm'`` to SI with the converter of the campaign layer; leave names such as ``auto`` alone."""
-        if info.context is None or info.field_name is None:
-            return value
-        unit = unit_of(cls, info.field_name)
-        if unit is None:
-            return value
-        convert = info.context["to_si"]
-        if isinstance(value, list | tuple):
-            return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
-        return convert(value, unit) if _looks_numeric(value) else value
 
 
 def _looks_numeric(value: Any) -> bool:
@@ -70,7 +56,19 @@ def quantity(unit: str, description: str, **bounds: Any) -> Any:
     pydantic field
         Used as ``length: float = quantity("m", "length of the line", gt=0)``.
     """
-    return Field(description=description, json_schema_extra={"unit": unit}, **bounds)
+
+    def to_si(value: Any, info: ValidationInfo) -> Any:
+        """Convert ``'20 mm'`` with the converter of the campaign layer; leave names such as ``auto`` alone."""
+        if info.context is None:
+            return value
+        convert = info.context["to_si"]
+        if isinstance(value, list | tuple):
+            return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
+        return convert(value, unit) if _looks_numeric(value) else value
+
+    field = Field(description=description, json_schema_extra={"unit": unit}, **bounds)
+    field.metadata.append(BeforeValidator(to_si))
+    return field
 
 
 def unit_of(parameters: type[BaseModel], name: str) -> str | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,11 @@ IntArray = NDArray[np.intp]
 
 ACCURACY = 0.01  # where the campaign does not say
 FINEST = 64  # oversampling beyond which `auto` gives up
+SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
+CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
+CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
+NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
+ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
 
@@ -28,7 +34,41 @@ class Plane(Parameters):
     shape: Literal["plane"] = "plane"
 
 
-Indenter = Plane
+class Cone(Parameters):
+    """A cone, rough or smooth."""
+
+    shape: Literal["cone"]
+    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return math.tan(self.angle), 1.0
+
+
+class Parabola(Parameters):
+    """A paraboloid, which stands for a sphere."""
+
+    shape: Literal["parabola"]
+    radius: float = quantity("m", "radius of curvature R at the apex", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return 1 / (2 * self.radius), 2.0
+
+
+class Power(Parameters):
+    """A body of revolution c r^n."""
+
+    shape: Literal["power"]
+    exponent: float = quantity("1", "exponent n of the body c r^n", ge=1, le=100)
+    coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return self.coefficient, self.exponent
+
+
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
 
 
 class SlidingFriction(Parameters):
@@ -76,11 +116,97 @@ class _Line:
     points: int
     rolloff: float
     longest: float
+    coefficient: float  # of the indenter c |x|^n, 0 for a plane
+    exponent: float
 
     def amplitudes(self) -> FloatArray:
+        """Return the amplitudes of its harmonics."""
         from mdr_dask.physics import roughness
 
         return roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """Cases on one realisation of a line, in units of its length and rms height."""
+
+    line: _Line
+    phase: FloatArray
+    scheme: Scheme
+    reaches: FloatArray  # v tau / L
+    loads: FloatArray  # F_N / (4 G L h)
+    contact: bool  # whether fraction and slope of the contact are wanted
+
+    def only(self, cases: NDArray[np.bool_]) -> _Task:
+        """Return some of the cases."""
+        return replace(self, reaches=self.reaches[cases], loads=self.loads[cases])
+
+    def nodes(self, oversampling: int) -> tuple[FloatArray, FloatArray]:
+        """Return heights and slopes of the roughness on a grid."""
+        from mdr_dask.physics import roughness
+
+        amplitude, count = self.line.amplitudes(), self.line.points * oversampling
+        height = roughness.line(amplitude, self.phase, count)
+        slope = roughness.line(amplitude, self.phase, count, 1)
+        if self.line.coefficient == 0:
+            return height, slope
+        return np.append(height, height[0]), np.append(slope, slope[0])
+
+    def solve(
+        self, nodes: tuple[FloatArray, FloatArray], scheme: Scheme, near: Steady | None = None, close: float = 0.0
+    ) -> Steady:
+        """Solve the cases on a grid, beginning near a solution on another one."""
+        from mdr_dask.physics import sliding
+
+        height, slope = nodes
+        guesses = None if near is None else near.depth
+        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
+        coefficient, exponent = self.line.coefficient, self.line.exponent
+        if coefficient == 0:
+            return sliding.steady_sliding(height, slope, *cases)
+        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
+
+    def on_grid(self, oversampling: int) -> Steady:
+        """Solve the cases on one grid, without an estimate of the error."""
+        return self.solve(self.nodes(oversampling), self.scheme)
+
+    def with_error(self, oversampling: int, near: Steady | None = None) -> tuple[Steady, FloatArray]:
+        """Solve the cases on one grid and estimate the relative error of their friction.
+
+        The exact sweep on a fine grid is compared with the two grids that hold every other node: two, because one may
+        agree by accident. Anything else is compared with the exact sweep on a grid twice as fine.
+        """
+        nodes = self.nodes(oversampling)
+        steady = self.solve(nodes, self.scheme, near)
+        if self.scheme != "hermite" or oversampling % 2 or self.line.points * oversampling < 32:
+            finer = self.solve(self.nodes(2 * oversampling), "hermite")
+            return steady, SAFETY_FINER * _difference(steady, finer)
+        even, odd = ((nodes[0][first::2], nodes[1][first::2]) for first in (0, 1))
+        error = _difference(self.solve(even, self.scheme, steady, CLOSE), steady)
+        if self.line.coefficient:
+            return steady, SAFETY_EVEN * error
+        return steady, SAFETY_BOTH * np.maximum(error, _difference(self.solve(odd, self.scheme, steady, CLOSE), steady))
+
+    def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
+        """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
+        oversampling = 2 if self.scheme == "hermite" else 1
+        steady, error = self.with_error(oversampling)
+        while oversampling < FINEST:
+            wanting = ~(error <= accuracy) & (steady.status == 0)
+            if not np.any(wanting):
+                break
+            oversampling *= 2
+            finer, error[wanting] = self.only(wanting).with_error(oversampling, steady.only(wanting))
+            steady = steady.replaced(wanting, finer)
+        return steady, error
+
+
+def _difference(one: Steady, other: Steady) -> FloatArray:
+    with np.errstate(all="ignore"):
+        change = np.abs(one.drag / other.drag - 1)
+    # where a coarse grid has no solution nothing is known
+    unknown: FloatArray = np.where(np.isnan(change) & (other.status == 0), np.inf, change)
+    return unknown
 
 
 def _canonical(number: FloatArray) -> FloatArray:
@@ -106,141 +232,163 @@ class _Cases:
 
     loads: FloatArray  # F_N / (4 G L h)
     reaches: FloatArray  # v tau / L
-    scale: FloatArray  # h / L
-    oversampling: NDArray[np.object_]
-    scheme: NDArray[np.object_]
-    lines: list[_Line]
+    height: FloatArray  # h
+    length: FloatArray  # L
+    keys: list[tuple[_Line, int | str, Scheme]]
 
-    def groups(self) -> Iterator[tuple[_Line, int | str, Scheme, IntArray]]:
-        """Yield the cases that share lines and grids."""
-        keys = list(zip(self.lines, self.oversampling.tolist(), self.scheme.tolist(), strict=True))
-        for key in dict.fromkeys(keys):
-            yield *key, np.array([j for j, other in enumerate(keys) if other == key])
+    def groups(self) -> Iterator[tuple[tuple[_Line, int | str, Scheme], IntArray]]:
+        """Yield the cases that share rough lines and grids."""
+        members: dict[tuple[_Line, int | str, Scheme], list[int]] = {}
+        for j in np.flatnonzero(self.height > 0):
+            members.setdefault(self.keys[j], []).append(int(j))
+        for key, indices in members.items():
+            yield key, np.array(indices)
+
+
+def _shapes(block: Block[SlidingFriction]) -> list[tuple[float, float]]:
+    """Return coefficient and exponent of the line c |x|^n of every case, 0 and 1 for a plane."""
+    from mdr_dask.physics.indenter import mapped
+
+    shapes = []
+    varied = any(path.split(".")[0] == "indenter" for path in block.columns)
+    for j in range(block.cases if varied else 1):
+        indenter = (block.case(j) if varied else block.parameters).indenter
+        coefficient, exponent = (0.0, 1.0) if isinstance(indenter, Plane) else indenter.power_law()
+        shapes.append((mapped(exponent) * coefficient, exponent))
+    return shapes if varied else shapes * block.cases
 
 
 def _cases(block: Block[SlidingFriction]) -> _Cases:
     length, height = _number(block, "length"), _number(block, "rms_roughness")
+    coefficient, exponent = np.array(_shapes(block)).T
     with np.errstate(all="ignore"):
         loads = _number(block, "normal_force") / (4 * _number(block, "shear_modulus") * length * height)
         reaches = _number(block, "velocity") * _number(block, "relaxation_time") / length
-    lines = [
-        _Line(float(hurst), int(points), float(rolloff), float(longest))
-        for hurst, points, rolloff, longest in zip(
-            block.column("hurst"),
-            block.column("points"),
-            _harmonic(block, "rolloff_wavelength"),
-            _harmonic(block, "longest_wavelength"),
-            strict=True,
-        )
-    ]
-    return _Cases(
-        _canonical(loads),
-        _canonical(reaches),
-        height / length,
-        block.column("oversampling").astype(object),
-        block.column("scheme").astype(object),
-        lines,
+        coefficient = coefficient * length**exponent / height
+    columns = (
+        _number(block, "hurst").tolist(),
+        block.column("points").tolist(),
+        _harmonic(block, "rolloff_wavelength").tolist(),
+        _harmonic(block, "longest_wavelength").tolist(),
+        _canonical(coefficient).tolist(),
+        exponent.tolist(),
     )
+    lines = [_Line(*numbers) for numbers in zip(*columns, strict=True)]
+    keys = list(zip(lines, block.column("oversampling").tolist(), block.column("scheme").tolist(), strict=True))
+    return _Cases(_canonical(loads), _canonical(reaches), height, length, keys)
 
 
-def _solve(
-    line: _Line, phase: FloatArray, oversampling: int, scheme: Scheme, reaches: FloatArray, loads: FloatArray
-) -> Steady:
-    """Solve cases on one line, of unit length and rms height, on one grid."""
-    from mdr_dask.physics import roughness, sliding
+@dataclass
+class _Answer:
+    """The result of a block while it fills."""
 
-    amplitude, nodes = line.amplitudes(), line.points * oversampling
-    height = roughness.line(amplitude, phase, nodes)
-    slope = roughness.line(amplitude, phase, nodes, 1) if scheme == "hermite" else None
-    return sliding.steady_sliding(height, slope, reaches, loads, scheme)
+    block: Block[SlidingFriction]
+    values: dict[str, FloatArray]
+    status: NDArray[np.int8]
+    messages: dict[tuple[int, int], str]
+    solves: int = 0
 
+    def put(self, members: IntArray, realisation: int, found: dict[str, Any], state: NDArray[np.int8]) -> None:
+        """Write cases of one realisation, and why those with a state other than 0 failed."""
+        from mdr_dask.physics import sliding
 
-def _difference(one: Steady, other: Steady) -> FloatArray:
-    with np.errstate(all="ignore"):
-        change: FloatArray = np.abs(one.drag / other.drag - 1)
-    return change
+        for name in self.block.outputs:
+            self.values[name][members, realisation] = np.where(state == 0, found[name], np.nan)
+        self.status[members, realisation] = STATUS[state]
+        for j in np.flatnonzero(state):
+            self.messages[int(members[j]), realisation] = sliding.MESSAGES[int(state[j])]
 
-
-def _fixed(
-    line: _Line,
-    phase: FloatArray,
-    oversampling: int,
-    scheme: Scheme,
-    cases: tuple[FloatArray, FloatArray],
-    estimate: bool,
-) -> tuple[Steady, FloatArray]:
-    """Solve on one grid, and compare with another one if an error is asked for."""
-    steady = _solve(line, phase, oversampling, scheme, *cases)
-    if not estimate:
-        return steady, np.full(cases[0].size, np.nan)
-    if scheme == "hermite" and oversampling % 2 == 0:
-        return steady, _difference(steady, _solve(line, phase, oversampling // 2, scheme, *cases))
-    return steady, 1.5 * _difference(steady, _solve(line, phase, 2 * oversampling, "hermite", *cases))
-
-
-def _auto(
-    line: _Line, phase: FloatArray, scheme: Scheme, cases: tuple[FloatArray, FloatArray], accuracy: float
-) -> tuple[Steady, FloatArray]:
-    """Double the grid for the cases whose error estimate does not meet the accuracy."""
-    reaches, loads = cases
-    before = _solve(line, phase, 1, scheme, reaches, loads)
-    answer, error = before, np.full(loads.size, np.inf)
-    open_cases = np.arange(loads.size)
-    oversampling = 2
-    while open_cases.size and oversampling <= FINEST:
-        now = _solve(line, phase, oversampling, scheme, reaches[open_cases], loads[open_cases])
-        error[open_cases] = _difference(now, before)
-        still = ~(error[open_cases] <= accuracy) & (now.status == 0)
-        answer = answer.replaced(open_cases, now)
-        before = now.only(still)
-        open_cases, oversampling = open_cases[still], 2 * oversampling
-    return answer, error
+    def warn(self, members: IntArray, sentence: str) -> None:
+        """Note a sentence for cases in every realisation."""
+        self.messages.update({(int(j), r): sentence for j in members for r in range(self.status.shape[1])})
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
     """Solve the cases of a block, each different one once."""
-    from mdr_dask.physics import roughness, sliding
-
-    cases = _cases(block)
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
-    status = np.full(shape, Status.FAILED, np.int8)
-    messages: dict[tuple[int, int], str] = {}
-    solves = 0
-    accuracy = ACCURACY if block.accuracy is None else block.accuracy
-    for line, oversampling, scheme, members in cases.groups():
+    answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
+    cases = _cases(block)
+    _smooth(cases, answer)
+    for key, members in cases.groups():
         try:
-            slope = roughness.spectral_slope(line.amplitudes())
+            key[0].amplitudes()
         except ValueError as problem:
-            messages.update({(int(j), r): str(problem) for j in members for r in range(shape[1])})
+            answer.warn(members, str(problem))
             continue
-        numbers = np.stack([cases.reaches[members], cases.loads[members]])
-        distinct, which = np.unique(numbers, axis=1, return_inverse=True)
-        for r, realisation in enumerate(block.realisations):
-            phase = roughness.phases(block.seed, realisation, line.points // 2)
-            pair = (distinct[0], distinct[1])
-            if oversampling == "auto":
-                steady, error = _auto(line, phase, scheme, pair, accuracy)
-            else:
-                estimate = "discretisation_error" in block.outputs
-                steady, error = _fixed(line, phase, int(oversampling), scheme, pair, estimate)
-            solves += distinct.shape[1]
-            scale = cases.scale[members]
-            found = {
-                "friction_coefficient": (steady.drag / distinct[1])[which] * scale,
-                "indentation_depth": steady.depth[which] * _number(block, "rms_roughness")[members],
-                "contact_fraction": steady.contact_fraction[which],
-                "contact_slope": steady.contact_slope[which] * scale,
-                "rms_slope": slope * scale,
-                "discretisation_error": error[which],
-            }
-            for name in block.outputs:
-                values[name][members, r] = found[name]
-            state = steady.status[which]
-            status[members, r] = STATUS[state]
-            for j in np.flatnonzero(state):
-                messages[int(members[j]), r] = sliding.MESSAGES[int(state[j])]
-    return Result(values, status, messages, solves)
+        _rough(key, members, cases, answer)
+    return Result(answer.values, answer.status, answer.messages, answer.solves)
+
+
+def _rough(key: tuple[_Line, int | str, Scheme], members: IntArray, cases: _Cases, answer: _Answer) -> None:
+    """Solve the cases of one group in every realisation."""
+    from mdr_dask.physics import roughness
+
+    line, oversampling, scheme = key
+    block = answer.block
+    slope = roughness.spectral_slope(line.amplitudes())
+    numbers = np.stack([cases.reaches[members], cases.loads[members]])
+    (reaches, loads), which = np.unique(numbers, axis=1, return_inverse=True)
+    height = cases.height[members]
+    scale = height / cases.length[members]
+    contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
+    accuracy = ACCURACY if block.accuracy is None else block.accuracy
+    for r, realisation in enumerate(block.realisations):
+        phase = roughness.phases(block.seed, realisation, line.points // 2)
+        task = _Task(line, phase, scheme, reaches, loads, contact)
+        if oversampling == "auto":
+            steady, error = task.to_accuracy(accuracy)
+        elif "discretisation_error" in block.outputs:
+            steady, error = task.with_error(int(oversampling))
+        else:
+            steady, error = task.on_grid(int(oversampling)), np.full(loads.size, np.nan)
+        answer.solves += loads.size
+        found = {
+            "friction_coefficient": (steady.drag / loads)[which] * scale,
+            "indentation_depth": steady.depth[which] * height,
+            "contact_fraction": steady.contact_fraction[which],
+            "contact_slope": steady.contact_slope[which] * scale,
+            "rms_slope": slope * scale,
+            "discretisation_error": error[which],
+        }
+        answer.put(members, r, found, steady.status[which])
+        if oversampling == "auto":
+            for j in np.flatnonzero((steady.status == 0) & ~(error <= accuracy)):
+                for member in members[which == j]:
+                    answer.messages[int(member), r] = f"estimated error {error[j]:.1e} on the finest grid"
+
+
+def _smooth(cases: _Cases, answer: _Answer) -> None:
+    """Solve the cases without roughness in closed form."""
+    from mdr_dask.physics import indenter, sliding
+
+    members = np.flatnonzero(cases.height == 0)
+    if not members.size:
+        return
+    block, length = answer.block, cases.length[members]
+    shapes = np.array(_shapes(block))[members]
+    loads = (_number(block, "normal_force") / (4 * _number(block, "shear_modulus")))[members]
+    found = dict.fromkeys(block.outputs, np.zeros(members.size))
+    found |= {"indentation_depth": loads / length, "contact_fraction": np.ones(members.size)}
+    state = np.zeros(members.size, np.int8)
+    body = shapes[:, 0] > 0
+    if np.any(body):
+        state_of = np.empty((members.size, indenter.COLUMNS))
+        state_of[:] = np.nan
+        solved = np.empty((int(body.sum()), indenter.COLUMNS))
+        indenter.smooth(loads[body], (cases.reaches[members] * length)[body], shapes[body, 0], shapes[body, 1], solved)
+        state_of[body] = solved
+        depth, drag, a, b, stretch = state_of.T
+        outside = np.maximum(a, b) > 0.5 * length
+        state = np.where(body & np.isnan(depth), sliding.NOT_CONVERGED, np.where(outside, sliding.OUTSIDE_LINE, 0))
+        found["friction_coefficient"] = np.where(body, drag / loads, 0.0)
+        found["indentation_depth"] = np.where(body, depth, found["indentation_depth"])
+        found["contact_fraction"] = np.where(body, (a + b) / length, 1.0)
+        found["contact_slope"] = np.where(body, np.sqrt(stretch / (a + b)), 0.0)
+        found["discretisation_error"] = np.full(members.size, CLOSED_FORM)
+    answer.solves += members.size
+    for r in range(len(block.realisations)):
+        answer.put(members, r, found, state.astype(np.int8))
 
 
 STATUS = np.array([Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.FAILED], dtype=np.int8)
@@ -249,16 +397,31 @@ STATUS = np.array([Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.FAIL
 def distinct(block: Block[SlidingFriction]) -> int:
     """Return how many different cases a block holds, over all realisations."""
     cases = _cases(block)
-    different = set(zip(cases.lines, cases.oversampling, cases.scheme, cases.loads, cases.reaches, strict=True))
-    return len(different) * len(block.realisations)
+    rough = cases.height > 0
+    different = set(zip(cases.keys, cases.loads.tolist(), cases.reaches.tolist(), rough, strict=True))
+    smooth = np.count_nonzero(~rough)
+    return len([case for case in different if case[-1]]) * len(block.realisations) + int(smooth)
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Estimate the time of a block from the nodes that its different cases visit."""
-    grid = np.array([3 if value == "auto" else value for value in block.column("oversampling")], dtype=np.float64)
-    nodes = grid * _number(block, "points")
-    share = distinct(block) / (block.cases * len(block.realisations))
-    return float(np.sum(nodes) * len(block.realisations) * share * 5e-9 + 1e-3)
+    """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
+    cases = _cases(block)
+    total = 1e-4
+    for (line, oversampling, scheme), members in cases.groups():
+        numbers = np.stack([cases.reaches[members], cases.loads[members]])
+        solves = np.unique(numbers, axis=1).shape[1]
+        grid = 4 if oversampling == "auto" else int(oversampling)
+        checks = 2.5 if oversampling == "auto" or "discretisation_error" in block.outputs else 1
+        nodes = line.points * grid
+        sweep = NODE_STEPPED * nodes if scheme == "backward_euler" else NODE_SWEPT * line.points * grid**0.5
+        total += len(block.realisations) * checks * (NODE_LINE * nodes + solves * sweep)
+    return total
+
+
+def memory(block: Block[SlidingFriction]) -> float:
+    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
+    grid = [FINEST if value == "auto" else 2 * int(value) for value in block.column("oversampling")]
+    return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
 
 
 MODEL = Model(
@@ -271,4 +434,5 @@ MODEL = Model(
     seconds=seconds,
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=distinct,
+    memory=memory,
 )

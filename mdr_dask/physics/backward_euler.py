@@ -36,9 +36,15 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
 
 @njit(nogil=True, cache=True)
 def _sweep(
-    height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, state: FloatArray, sums: FloatArray
+    height: FloatArray,
+    rise: FloatArray,
+    periodic: bool,
+    decay: FloatArray,
+    depth: FloatArray,
+    state: FloatArray,
+    sums: FloatArray,
 ) -> None:
-    """Follow one element of every case from the highest node, which comes last, back to it.
+    """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
 
     Parameters
     ----------
@@ -46,6 +52,8 @@ def _sweep(
         Heights from the highest node.
     rise : array, shape (n,)
         Height less that of the node before.
+    periodic : bool
+        Whether the line closes on itself; its highest node then comes last.
     decay, depth : array, shape (cases,)
         lambda, and the penetration of the highest node.
     state : array, shape (2, cases)
@@ -55,7 +63,8 @@ def _sweep(
     """
     cases = depth.size
     for k in range(cases):
-        state[0, k], state[1, k] = depth[k], 1.0
+        state[0, k] = depth[k] if periodic else 0.0
+        state[1, k] = 1.0 if periodic else 0.0
         sums[0, k] = sums[1, k] = sums[2, k] = 0.0
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
@@ -85,11 +94,13 @@ def _sweep(
 def _newton(
     height: FloatArray,
     rise: FloatArray,
+    periodic: bool,
     reaches: FloatArray,
     loads: FloatArray,
     tolerance: float,
     depths: FloatArray,
     drags: FloatArray,
+    outside: NDArray[np.bool_],
 ) -> None:
     """Find the depth of every case; `depths` holds the guesses on entry, `drags` is NaN where none was found.
 
@@ -100,16 +111,20 @@ def _newton(
     decay, depth, load = reaches / (1 + reaches), depths.copy(), loads.copy()
     state, sums = np.empty((2, loads.size)), np.empty((SUMS, loads.size))
     drags[:] = np.nan
+    ends = 0.0 if periodic else 1.0
     count = loads.size
     for _ in range(ITERATIONS):
-        _sweep(height, rise, decay[:count], depth[:count], state, sums)
+        _sweep(height, rise, periodic, decay[:count], depth[:count], state, sums)
         kept = 0
         for k in range(count):
             case = active[k]
-            step = (load[k] - sums[CARRIED, k]) / sums[STIFFNESS, k]
+            # behind a line that does not close, u and its derivative fade away undisturbed
+            carried = sums[CARRIED, k] + ends * reaches[case] * state[0, k]
+            step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * reaches[case] * state[1, k])
             if abs(step) <= tolerance * depth[k]:
                 depths[case] = depth[k]
                 drags[case] = sums[DRAG, k] * (1 + reaches[case])
+                outside[case] = not periodic and (state[1, k] == 1 or height[0] + depth[k] > 0)
                 continue
             active[kept], decay[kept], load[kept] = case, decay[k], load[k]
             depth[kept] = max(depth[k] + step, 0.25 * depth[k])
@@ -122,7 +137,7 @@ def _newton(
 @njit(nogil=True, cache=True)
 def contact(
     height: FloatArray,
-    rise: FloatArray,
+    periodic: bool,
     reaches: FloatArray,
     depths: FloatArray,
     touched: FloatArray,
@@ -130,40 +145,48 @@ def contact(
 ) -> None:
     """Write the number of nodes in contact and the rms rise over them, for line and cases as in :func:`solve`."""
     for k in range(depths.size):
-        decay, u, count, square = reaches[k] / (1 + reaches[k]), depths[k], 0, 0.0
+        decay, count, square = reaches[k] / (1 + reaches[k]), 0, 0.0
+        u = depths[k] if periodic else 0.0
         for i in range(height.size):
             w = height[i] + depths[k]
             if w > decay * u:
                 u = w
+                rise = height[i] - height[i - 1]
                 count += 1
-                square += rise[i] * rise[i]
+                square += rise * rise
             else:
                 u *= decay
         touched[k] = count
         slope[k] = np.sqrt(square / max(count, 1))
 
 
-def solve(height: FloatArray, reaches: FloatArray, loads: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the depth of the highest node and F_x / (4 G) of every case on a periodic line.
+def solve(
+    height: FloatArray, periodic: bool, reaches: FloatArray, loads: FloatArray
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.
 
-    The first guess comes from every `COARSENING`-th node, and so on: it depends on the case alone, and so does every bit of
-    the result.
+    The first guess comes from every `COARSENING`-th node, and so on: it depends on the case alone, and so does
+    every bit of the result.
 
     Parameters
     ----------
     height : array, shape (n,)
-        Heights from the highest node, which comes last.
+        Heights from the highest node, which comes last if the line is periodic.
+    periodic : bool
+        Whether the line closes on itself; if not, elements enter undeformed at the first node.
     reaches, loads : array, shape (cases,)
-        v tau in cells, and F_N / (4 G L) in the unit of height; both positive and finite.
+        v tau in cells, and F_N / (4 G dx) in the unit of height; both positive and finite.
     """
     strides = [1]
     while height.size > COARSEST * strides[-1]:
         strides.append(strides[-1] * COARSENING)
-    depths = np.maximum(loads, loads ** (2 / 3))
-    drags = np.empty(loads.size)
+    mean = loads / height.size
+    depths = np.maximum(mean, mean ** (2 / 3))
+    drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)
+    top = int(np.argmax(height))
     for stride in reversed(strides):
-        coarse = np.ascontiguousarray(height[::-1][::stride][::-1])
-        tolerance = CONVERGED_STEP if stride == 1 else COARSE_STEP
+        coarse = np.ascontiguousarray(height[top % stride :: stride])
         rise = coarse - np.roll(coarse, 1)
-        _newton(coarse, rise, reaches / stride, loads * coarse.size, tolerance, depths, drags)
-    return depths, drags
+        tolerance = CONVERGED_STEP if stride == 1 else COARSE_STEP
+        _newton(coarse, rise, periodic, reaches / stride, loads / stride, tolerance, depths, drags, outside)
+    return depths, drags, outside

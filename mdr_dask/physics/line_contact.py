@@ -31,8 +31,15 @@ _WHY = {
 }
 #: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
 _SPIKE = 0.01
-#: Ways to the first solution, in this order: factor on the expected film, greatest change of pressure, nodes.
-_ATTEMPTS = ((1.5, 0.12, 121), (2.5, 0.12, 121), (1.5, 0.04, 121), (4.0, 0.05, 121), (1.5, 0.05, 361))
+#: Ways to the first solution, in this order: factor on the expected film, its upper limit over the square of the
+#: inlet's distance (starvation), greatest change of pressure, nodes.
+_ATTEMPTS = (
+    (1.5, 0.2, 0.12, 121),
+    (2.5, 0.4, 0.12, 121),
+    (1.5, 0.1, 0.04, 121),
+    (4.0, 0.2, 0.05, 121),
+    (1.5, 0.2, 0.05, 361),
+)
 #: Ways from one grid to another: greatest change of pressure in a step, greatest number of steps.
 _PACES = ((0.12, 30), (0.05, 80), (0.02, 250))
 #: Numbers of nodes: of the grids that are placed by a solution, and of those whose films are compared.
@@ -254,9 +261,10 @@ def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
 
 def _first_solution(case: LineContact) -> tuple[int, GridSolution]:
     """Return the solution on a first grid, by the first of the known ways that leads there."""
-    for factor, clip, count in _ATTEMPTS:
+    for factor, starved, clip, count in _ATTEMPTS:
         guess = factor * expected_film(case.M, case.L)
         inlet = ehl_grid.inlet_position(guess) if case.inlet is None else case.inlet
+        guess = min(guess, starved * inlet**2)
         nodes = ehl_grid.first_grid(guess, inlet, count)
         status, state = _solve_on(case, nodes, _first_pressure(nodes, guess), guess, ((clip, _FIRST_STEPS),))
         if status == CONVERGED:
@@ -359,13 +367,14 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
             state = adapted
     source = state
     films: list[tuple[float, float]] = []
-    error = np.inf
+    error, failure = np.inf, TOO_MANY_STEPS
     for count in _NODES:
         status, finer = _refine(case, state, source, count)
         steps += finer.steps
-        if status != CONVERGED and films:
-            break
         if status != CONVERGED:
+            failure = status
+            if films:
+                break
             continue  # too coarse for this film
         coarser, state = state, finer
         films.append((state.central, _minimum(state)[1]))
@@ -375,7 +384,7 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
             if error <= accuracy:
                 break
     if not np.isfinite(error):
-        return _failed(case, status, steps, count)
+        return _failed(case, failure, steps, count)
     return _solution(case, state, coarser, np.array(films), error, accuracy, steps)
 
 

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.physics import backward_euler
+from mdr_dask.physics.profile import Profile, cut, indented_line, periodic_line
 from mdr_dask.physics.sweep import (
     BLOCK,
     DISPLACEMENT,
@@ -23,7 +24,6 @@ from mdr_dask.physics.sweep import (
     SUMS,
     Cells,
     barrier,
-    summit,
     sweep,
 )
 
@@ -75,80 +75,6 @@ class Steady:
         for name, column in columns.items():
             column[cases] = vars(other)[name]
         return Steady(**columns)
-
-
-@njit(nogil=True, cache=True)
-def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
-    """Return the highest point of every cell, and the cell and place of the highest of all."""
-    peaks = np.empty(enter.size)
-    best, place = 0, 0.0
-    for i in range(enter.size):
-        rise = height[i + 1] - height[i]
-        b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
-        x = summit(enter[i], b, c)
-        if x > 1:
-            x = 0.0 if height[i] >= height[i + 1] else 1.0
-            peaks[i] = max(height[i], height[i + 1])
-        else:
-            peaks[i] = height[i] + x * (enter[i] + x * (b + x * c))
-        if i == 0 or peaks[i] > peaks[best]:
-            best, place = i, x
-    return peaks, best, place
-
-
-def cut(height: FloatArray, enter: FloatArray, leave: FloatArray, periodic: bool, smooth: bool) -> tuple[Cells, float]:
-    """Cut a profile into the cells of a sweep.
-
-    Parameters
-    ----------
-    height : array, shape (n,) if periodic, else (n + 1,)
-        Heights at the nodes, into the elastomer.
-    enter, leave : array, shape (n,)
-        Rise over one cell at the slope of its start and of its end.
-    periodic : bool
-        Whether the last cell ends at the first node.
-    smooth : bool
-        Whether slopes are continuous and periodic, so that the integral of their square is summed by Euler and
-        Maclaurin: exact over the whole line if that is resolved.
-
-    Returns
-    -------
-    cells : Cells
-    top : float
-        Height of the highest point.
-    """
-    nodes = np.append(height, height[0]) if periodic else height
-    peaks, best, place = _peaks(nodes, enter, leave)
-    top = float(peaks[best])
-    rise = np.diff(nodes)
-    mean = 0.5 * (nodes[1:] + nodes[:-1]) + (enter - leave) / 12 - top
-    stretch = (36 * rise**2 - 6 * rise * (enter + leave) + 4 * (enter**2 + leave**2) - 2 * enter * leave) / 30
-    if smooth:
-        whole, square = stretch, enter**2
-        correction = (np.roll(square, -1) - np.roll(square, 1)) / 24
-        stretch = 0.5 * (square + np.roll(square, -1)) + correction - np.roll(correction, -1)
-        # the first cell is cut in two and integrated as a polynomial: the others take the difference
-        stretch += (stretch[best] - whole[best]) / max(enter.size - 1, 1)
-        stretch[best] = whole[best]
-    roll = best if periodic else 0
-    height, enter, leave, peaks, mean, stretch = (
-        np.roll(array, -roll) for array in (nodes[: enter.size] - top, enter, leave, peaks - top, mean, stretch)
-    )
-    after = height[:2] if periodic else np.array([nodes[-1] - top, nodes[-1] - top])
-    blocks = enter.size // BLOCK
-    return Cells(
-        np.append(height, after),
-        np.append(enter, enter[0]),
-        np.append(leave, leave[0]),
-        np.append(peaks, peaks[0]),
-        np.append(mean, mean[0]),
-        np.append(stretch, stretch[0]),
-        peaks[: blocks * BLOCK].reshape(blocks, BLOCK).max(axis=1),
-        mean[: blocks * BLOCK].reshape(blocks, BLOCK).sum(axis=1),
-        stretch[: blocks * BLOCK].reshape(blocks, BLOCK).sum(axis=1),
-        place if periodic else 0.0,
-        periodic,
-    ), top
 
 
 @njit(nogil=True, cache=True)
@@ -234,28 +160,45 @@ def _solve(
 
 @njit(nogil=True, cache=True)
 def _states(
-    cells: Cells, reaches: FloatArray, loads: FloatArray, results: FloatArray, status: NDArray[np.int8]
+    cells: Cells,
+    reaches: FloatArray,
+    loads: FloatArray,
+    guesses: FloatArray,
+    close: float,
+    results: FloatArray,
+    status: NDArray[np.int8],
 ) -> None:
-    """Solve the cases of one profile, ordered by reach and load, each from the one before; see `Steady` for the columns."""
+    """Solve the cases of one profile, ordered by reach and load; see `Steady` for the columns of the results.
+
+    The search for a depth follows that of the case before, or starts from its guess where that is a number. Where the
+    tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
+    """
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK)
     sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
     reach = -1.0
-    first[:] = math.log(loads[0]), math.log(loads[0] * n), 0.7, 0.0
+    first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
     for k in range(loads.size):
         starts = reaches[k] != reach
         if starts:
             reach = reaches[k]
             barrier(cells, reach, barriers, block_barriers)
             trail[:] = first
-        depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k] * n, trail, sums)
+        depth, converged = guesses[k], False
+        if guesses[k] > 0:
+            trail[:] = math.log(guesses[k]), math.log(loads[k]), 0.7, 0.0
+            if close > 0:
+                sweep(cells, barriers, block_barriers, reach, depth, sums)
+                converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
+        if not converged:
+            depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k], trail, sums)
         if not converged:
             status[k] = NOT_CONVERGED
             trail[:] = first
             continue
         if starts:
             first[:] = trail
-        shift = (loads[k] * n - sums[DISPLACEMENT]) / sums[STIFFNESS]
+        shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = OUTSIDE_LINE if sums[OUTSIDE] > 0 else CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
@@ -270,6 +213,8 @@ def steady_sliding(
     loads: FloatArray,
     scheme: Scheme = "hermite",
     contact: bool = True,
+    guesses: FloatArray | None = None,
+    close: float = 0.0,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation sliding over a periodic line.
 
@@ -287,6 +232,10 @@ def steady_sliding(
         Exact sweep over cubic cells or over straight ones, or the papers' time steps.
     contact : bool
         Whether fraction and slope of the contact are wanted where they cost extra.
+    guesses : array, shape (cases,), optional
+        Depths to start the exact sweeps from; the answer does not depend on them while `close` is 0.
+    close : float
+        Relative change of a guess that its tangent is trusted with instead of a search: for comparisons, not for results.
 
     Returns
     -------
@@ -298,54 +247,102 @@ def steady_sliding(
     ValueError
         If the scheme needs slopes that are not given.
     """
-    if scheme == "hermite" and slope is None:
+    profile = periodic_line(height, _needed(slope, scheme))
+    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
+
+
+def steady_indenter(
+    height: FloatArray,
+    slope: FloatArray | None,
+    coefficient: float,
+    exponent: float,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme = "hermite",
+    contact: bool = True,
+    guesses: FloatArray | None = None,
+    close: float = 0.0,
+) -> Steady:
+    """Return the steady states of a Kelvin foundation under a rough line -c |x|^n + h(x) that it enters undeformed.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n + 1,)
+        The roughness h, both ends included, and its derivative as in :func:`steady_sliding`.
+    coefficient, exponent : float
+        c > 0 and n >= 1 of the line, x in units of its length from its middle node n // 2.
+    reaches, loads, scheme, contact, guesses, close
+        As in :func:`steady_sliding`.
+
+    Returns
+    -------
+    Steady
+        With status `OUTSIDE_LINE` where an end of the line is in contact.
+    """
+    profile = indented_line(height, _needed(slope, scheme), coefficient, exponent)
+    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
+
+
+def _needed(slope: FloatArray | None, scheme: Scheme) -> FloatArray | None:
+    """Return the slopes for a scheme that uses them."""
+    if scheme != "hermite":
+        return None
+    if slope is None:
         raise ValueError("expected slopes at the nodes for the scheme 'hermite', got None")
+    return slope
+
+
+def _steady(
+    profile: Profile,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme,
+    contact: bool,
+    guesses: FloatArray | None,
+    close: float,
+) -> Steady:
+    """Solve the cases that are numbers."""
     good = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
-    if not np.all(np.isfinite(height)) or (slope is not None and not np.all(np.isfinite(slope))):
-        good[:] = False
+    good &= bool(np.all(np.isfinite(profile.height)) and np.all(np.isfinite(profile.enter)))
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, INVALID, np.int8)
-    if np.any(good):
-        cells, weights = reaches[good] * height.size, loads[good]
-        results[:, good], status[good] = (
-            _backward_euler(height, cells, weights, contact)
-            if scheme == "backward_euler"
-            else _exact(height, slope if scheme == "hermite" else None, cells, weights)
-        )
+    n = profile.enter.size
+    if np.any(good) and scheme == "backward_euler":
+        results[:, good], status[good] = _stepped(profile, reaches[good] * n, loads[good] * n, contact)
+    elif np.any(good):
+        start = np.full(int(good.sum()), np.nan) if guesses is None else guesses[good]
+        results[:, good], status[good] = _swept(profile, reaches[good] * n, loads[good] * n, start, close)
     results[:, status != CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
-def _exact(
-    height: FloatArray, slope: FloatArray | None, reaches: FloatArray, loads: FloatArray
+def _swept(
+    profile: Profile, reaches: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells, straight ones without slopes; reaches in cells."""
-    if slope is not None:
-        rise = slope / height.size
-        cells, top = cut(height, rise, np.roll(rise, -1), True, True)
-    else:
-        rise = np.roll(height, -1) - height
-        cells, top = cut(height, rise, rise, True, False)
+    """Solve by sweeps over cells; reaches in cells, loads over 4 G dx."""
+    cells, top = cut(profile)
     order = np.lexsort((loads, reaches))
-    results, status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
-    ordered, ordered_status = results.copy(), status.copy()
-    _states(cells, reaches[order], loads[order], ordered, ordered_status)
+    ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
+    _states(cells, reaches[order], loads[order], guesses[order] + top, close, ordered, ordered_status)
+    results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= top
     return results.T, status
 
 
-def _backward_euler(
-    height: FloatArray, reaches: FloatArray, loads: FloatArray, contact: bool
+def _stepped(
+    profile: Profile, reaches: FloatArray, loads: FloatArray, contact: bool
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by time steps of one cell; reaches in cells."""
-    last = int(np.argmax(height)) + 1
-    below = np.roll(height, -last) - height[last - 1]
-    depths, drags = backward_euler.solve(below, reaches, loads)
+    """Solve by time steps of one cell; reaches in cells, loads over 4 G dx."""
+    highest, n = int(np.argmax(profile.height)), profile.enter.size
+    top = profile.height[highest]
+    below = (np.roll(profile.height, -1 - highest) if profile.periodic else profile.height) - top
     results = np.full((4, loads.size), np.nan)
-    results[0], results[1] = drags, depths - height[last - 1]
+    depths, results[0], outside = backward_euler.solve(below, profile.periodic, reaches, loads)
+    results[1] = depths - top
     if contact:
-        backward_euler.contact(below, below - np.roll(below, 1), reaches, depths, results[2], results[3])
-        results[2] /= height.size
-        results[3] *= height.size
-    return results, np.where(np.isnan(drags), NOT_CONVERGED, CONVERGED).astype(np.int8)
+        backward_euler.contact(below, profile.periodic, reaches, depths, results[2], results[3])
+        results[2] /= n
+        results[3] *= n
+    status = np.where(np.isnan(results[0]), NOT_CONVERGED, np.where(outside, OUTSIDE_LINE, CONVERGED))
+    return results, status.astype(np.int8)

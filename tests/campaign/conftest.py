@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pytest
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
 from mdr_dask import models
 from mdr_dask.models.base import Model, NamedFile, Output, Parameters, Result, quantity
@@ -27,14 +27,7 @@ class Plane(Parameters):
     shape: Literal["plane"]
 
 
-def _shape(value):
-    return value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
-
-
-Indenter = Annotated[
-    Annotated[Cone, Tag("cone")] | Annotated[Power, Tag("power")] | Annotated[Plane, Tag("plane")],
-    Discriminator(_shape),
-]
+Indenter = Annotated[Cone | Power | Plane, Field(discriminator="shape")]
 
 
 class Rubbing(Parameters):

@@ -8,8 +8,11 @@ import time
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from mdr_dask.campaign import Replication, Tolerance, load, loads
+from mdr_dask.errors import CampaignError
 
 VALID = Path(__file__).parent / "valid"
 SMALL = (VALID / "small.yaml").read_text()
@@ -27,7 +30,7 @@ def test_defaults():
 
 def test_every_key():
     campaign = loads(FULL, "force.yaml", ".")
-    assert (campaign.name, campaign.model, campaign.seed) == ("force-sweep", "rubbing", 2013)
+    assert (campaign.name, campaign.model, campaign.seed) == ("full", "rubbing", 2013)
     assert campaign.replication == Replication(
         10, 200, {"friction_coefficient": Tolerance(relative=0.01), "indentation_depth": Tolerance(absolute=2e-6)}
     )
@@ -89,3 +92,23 @@ def test_a_typical_file_is_read_fast():
 @pytest.mark.parametrize("path", sorted(VALID.glob("*.yaml")), ids=lambda path: path.stem)
 def test_valid_files_are_read(path):
     assert load(path).name == path.stem
+
+
+FRAGMENTS = [*"[]{}:-'*~10%#|", "&a", "-1", "mm", "null", "true", "[]", "{}", "1e400", ".nan", "!x", "3.5", "[1, 2]"]
+FRAGMENTS += ["linear", "values", "{linear: [1, 2, 3]}", "{shape: cone}"]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150)
+@given(st.data())
+def test_no_damage_to_a_file_does_more_than_raise_a_campaign_error(data):
+    text = data.draw(st.sampled_from([path.read_text() for path in sorted(VALID.glob("*.yaml"))]))
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(text)))
+        length = data.draw(st.integers(0, 8))
+        text = text[:start] + data.draw(st.sampled_from(["", *FRAGMENTS])) + text[start + length :]
+    problems = ()
+    try:
+        assert loads(text, "a.yaml", str(VALID)).series
+    except CampaignError as error:
+        problems = error.args
+    assert {problem.partition(":")[0] for problem in problems} <= {"a.yaml", "cases.csv"}

@@ -174,6 +174,17 @@ def test_short_inlet_starves_the_film() -> None:
     assert 1 - films[2] / films[4] == pytest.approx(0.027, abs=0.003)  # the checked figure
 
 
+@pytest.mark.parametrize("inlet", [-1.05, -1.3])
+@pytest.mark.parametrize("W", [2e-6, 5e-4])
+@pytest.mark.parametrize("U", [1e-13, 1e-9])
+@pytest.mark.parametrize("G", [500.0, 8000.0])
+def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet: float) -> None:
+    found = solve(line_contact(W, U, G, E_STAR, inlet=inlet))
+    assert found.status == 0, found.reason
+    assert found.nodes[0] == inlet
+    assert 0 < found.minimum_film <= found.film.min() * 1.02
+
+
 def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     case = line_contact(*CHECKED, E_STAR)
     usual = solve(case, accuracy=1e-4)

@@ -1,0 +1,140 @@
+"""Profiles that an elastomer slides over, and how they are cut into the cells of a sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mdr_dask.physics import indenter
+from mdr_dask.physics.sweep import BLOCK, Cells, summit
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A profile at equidistant nodes, n cells, unit of length free.
+
+    Parameters
+    ----------
+    height : array, shape (n,) if periodic, else (n + 1,)
+        Heights at the nodes, into the elastomer.
+    enter, leave : array, shape (n,)
+        Rise over one cell at the slope of its start and of its end.
+    periodic : bool
+        Whether the last cell ends at the first node.
+    smooth : bool
+        Whether the slopes of a periodic line are continuous, so that the integral of their square is summed by Euler and
+        Maclaurin: exact over the whole line if that is resolved.
+    """
+
+    height: FloatArray
+    enter: FloatArray
+    leave: FloatArray
+    periodic: bool
+    smooth: bool
+
+
+def periodic_line(height: FloatArray, slope: FloatArray | None) -> Profile:
+    """Return a periodic line of cubic cells, or of straight ones where there are no slopes.
+
+    Parameters
+    ----------
+    height : array, shape (n,)
+    slope : array, shape (n,), or None
+        Derivative of the height by position over the length of the line.
+    """
+    if slope is None:
+        rise = np.roll(height, -1) - height
+        return Profile(height, rise, rise, True, False)
+    rise = slope / height.size
+    return Profile(height, rise, np.roll(rise, -1), True, True)
+
+
+def indented_line(height: FloatArray, slope: FloatArray | None, coefficient: float, exponent: float) -> Profile:
+    """Return a rough indenter h(x) - c |x|^n of cubic cells, or of straight ones where there are no slopes.
+
+    Parameters
+    ----------
+    height : array, shape (n + 1,)
+        The roughness h at the nodes, both ends included.
+    slope : array, shape (n + 1,), or None
+        Derivative of the roughness by position over the length of the line.
+    coefficient, exponent : float
+        c and n >= 1; x is measured from node n // 2 in units of the length of the line.
+    """
+    n = height.size - 1
+    smooth, left, right = indenter.shape((np.arange(n + 1) - n // 2) / n, coefficient, exponent)
+    height = height + smooth
+    if slope is None:
+        rise = np.diff(height)
+        return Profile(height, rise, rise, False, False)
+    return Profile(height, (slope + right)[:-1] / n, (slope + left)[1:] / n, False, False)
+
+
+@njit(nogil=True, cache=True)
+def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
+    """Return the highest point of every cell, and the cell and place of the highest of all."""
+    peaks = np.empty(enter.size)
+    best, place = 0, 0.0
+    for i in range(enter.size):
+        rise = height[i + 1] - height[i]
+        b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
+        x = summit(enter[i], b, c)
+        if x > 1:
+            x = 0.0 if height[i] >= height[i + 1] else 1.0
+            peaks[i] = max(height[i], height[i + 1])
+        else:
+            peaks[i] = height[i] + x * (enter[i] + x * (b + x * c))
+        if i == 0 or peaks[i] > peaks[best]:
+            best, place = i, x
+    return peaks, best, place
+
+
+def cut(profile: Profile) -> tuple[Cells, float]:
+    """Cut a profile into the cells of a sweep, and return the height of its highest point beside them."""
+    enter, leave, n = profile.enter, profile.leave, profile.enter.size
+    nodes = np.append(profile.height, profile.height[0]) if profile.periodic else profile.height
+    peaks, best, place = _peaks(nodes, enter, leave)
+    top = float(peaks[best])
+    rise = np.diff(nodes)
+    mean = 0.5 * (nodes[1:] + nodes[:-1]) + (enter - leave) / 12 - top
+    stretch = (36 * rise**2 - 6 * rise * (enter + leave) + 4 * (enter**2 + leave**2) - 2 * enter * leave) / 30
+    if profile.smooth:
+        stretch = _resummed(stretch, enter, best)
+    roll = best if profile.periodic else 0
+    height, enter, leave, peaks, mean, stretch = (
+        np.roll(array, -roll) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
+    )
+    after = height[:2] if profile.periodic else np.full(2, nodes[-1] - top)
+    blocks = n // BLOCK
+    whole = blocks * BLOCK
+    return Cells(
+        np.append(height, after),
+        np.append(enter, enter[0]),
+        np.append(leave, leave[0]),
+        np.append(peaks, peaks[0]),
+        np.append(mean, mean[0]),
+        np.append(stretch, stretch[0]),
+        peaks[:whole].reshape(blocks, BLOCK).max(axis=1),
+        mean[:whole].reshape(blocks, BLOCK).sum(axis=1),
+        stretch[:whole].reshape(blocks, BLOCK).sum(axis=1),
+        place if profile.periodic else 0.0,
+        profile.periodic,
+    ), top
+
+
+def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
+    """Return the integrals of the slope squared over cells by Euler and Maclaurin, with the same integral over the line.
+
+    The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
+    """
+    square = slope**2
+    correction = (np.roll(square, -1) - np.roll(square, 1)) / 24
+    summed = 0.5 * (square + np.roll(square, -1)) + correction - np.roll(correction, -1)
+    summed += (summed[first] - stretch[first]) / max(slope.size - 1, 1)
+    summed[first] = stretch[first]
+    return summed

@@ -1,0 +1,187 @@
+"""Steady sliding of any linear viscoelastic foundation along a rough line or under an indenter, solved directly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.physics.rheology import LinearSolid, Recovery, recovery
+from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED, OUTSIDE_LINE
+from mdr_dask.physics.viscoelastic_sweep import solve_sliding, static_depth
+
+FloatArray = NDArray[np.float64]
+
+TOLERANCE = 1e-11
+"""Last step of Newton's method, relative to the depth: far below any discretisation error, above rounding."""
+
+SHORTEST_REACH = 1e-9
+"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it: an error of that size."""
+
+BALANCE = 1e-7
+"""Largest relative difference between the load carried and the load wanted in a converged state."""
+
+GRIDS = (1, 2, 4)
+"""Every point, every second and every fourth: extrapolation and its error estimate."""
+
+FIRST_ORDER_SHARE = 0.125
+"""Part of the correction that counts as error even where two extrapolations happen to agree."""
+
+
+@dataclass(frozen=True)
+class ViscoelasticSteady:
+    """A steady state; every number is NaN unless it converged.
+
+    Parameters
+    ----------
+    friction_coefficient : float
+        F_x / F_N, positive when it resists.
+    depth : float
+        Penetration of the mean line (of z = 0 for an indenter), m.
+    contact_fraction : float
+        Length in contact over length of the line.
+    contact_slope : float
+        rms slope of the line over the contact.
+    error : float
+        Estimated relative error of the friction coefficient.
+    status : int
+        `CONVERGED`, `NOT_CONVERGED` or `OUTSIDE_LINE`, with messages in :data:`mdr_dask.physics.sliding.MESSAGES`.
+    sweeps : int
+        Sweeps of the finest line.
+    """
+
+    friction_coefficient: float
+    depth: float
+    contact_fraction: float
+    contact_slope: float
+    error: float
+    status: int
+    sweeps: int
+
+
+def steady_viscoelastic_sliding(
+    height: FloatArray,
+    spacing: float,
+    solid: LinearSolid,
+    velocity: float,
+    normal_force: float,
+    periodic: bool = True,
+) -> ViscoelasticSteady:
+    """Return the steady state of a foundation of independent elements that slides along a line.
+
+    An element that has travelled s along the line is pressed by ``w(s) = d + h(s)``; in contact u = w, free f = 0, with
+    f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'] (thesis 3.3.3 for any linear rheology).
+
+    Parameters
+    ----------
+    height : array, shape (points,)
+        Heights h, m, positive into the elastomer, in the order in which an element meets them. A multiple of four points
+        if `periodic`, one more otherwise, so that every fourth point spans the same line.
+    spacing : float
+        Distance of points, m.
+    solid : LinearSolid
+        The material.
+    velocity, normal_force : float
+        v, m/s, and F_N, N; positive.
+    periodic : bool
+        Whether the line closes; otherwise elements enter undeformed at its first point.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite or not positive, or the number of points is not one of those allowed.
+
+    Notes
+    -----
+    The line is straight between points and swept exactly; the result is extrapolated from the same line with every second
+    point. The answer depends on nothing but the arguments: each solve starts from the statics.
+    """
+    heights = np.asarray(height, dtype=np.float64)
+    _check(heights, spacing, velocity, normal_force, periodic)
+    top = int(np.argmax(heights))
+    below = heights - heights[top]
+    below = np.append(np.roll(below, -top), 0.0) if periodic else below
+    solutions: list[_Solution] = []
+    for step in reversed(GRIDS):
+        start = solutions[-1].start if solutions else None
+        load = _Load(solid, velocity, normal_force, spacing, SHORTEST_REACH * spacing / velocity)
+        solutions.append(_solve(below[::step], step, load, periodic, start))
+    mean = float(heights.mean()) if periodic else 0.0
+    return _extrapolated(solutions, mean - heights[top])
+
+
+@dataclass(frozen=True)
+class _Load:
+    solid: LinearSolid
+    velocity: float
+    normal_force: float
+    spacing: float
+    fast_time: float
+
+    def in_cells(self, cell: float) -> tuple[FloatArray, FloatArray, Recovery]:
+        """Return moduli over the static one, reaches tau v / cell and modes; fast arms and the dashpot are one arm."""
+        solid = self.solid
+        fast = solid.times < self.fast_time
+        moduli, reach = solid.moduli[~fast] / solid.static_modulus, solid.times[~fast] * self.velocity / cell
+        viscosity = (solid.viscosity + solid.moduli[fast] @ solid.times[fast]) / solid.static_modulus
+        if viscosity > 0:
+            shortest = SHORTEST_REACH / 10
+            moduli = np.append(viscosity * self.velocity / cell / shortest, moduli)
+            reach = np.append(shortest, reach)
+        return moduli, reach, recovery(moduli, reach)
+
+
+@dataclass(frozen=True)
+class _Solution:
+    values: FloatArray
+    start: FloatArray
+    status: int
+    sweeps: int
+
+
+def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: FloatArray | None) -> _Solution:
+    """Solve on one grid, from the statics or from the state found on the grid before."""
+    profile, cell = np.ascontiguousarray(profile), load.spacing * step
+    moduli, reach, modes = load.in_cells(cell)
+    strain_area = load.normal_force / (4 * load.solid.static_modulus * cell)
+    if start is None or not np.all(np.isfinite(start)):
+        inner = profile[:-1] if periodic else profile
+        depth = static_depth(inner, strain_area)
+        start = np.append(np.full(moduli.size, depth - strain_area / inner.size), depth)
+    unknown, totals = start.copy(), np.empty(6)
+    arrays = moduli, reach, modes.times, modes.stretch, modes.amplitude, modes.memory
+    converged, sweeps, inside = solve_sliding(profile, strain_area, periodic, *arrays, TOLERANCE, unknown, totals)
+    balanced = converged and abs(totals[1] / strain_area - 1) < BALANCE
+    status = OUTSIDE_LINE if not inside else CONVERGED if balanced else NOT_CONVERGED
+    slope = np.sqrt(totals[4] / totals[3]) / cell if totals[3] > 0 else 0.0
+    values = np.array([totals[2] / strain_area / cell, unknown[-1], totals[3] / (profile.size - 1), slope])
+    return _Solution(values, unknown, status, sweeps)
+
+
+def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady:
+    """Extrapolate the two finest grids by their second order; the coarsest tells how well that works."""
+    coarsest, coarse, fine = solutions
+    if any(solution.status != CONVERGED for solution in solutions):
+        status = fine.status if fine.status != CONVERGED else NOT_CONVERGED
+        return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, status, fine.sweeps)
+    before = coarse.values + (coarse.values - coarsest.values) / 3
+    values = fine.values + (fine.values - coarse.values) / 3
+    friction, depth, fraction, slope = (float(value) for value in values)
+    change = max(abs(friction - before[0]), FIRST_ORDER_SHARE * abs(fine.values[0] - coarse.values[0]))
+    error = float(change / abs(friction)) if friction else float(change)
+    return ViscoelasticSteady(
+        friction, depth + mean, min(max(fraction, 0.0), 1.0), slope, error, fine.status, fine.sweeps
+    )
+
+
+def _check(heights: FloatArray, spacing: float, velocity: float, normal_force: float, periodic: bool) -> None:
+    if heights.ndim != 1 or not np.all(np.isfinite(heights)):
+        raise ValueError("the heights must be one row of finite numbers")
+    cells = heights.size if periodic else heights.size - 1
+    if cells < 8 or cells % GRIDS[-1]:
+        wanted = "a multiple of four points" if periodic else "one point more than a multiple of four"
+        raise ValueError(f"a line needs {wanted} and at least eight cells, got {heights.size} points")
+    for name, value in (("spacing", spacing), ("velocity", velocity), ("normal force", normal_force)):
+        if not (np.isfinite(value) and value > 0):
+            raise ValueError(f"the {name} must be positive and finite, got {value!r}")

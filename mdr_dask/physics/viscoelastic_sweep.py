@@ -1,0 +1,541 @@
+"""Compiled sweep of a linear viscoelastic foundation along a profile of straight cells, exact inside every cell.
+
+Lengths are in cells, stresses in units of the static modulus. `penetration` w is how deep the profile would press each
+node; arm m stretches by e = u - a, with de/ds = du/ds - e / reach, reach = tau v / cell. Contact moves the
+stretches by closed forms; free flight is the sum of recovery modes. Contact begins and ends inside cells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+CLOSED, OPEN_END = 0, 1
+SURFACE_LAYER = 1e-7
+"""Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def step_factors(
+    length: float, reach: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
+) -> None:  # pragma: no cover
+    """Fill the factors of a straight piece: e -> decay e + gain slope; its integral is gain e + area slope."""
+    for m in range(reach.size):
+        x = length / reach[m]
+        if x < 0.02:
+            loss = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6)))))
+            decay[m] = 1 - loss
+            gain[m] = reach[m] * loss
+            area[m] = length * length * (0.5 - x / 6 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7)))))
+        else:
+            decay[m] = np.exp(-x)
+            gain[m] = reach[m] * (1 - decay[m])
+            area[m] = reach[m] * (length - gain[m])
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _pressure_inside(
+    length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+) -> tuple[float, float]:  # pragma: no cover
+    """Return the stress and its derivative a `length` into a straight piece."""
+    pressure, rate = start + slope * length, slope
+    for m in range(moduli.size):
+        lost = -np.expm1(-length / reach[m])
+        pressure += moduli[m] * ((1 - lost) * stretch[m] + slope * reach[m] * lost)
+        rate += moduli[m] * (1 - lost) * (slope - stretch[m] / reach[m])
+    return pressure, rate
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def leaving_point(
+    end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+) -> float:  # pragma: no cover
+    """Return where the stress falls to zero in (0, end], by Newton kept inside a bracket."""
+    low, high = 0.0, end
+    point = SURFACE_LAYER if reach.size and reach[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
+    for _ in range(200):
+        pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, reach)
+        if pressure > 0:
+            low = point
+        else:
+            high = point
+        following = point - pressure / rate if rate < 0 else -1.0
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - point) <= 1e-15 * point or high - low <= 1e-15 * high:
+            return following
+        point = following
+    return point
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def touching_point(
+    low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
+) -> float:  # pragma: no cover
+    """Return where the recovering strain meets the line start + slope (t - low); monotone, since it is convex."""
+    point = low
+    for _ in range(60):
+        gap, rate = -(start + slope * (point - low)), -slope
+        for k in range(times.size):
+            term = modes[k] * np.exp(-point / times[k])
+            gap += term
+            rate -= term / times[k]
+        if gap <= 0 or rate >= 0:
+            return point
+        step = -gap / rate
+        point += step
+        if point >= high:
+            return high
+        if step <= 1e-15 * high:
+            return point
+    return point
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
+    strain, rate = 0.0, 0.0
+    for k in range(times.size):
+        term = modes[k] * np.exp(-distance / times[k])
+        strain += term
+        rate -= term / times[k]
+    return strain, rate
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _fly(
+    place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
+) -> float:  # pragma: no cover
+    """Return where the strain that recovers from `place` meets the profile again at `node` or later, or -1.
+
+    A convex strain that leaves a straight cell does not meet it again: `node` is the end of the next cell.
+
+    A sum of decaying exponentials is log-convex, so its tangent exponential is a lower bound: nodes below it are passed
+    without evaluating the sum.
+    """
+    strain, rate = _strain_of(0.0, modes, times)
+    bound = strain
+    ratio = np.exp(rate / strain) if strain > 0 else 1.0
+    bound *= ratio ** (node - place)
+    while node <= last:
+        if penetration[node] > bound:
+            strain, rate = _strain_of(node - place, modes, times)
+            if penetration[node] > strain:
+                before = max(node - 1.0 - place, 0.0)
+                slope = penetration[node] - penetration[node - 1]
+                start = penetration[node] - slope * (node - place - before)
+                return place + touching_point(before, node - place, start, slope, modes, times)
+            bound = strain
+            ratio = np.exp(rate / strain) if strain > 0 else 1.0
+        bound *= ratio
+        node += 1
+    return -1.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def sweep(
+    penetration: FloatArray,
+    start: FloatArray,
+    moduli: FloatArray,
+    reach: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    amplitude_of: FloatArray,
+    undeformed: bool,
+    lengths: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+    work: FloatArray,
+) -> tuple[int, int]:  # pragma: no cover
+    """Carry the arms once along the line and note what each contact and each flight contributes.
+
+    Parameters
+    ----------
+    penetration : array, shape (nodes,)
+        w at each node; the last node of a periodic line repeats the first.
+    start : array, shape (arms,)
+        e_m at the first node under the penetration there; ignored if `undeformed`.
+    moduli, reach : array, shape (arms,)
+        Arms, ascending in reach.
+    times, stretch_of, amplitude_of : arrays
+        Recovery modes, lengths in cells.
+    undeformed : bool
+        Whether the elements enter free and at rest.
+    lengths : array, shape (>= 2 nodes + 2,), output
+        Lengths of flight, contact, flight, contact, ... in this order, the first flight possibly of length zero.
+    imbalance : array, shape (arms,), output
+        Integral of e_m over the line.
+    totals : array, shape (6,), output
+        Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
+        beyond the line.
+    work : array, shape (9, arms), scratch
+
+    Returns
+    -------
+    pieces, end : int
+        Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
+    """
+    arms, last = moduli.size, penetration.size - 1
+    e, following, modes = work[0], work[1], work[2]
+    step_factors(1.0, reach, work[3], work[4], work[5])
+    imbalance[:] = 0.0
+    totals[:] = 0.0
+    glass, push = 1.0, penetration[0]
+    for m in range(arms):
+        e[m] = 0.0 if undeformed else start[m]
+        glass += moduli[m]
+        push += moduli[m] * e[m]
+        modes[m] = 0.0
+    place, pieces, node = 0.0, 0, 1
+    flying = undeformed or push < 0
+    if flying and not undeformed:
+        _into_flight(penetration[0], push / glass, e, moduli, modes, amplitude_of)
+    while True:
+        landing = _fly(place, node, modes, times, penetration, last) if flying else place
+        goal = landing if landing >= 0 else float(last)
+        lengths[pieces] = goal - place
+        pieces += 1
+        if flying:
+            _add_flight(goal - place, modes, times, stretch_of, reach, e, imbalance, totals)
+        if landing < 0:
+            for k in range(arms):
+                totals[5] += modes[k] * times[k]
+            return pieces, CLOSED
+        place = goal
+        begin = place
+        node = int(place) + 1
+        if node > last:
+            return pieces, OPEN_END
+        strain = penetration[node] - (penetration[node] - penetration[node - 1]) * (node - place)
+        first = strain
+        left = False
+        while node <= last and not left:
+            slope = penetration[node] - penetration[node - 1]
+            length = node - place
+            if length == 1.0:
+                decay, gain, area = work[3], work[4], work[5]
+            else:
+                decay, gain, area = work[6], work[7], work[8]
+                step_factors(length, reach, decay, gain, area)
+            pressure = penetration[node]
+            for m in range(arms):
+                following[m] = decay[m] * e[m] + gain[m] * slope
+                pressure += moduli[m] * following[m]
+            if pressure < 0:
+                left = True
+                length = leaving_point(length, strain, slope, e, moduli, reach)
+                decay, gain, area = work[6], work[7], work[8]
+                step_factors(length, reach, decay, gain, area)
+                pressure = strain + slope * length
+                for m in range(arms):
+                    following[m] = decay[m] * e[m] + gain[m] * slope
+                    pressure += moduli[m] * following[m]
+            viscous = 0.0
+            for m in range(arms):
+                integral = gain[m] * e[m] + area[m] * slope
+                imbalance[m] += integral
+                viscous += moduli[m] * integral
+            elastic = length * (strain + 0.5 * slope * length)
+            totals[0] += elastic
+            totals[1] += elastic + viscous
+            totals[2] += viscous * slope
+            totals[4] += slope * slope * length
+            strain = strain + slope * length if left else penetration[node]
+            place = place + length if left else float(node)
+            node += 1
+            e, following = following, e
+        totals[2] += 0.5 * (strain - first) * (strain + first)
+        totals[3] += place - begin
+        lengths[pieces] = place - begin
+        pieces += 1
+        if not left:
+            for m in range(arms):
+                work[0, m] = e[m]
+            return pieces, OPEN_END
+        _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
+        flying = True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _into_flight(
+    strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
+) -> None:  # pragma: no cover
+    """Turn stretches into modes, after the strain has given way by `excess`; the shortest arm makes the stress zero."""
+    stress = strain - excess
+    for m in range(e.size):
+        e[m] -= excess
+        if m > 0:
+            stress += moduli[m] * e[m]
+    if e.size:
+        e[0] = -stress / moduli[0]
+    for k in range(modes.size):
+        modes[k] = 0.0
+        for m in range(modes.size):
+            modes[k] += amplitude_of[k, m] * e[m]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_flight(
+    length: float,
+    modes: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    reach: FloatArray,
+    e: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+) -> None:  # pragma: no cover
+    """Let the modes decay over a flight, add its integrals of u and e, and leave the stretches at its end in `e`."""
+    for m in range(e.size):
+        e[m] = 0.0
+    for k in range(modes.size):
+        lost = -np.expm1(-length / times[k])
+        integral = modes[k] * times[k] * lost
+        totals[0] += integral
+        modes[k] *= 1 - lost
+        for m in range(e.size):
+            imbalance[m] += stretch_of[m, k] * integral
+            e[m] += stretch_of[m, k] * modes[k]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def tangent(
+    lengths: FloatArray,
+    pieces: int,
+    moduli: FloatArray,
+    reach: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    amplitude_of: FloatArray,
+    memory_of: FloatArray,
+    periodic: bool,
+    change: FloatArray,
+    strain_area: FloatArray,
+    scratch: FloatArray,
+) -> None:  # pragma: no cover
+    """Differentiate a sweep: change of a_m over the line, and integral of u, by (e at the start..., depth).
+
+    Contacts and flights of fixed lengths act linearly on the arms, and u is continuous where they meet, so moving the
+    meeting points does not matter to first order.
+
+    Parameters
+    ----------
+    lengths, pieces, moduli, reach, times, stretch_of, amplitude_of
+        As in `sweep`.
+    memory_of : array, shape (arms, arms)
+        a_m in each mode.
+    periodic : bool
+        Whether the line closes; otherwise there is only the column of the depth, and the recovery beyond the line counts.
+    change : array, shape (arms, columns), output
+        Derivative of a(end) - a(start); the last column belongs to the depth, the others to e(start).
+    strain_area : array, shape (columns,), output
+        Derivative of the integral of u.
+    scratch : array, shape (2, arms, columns)
+    """
+    arms, columns = change.shape
+    depth, glass = columns - 1, 1.0 + moduli.sum()
+    stretch, modes = scratch[0], scratch[1]
+    change[:] = 0.0
+    strain_area[:] = 0.0
+    stretch[:] = 0.0
+    for m in range(arms):
+        if periodic:
+            stretch[m, m] = 1.0
+        else:
+            stretch[m, depth] = 1.0
+    for piece in range(pieces):
+        length = lengths[piece]
+        if piece % 2 == 1:
+            strain_area[depth] += length
+            for m in range(arms):
+                lost = -np.expm1(-length / reach[m])
+                for j in range(columns):
+                    change[m, j] += lost * stretch[m, j]
+                    stretch[m, j] *= 1 - lost
+        elif length > 0:
+            _take_stress(stretch, moduli, glass)
+            np.dot(amplitude_of, stretch, modes)
+            np.dot(stretch_of, modes * np.exp(-length / times).reshape(-1, 1), stretch)
+            stretch[:, depth] += 1.0
+            for k in range(arms):
+                lost = -np.expm1(-length / times[k])
+                weight = times[k] * (lost if periodic or piece < pieces - 1 else 1.0)
+                for j in range(columns):
+                    strain_area[j] += weight * modes[k, j]
+                    after = modes[k, j] * (1 - lost)
+                    modes[k, j] *= -lost
+                    for m in range(arms):
+                        stretch[m, j] -= after
+                        change[m, j] += memory_of[m, k] * modes[k, j]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _take_stress(stretch: FloatArray, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
+    """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
+    arms, columns = stretch.shape
+    if arms == 0:
+        return
+    for j in range(columns):
+        strain = 1.0 if j == columns - 1 else 0.0
+        stress = strain
+        for m in range(arms):
+            stress += moduli[m] * stretch[m, j]
+        balance = strain - stress / glass
+        for m in range(1, arms):
+            stretch[m, j] -= stress / glass
+            balance += moduli[m] * stretch[m, j]
+        stretch[0, j] = -balance / moduli[0]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def solve_in_place(matrix: FloatArray, vector: FloatArray) -> bool:  # pragma: no cover
+    """Overwrite `vector` by the solution of a small dense system; False if the matrix is singular."""
+    size = vector.size
+    for j in range(size):
+        pivot = j
+        for i in range(j + 1, size):
+            if abs(matrix[i, j]) > abs(matrix[pivot, j]):
+                pivot = i
+        if not abs(matrix[pivot, j]) > 0:
+            return False
+        if pivot != j:
+            for c in range(j, size):
+                matrix[j, c], matrix[pivot, c] = matrix[pivot, c], matrix[j, c]
+            vector[j], vector[pivot] = vector[pivot], vector[j]
+        for i in range(j + 1, size):
+            factor = matrix[i, j] / matrix[j, j]
+            for c in range(j + 1, size):
+                matrix[i, c] -= factor * matrix[j, c]
+            vector[i] -= factor * vector[j]
+    for j in range(size - 1, -1, -1):
+        for c in range(j + 1, size):
+            vector[j] -= matrix[j, c] * vector[c]
+        vector[j] /= matrix[j, j]
+    return True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
+    """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0): Newton, falling from above."""
+    depth = 0.0
+    for value in profile:
+        depth -= value
+    depth = (depth + strain_area) / profile.size
+    for _ in range(200):
+        total, touching = 0.0, 0
+        for value in profile:
+            if depth + value > 0:
+                total += depth + value
+                touching += 1
+        if touching == 0:
+            depth = strain_area
+            continue
+        step = (total - strain_area) / touching
+        depth -= step
+        if abs(step) <= 1e-12 * depth:
+            break
+    return depth
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def solve_sliding(
+    profile: FloatArray,
+    strain_area: float,
+    periodic: bool,
+    moduli: FloatArray,
+    reach: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    amplitude_of: FloatArray,
+    memory_of: FloatArray,
+    tolerance: float,
+    unknown: FloatArray,
+    totals: FloatArray,
+) -> tuple[bool, int, bool]:  # pragma: no cover
+    """Find the depth that carries the load, and for a periodic line the arms' state that returns after one period.
+
+    In the steady state the integral of the stress is that of u, so the load prescribes the latter. The strain is convex
+    and increasing in the unknowns (a contact takes the larger of two such functions), so Newton's method converges
+    from any start, from above after its first step.
+
+    Parameters
+    ----------
+    profile : array, shape (nodes,)
+        Heights into the elastomer, the highest of them 0; a periodic line starts there and repeats it at the end.
+    strain_area : float
+        F_N / (4 G_inf cell), the integral of u wanted, in cells times height.
+    periodic : bool
+        Whether the line closes; otherwise elements enter undeformed and recover beyond its end.
+    moduli, reach, times, stretch_of, amplitude_of, memory_of
+        The solid, see `sweep` and `tangent`.
+    tolerance : float
+        Largest last step, relative to the depth.
+    unknown : array, shape (arms + 1,), input and output
+        Start and solution: e_m at the first node, then the depth.
+    totals : array, shape (6,), output
+        See `sweep`.
+
+    Returns
+    -------
+    converged, sweeps, inside : bool, int, bool
+        `inside` is False if an element is in contact at the end of a line that is not periodic.
+    """
+    arms, nodes = moduli.size, profile.size
+    columns = arms + 1 if periodic else 1
+    lengths, penetration = np.empty(2 * nodes + 4), np.empty(nodes)
+    imbalance, work = np.empty(arms), np.empty((9, arms))
+    change, row, scratch = np.empty((arms, columns)), np.empty(columns), np.empty((2, arms, columns))
+    matrix, residual = np.empty((columns, columns)), np.empty(columns)
+    for sweeps in range(1, 81):
+        for i in range(nodes):
+            penetration[i] = unknown[arms] + profile[i]
+        pieces, end = sweep(
+            penetration,
+            unknown[:arms],
+            moduli,
+            reach,
+            times,
+            stretch_of,
+            amplitude_of,
+            not periodic,
+            lengths,
+            imbalance,
+            totals,
+            work,
+        )
+        tangent(
+            lengths,
+            pieces,
+            moduli,
+            reach,
+            times,
+            stretch_of,
+            amplitude_of,
+            memory_of,
+            periodic,
+            change,
+            row,
+            scratch,
+        )
+        total = totals[0] if periodic else totals[0] + totals[5]
+        residual[columns - 1] = strain_area - total
+        matrix[columns - 1] = row
+        if periodic:
+            for m in range(arms):
+                scale = change[m, m]
+                residual[m] = -imbalance[m] / reach[m] / scale
+                for j in range(columns):
+                    matrix[m, j] = change[m, j] / scale
+        if not solve_in_place(matrix, residual):
+            return False, sweeps, True
+        largest = 0.0
+        for j in range(columns):
+            largest = max(largest, abs(residual[j]))
+            unknown[unknown.size - columns + j] += residual[j]
+        if not np.isfinite(largest):
+            return False, sweeps, True
+        if largest <= tolerance * unknown[arms]:
+            return True, sweeps, periodic or end == CLOSED
+    return False, 80, True
