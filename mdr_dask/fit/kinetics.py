@@ -28,7 +28,7 @@ def passing(data: xr.Dataset) -> xr.DataArray:
 
 def law_rate(number: xr.DataArray, hurst: xr.DataArray) -> xr.DataArray:
     """Return the rate of eq. 4.12 with its powers 1 below and 1 - H above v_1 tau q_max = 1."""
-    rate: xr.DataArray = xr.where(number < 1, number, number ** (1 - hurst))
+    rate: xr.DataArray = number.where(number < 1, number ** (1 - hurst))
     return rate
 
 
@@ -128,27 +128,31 @@ def _case_row(
     slope = float(case["rms_slope"].mean())
     row: dict[str, float] = {}
     try:
-        (before, jump, after), without = _jackknife(levels)
+        levels_mean, without = _jackknife(levels)
         mean, others = _jackknife(relaxing)
     except FitError:
         return dict.fromkeys((*LEVEL_NAMES, *RATE_FIELDS), np.nan)
-    functions = {
-        "jump": lambda level: level[..., 1],
-        "jump_over_slope": lambda level: level[..., 1] / change / slope,
-        "before_over_slope": lambda level: level[..., 0] / slope,
-        "zeta": lambda level: level[..., 1] / level[..., 0] / change,
-        "xi": lambda level: (level[..., 2] / level[..., 0] - 1) / change,
-        "relaxing_over_slope": lambda level: (level[..., 0] + level[..., 1] - level[..., 2]) / slope,
-    }
-    mean_levels = np.array([before, jump, after])
-    for name, function in functions.items():
-        value = float(function(mean_levels))
-        low, high = _interval(value, np.asarray(function(without)))
-        row |= {name: value, f"{name}_low": low, f"{name}_high": high}
+    of_others = _level_numbers(without, change, slope)
+    for name, value in _level_numbers(levels_mean, change, slope).items():
+        low, high = _interval(float(value), of_others[name])
+        row |= {name: float(value), f"{name}_low": low, f"{name}_high": high}
     error = relaxing.std(axis=0, ddof=1) / np.sqrt(relaxing.shape[0])
     if np.nanmax(np.abs(mean)) < INSTANT * slope:
         return row | dict.fromkeys(RATE_FIELDS, np.nan)
     return row | relaxation_of(time, mean, others, error, expected, _interval)
+
+
+def _level_numbers(levels: np.ndarray, change: float, slope: float) -> dict[str, np.ndarray]:
+    """Return the numbers that follow from mu_1, d_mu_0 and mu_2, which lie along the last axis."""
+    before, jump, after = np.moveaxis(levels, -1, 0)
+    return {
+        "jump": jump,
+        "jump_over_slope": jump / change / slope,
+        "before_over_slope": before / slope,
+        "zeta": jump / before / change,
+        "xi": (after / before - 1) / change,
+        "relaxing_over_slope": (before + jump - after) / slope,
+    }
 
 
 LEVEL_NAMES = tuple(
@@ -196,9 +200,15 @@ def _constant(before: np.ndarray, jump: np.ndarray) -> tuple[float, float, float
     x, y = before[good], jump[good]
     if x.size < 2:
         return np.nan, np.nan, np.nan, np.nan, np.nan
-    found = least_squares(lambda log_c: np.log(jump_law(x, np.exp(log_c[0])) / y), [np.log(LAW)])
+
+    def deviations(log_c: np.ndarray) -> np.ndarray:
+        ratio: np.ndarray = np.log(jump_law(x, float(np.exp(log_c[0]))) / y)
+        return ratio
+
+    found = least_squares(deviations, [np.log(LAW)])
     freedom = x.size - 1
-    variance = float(np.sum(found.fun**2)) / freedom / float(found.jac[:, 0] @ found.jac[:, 0])
+    sensitivity = (deviations(found.x + 1e-6) - deviations(found.x - 1e-6)) / 2e-6
+    variance = float(np.sum(found.fun**2)) / freedom / float(sensitivity @ sensitivity)
     half = t.ppf(0.975, freedom) * np.sqrt(variance)
     centre = float(found.x[0])
     deviation = np.sqrt(np.mean(found.fun**2))
@@ -258,7 +268,6 @@ def _rate_and_state(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return direct effect, evolution effect and slip length of every case."""
     rates = _rates(series)
     logarithm = np.log1p(rates["velocity_change"])
-    per_log = rates["velocity_change"] / logarithm
     scale = rates["jump"] / rates["zeta"]  # mu_1 dv / v_1
     result = xr.Dataset(
         {
@@ -274,7 +283,6 @@ def _rate_and_state(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
         result[f"evolution_effect_{end}"] = result["evolution_effect"] * part
         other = "high" if end == "low" else "low"
         result[f"slip_length_{end}"] = rates["relaxation_length"] * rates["rate"] / rates[f"rate_{other}"]
-    del per_log
     for name in result.data_vars:
         result[name].attrs["units"] = "m" if "length" in str(name) else "1"
     result.attrs["law"] = "mu = mu_1 + a ln(v_2 / v_1) - b ln(v_2 / v_1) (1 - exp(-s / D_c)), s slipped since the jump"
@@ -286,6 +294,16 @@ _MODELS = ("velocity_jump",)
 FITS: tuple[Fit, ...] = (
     Fit("kinetics", _MODELS, "d_mu_0, zeta, xi, and mu(t) = mu_2 + mu* exp(-b t') of every case", _kinetics),
     Fit("jump_law", _MODELS, "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c", _jump_law),
-    Fit("rate_power", _MODELS, "b = factor (v_1 tau q_max)^a for every H, below and above v_1 tau q_max = 1", _rate_power),
-    Fit("rate_and_state", _MODELS, "direct effect a, evolution effect b and slip length D_c of every case", _rate_and_state),
+    Fit(
+        "rate_power",
+        _MODELS,
+        "b = factor (v_1 tau q_max)^a for every H, below and above v_1 tau q_max = 1",
+        _rate_power,
+    ),
+    Fit(
+        "rate_and_state",
+        _MODELS,
+        "direct effect a, evolution effect b and slip length D_c of every case",
+        _rate_and_state,
+    ),
 )

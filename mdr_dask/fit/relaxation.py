@@ -74,17 +74,22 @@ def _refined(time: np.ndarray, trace: np.ndarray, weights: np.ndarray, rate: flo
 
     def amplitudes(curves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         design = curves * root
-        found = np.linalg.lstsq(design.T, root * trace, rcond=None)[0]
+        found: np.ndarray = np.linalg.lstsq(design.T, root * trace, rcond=None)[0]
         return found, root * trace - found @ design
 
     def stretched(p: np.ndarray) -> np.ndarray:
         return amplitudes(np.exp(-((np.exp(p[0]) * time) ** np.exp(p[1])))[None])[1]
 
     def curves_of(p: np.ndarray) -> np.ndarray:
-        return np.exp(-np.exp(p[0] + np.array([[0.0], [1.0]]) * np.exp(p[1])) * time)
+        rates: np.ndarray = np.exp(p[0] + np.array([[0.0], [1.0]]) * np.exp(p[1]))
+        curves: np.ndarray = np.exp(-rates * time)
+        return curves
+
+    def double(p: np.ndarray) -> np.ndarray:
+        return amplitudes(curves_of(p))[1]
 
     one = least_squares(stretched, [np.log(rate), 0.0], bounds=([-12, -3], [14, 1.5]))
-    two = least_squares(lambda p: amplitudes(curves_of(p))[1], [np.log(rate) - 1, 0.5], bounds=([-12, -4], [14, 2.5]))
+    two = least_squares(double, [np.log(rate) - 1, 0.5], bounds=([-12, -4], [14, 2.5]))
     slow, fast = np.exp(two.x[0]), np.exp(two.x[0] + np.exp(two.x[1]))
     parts = amplitudes(curves_of(two.x))[0]
     return {

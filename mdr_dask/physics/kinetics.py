@@ -148,6 +148,7 @@ def _settle(
             converged = True
             break
         at[0] += step
+    converged = converged or (found > 0 and abs(sums[LOAD] - load) <= 1e-8 * load)
     pressed = np.empty(max(found, 0))
     for k in range(pressed.size):
         pressed[k] = at[0] + height_at(profile, end[k])[0]

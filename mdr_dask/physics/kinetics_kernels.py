@@ -245,7 +245,7 @@ def _unloading(profile: Profile, lift: float, reach: float, low: float, high: fl
         step = x - force / falls if falls < 0 else 0.5 * (low + high)
         if not low < step < high:
             step = 0.5 * (low + high)
-        if abs(step - x) < 1e-13 * (profile.cell + x):
+        if abs(step - x) < 1e-9 * profile.cell:
             return step
         x = step
     return x

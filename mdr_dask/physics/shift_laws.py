@@ -63,7 +63,9 @@ def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, r
     return _fit("power", ("exponent",), lambda c: c[0] * distance, [_slope(distance, factors)], factors, covariance)
 
 
-def fit_arrhenius(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, reference: float) -> ShiftLaw:
+def fit_arrhenius(
+    temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, reference: float
+) -> ShiftLaw:
     """Fit ``log10 a_T = E / (R ln 10) (1/T - 1/T_ref)``, temperatures in K; see `fit_power`."""
     if np.any(temperature <= 0) or reference <= 0:
         raise FitError("the law of Arrhenius needs absolute temperatures")
@@ -106,7 +108,9 @@ def _fit(
     known = np.diag(covariance) > 0
     freedom = int(known.sum()) - len(names)
     if freedom < 1:
-        raise FitError(f"the law {name} needs more than {len(names)} shift factors beside the reference, got {known.sum()}")
+        raise FitError(
+            f"the law {name} needs more than {len(names)} shift factors beside the reference, got {known.sum()}"
+        )
     values, vectors = np.linalg.eigh(covariance[np.ix_(known, known)])
     scale = np.maximum(np.abs(np.array(guess)), 1e-12)
 

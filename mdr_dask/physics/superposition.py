@@ -190,9 +190,7 @@ class _Problem:
         step = np.ptp(x) * (1 + 1e-9) / cells
         return x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
 
-    def fit(
-        self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS
-    ) -> tuple[FloatArray, float]:
+    def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
         """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
         smoothing, longest = weight, 0.3 * self.width
         system, step = _System.at(self, shifts), np.zeros(self.free)

@@ -61,7 +61,9 @@ def test_impossible_solids_are_refused(arguments, message):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.lists(st.tuples(st.floats(-10, 10), st.floats(-6, 6)), min_size=1, max_size=50, unique_by=lambda arm: round(arm[0], 1))
+    st.lists(
+        st.tuples(st.floats(-10, 10), st.floats(-6, 6)), min_size=1, max_size=50, unique_by=lambda arm: round(arm[0], 1)
+    )
 )
 def test_recovery_modes_interlace_and_invert(arms):
     decades, stiffness = np.array(sorted(arms)).T
