@@ -407,23 +407,17 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
     Returns
     -------
     Interval
-        From the means of batches at least five windows long (40 at most), with Student's t; cut to [0, 1].
-
-    Raises
-    ------
-    ValueError
-        If the trace holds fewer than two batches.
+        From the means of batches at least five windows long (40 at most), with Student's t, cut to [0, 1]; NaN for all
+        but the mean if the trace is too short for two batches.
     """
-    batches = min(40, in_contact.size // (5 * window))
-    if batches < 2:
-        raise ValueError(
-            f"expected a trace of at least ten windows, got {in_contact.size} positions of window {window}"
-        )
     from scipy.special import stdtrit
 
+    mean = float(in_contact.mean())
+    batches = min(40, in_contact.size // (5 * window))
+    if batches < 2:
+        return Interval(mean, np.nan, np.nan, np.nan)
     size = in_contact.size // batches
     means = in_contact[: batches * size].reshape(batches, size).mean(axis=1)
     error = float(means.std(ddof=1) / np.sqrt(batches))
-    mean = float(in_contact.mean())
     reach = float(stdtrit(batches - 1, (1 + confidence) / 2)) * error
     return Interval(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))

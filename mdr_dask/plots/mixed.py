@@ -169,9 +169,9 @@ def _probability_lines(panel: Axes, array: xr.DataArray, along: str, by: str | N
         y, dy = mean.isel(pick).values * 100, error.isel(pick).values * 100
         panel.errorbar(shown(array[along].values), y, np.nan_to_num(dy), marker="o", ms=3, lw=1, capsize=2, label=label)
     panel.set_xlabel(_axis_label(along))
-    if shown.logarithmic:
+    values = array[along].values
+    if shown.logarithmic and values.max() > 10 * values.min():
         panel.set_xscale("log")
-        panel.xaxis.set_minor_formatter("")
 
 
 def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:

@@ -121,12 +121,11 @@ def friction(operation: Operation, share: float) -> float:
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
     if sliding == 0:
         return 0.0
-    law = oil.barus if case.viscosity_law == "barus" else oil.roelands
     liquid = film.fluid_friction(
         operation.contact,
         operation.film,
         sliding,
-        lambda pressure: law(pressure, operation.viscosity, operation.alpha),
+        lambda pressure: oil.log_viscosity(case.viscosity_law, pressure, operation.viscosity, operation.alpha),
         case.eyring_stress,
     )
     return share * case.boundary_friction + (1 - share) * liquid
