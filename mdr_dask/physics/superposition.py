@@ -24,6 +24,9 @@ SMOOTHING = np.logspace(-8, 6, 15)
 
 CURVE_POINTS = 201
 ITERATIONS = 40
+DRAW_ITERATIONS = 3
+"""A bootstrap sample starts from the solution, where Gauss-Newton steps converge at once."""
+
 WEIGHED = (0, 1, 2, 4, 8)
 """Iterations that choose the smoothing anew."""
 
@@ -187,11 +190,11 @@ class _Problem:
         step = np.ptp(x) * (1 + 1e-9) / cells
         return x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
 
-    def fit(self, shifts: FloatArray, weight: float | None) -> tuple[FloatArray, float]:
+    def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
         """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
         smoothing, longest = weight, 0.3 * self.width
         system, step = _System.at(self, shifts), np.zeros(self.free)
-        for iteration in range(ITERATIONS):
+        for iteration in range(iterations):
             if weight is None and iteration in WEIGHED:
                 smoothing = system.likeliest_weight()
             assert smoothing is not None
@@ -248,7 +251,7 @@ class _Problem:
         for row in samples:
             drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
             again = replace(self, y=fitted + drawn - vertical)
-            row[:] = np.concatenate(self.split(again.fit(shifts, weight)[0]))
+            row[:] = np.concatenate(self.split(again.fit(shifts, weight, DRAW_ITERATIONS)[0]))
         return samples
 
 
@@ -339,7 +342,7 @@ def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: Floa
     shorter = min(np.ptp(x), np.ptp(other_x))
     low, high = x[0] - other_x[-1] + shorter / 6, x[-1] - other_x[0] - shorter / 6
     best = (np.inf, 0.0)
-    for shift in np.linspace(low, high, 121):
+    for shift in np.linspace(low, high, 61):
         moved = other_x + shift
         inside, own = (moved >= x[0]) & (moved <= x[-1]), (x >= moved[0]) & (x <= moved[-1])
         difference = np.append(
