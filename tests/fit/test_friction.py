@@ -92,3 +92,17 @@ def test_what_cannot_be_fitted_says_why(forces):
         FIT["friction-indenter"]({"": forces})
     with pytest.raises(FitError, match="expected three velocities"):
         FIT["friction-plateau"]({"": forces.isel(velocity=slice(2))})
+
+
+def test_zone_one_has_the_known_constants():
+    # physics note section 3: statics of 200 realisations, F_N / (G h L) in 0.01..0.3
+    known = {0.0: (0.149, 1.68), 0.3: (0.275, 1.57), 0.7: (0.410, 1.66), 1.0: (0.430, 1.65)}
+    axes = {"hurst": list(known), "normal_force": np.geomspace(0.01, 0.3, 8) * 0.1}
+    data = store(axes, realisations=60, velocity=1e-9, points=2000)
+    found = FIT["friction-zone-one"]({"": data})
+    for hurst, constants in known.items():
+        here = found.sel(hurst=hurst)
+        for name, value in zip(("alpha", "beta"), constants, strict=True):
+            sigma = float(here[f"{name}_high"] - here[f"{name}_low"]) / (2 * 1.96)
+            # 60 realisations here, 200 there: 4 sigma of both, and what the note says the window matters
+            assert abs(float(here[name]) - value) < 4 * sigma * np.sqrt(1 + 60 / 200) + 0.02
