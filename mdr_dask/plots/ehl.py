@@ -154,6 +154,9 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
         axes.set_xscale("log")
         axes.set_xlabel(f"{formula.name}: $h/R$")
         axes.set_title(output.replace("_", " "))
+    panels[0].set_yscale("log")
+    for which in (panels[0].yaxis.set_major_formatter, panels[0].yaxis.set_minor_formatter):
+        which(lambda value, _: f"{value:g}")
     panels[0].set_ylabel("film found over the formula")
     panels[0].legend(frameon=False, fontsize="small")
     return figure

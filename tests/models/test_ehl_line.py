@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -141,3 +143,11 @@ def test_estimate_grows_with_cases_and_accuracy() -> None:
     one = block(("central_film",))
     many = block(("central_film",), {"load_parameter": np.full(10, 1e-5)})
     assert seconds(many) == pytest.approx(10 * seconds(one))
+
+
+def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    page = (Path(__file__).parents[2] / "docs/ehl.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", page, flags=re.M | re.S)
+    assert len(blocks) == 1
+    exec(blocks[0], {})
+    assert re.match(r"h_c/R = 2\.54\de-05, h_min/R = 2\.13\de-05\n", capsys.readouterr().out)
