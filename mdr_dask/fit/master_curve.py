@@ -305,7 +305,10 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """
     wanted = {"normal_force", "velocity"}
     means = [
-        (float(dataset.coords.get("rms_roughness", 1.0)), dataset["friction_coefficient"].mean("realisation", keep_attrs=True))
+        (
+            float(dataset.coords.get("rms_roughness", 1.0)),
+            dataset["friction_coefficient"].mean("realisation", keep_attrs=True),
+        )
         for dataset in series.values()
         if wanted <= set(dataset.dims) and "friction_coefficient" in dataset
     ]
