@@ -58,10 +58,15 @@ class ModulusTable(Parameters):
     """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
 
     file: NamedFile = Field(description="table with columns frequency, storage modulus, loss modulus[, temperature]")
-    frequency_unit: str = Field(default="Hz", description="unit of the frequencies, where the table has no row of units")
+    frequency_unit: str = Field(
+        default="Hz", description="unit of the frequencies, where the table has no row of units"
+    )
     modulus_unit: str = Field(default="Pa", description="unit of the moduli, where the table has no row of units")
     table_temperature: float | None = quantity(
-        "K", "measured temperature to use; tables of several are otherwise superposed at `reference`", default=None, gt=0
+        "K",
+        "measured temperature to use; tables of several are otherwise superposed at `reference`",
+        default=None,
+        gt=0,
     )
     reference: float | None = quantity("K", "temperature to superpose at", default=None, gt=0)
     poisson_ratio: float | None = quantity(
@@ -167,7 +172,9 @@ def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return angular frequency, storage and loss modulus in SI, at one temperature."""
     table = parse_table(chosen.file.read_text(), chosen.file.name)
     if table.values.shape[1] < 3:
-        raise DataError(f"{chosen.file.name}: expected frequency, storage and loss modulus, got {table.values.shape[1]} columns")
+        raise DataError(
+            f"{chosen.file.name}: expected frequency, storage and loss modulus, got {table.values.shape[1]} columns"
+        )
     scales = [table.scale(0, chosen.frequency_unit), *(table.scale(column, chosen.modulus_unit) for column in (1, 2))]
     omega, storage, loss = (table.values[:, column] * scale for column, scale in enumerate(scales))
     temperature = _temperatures(table)

@@ -22,11 +22,15 @@ TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv")
 class ProfileFile(Parameters):
     """A measured line; a bare file name stands for it with all options at their defaults."""
 
-    file: NamedFile = Field(description="two columns x, z; other formats are read by SurfaceTopography if it is installed")
+    file: NamedFile = Field(
+        description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
+    )
     unit: str = Field(default="m", description="unit of both columns, where the file has no row of units")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
     taper: float = quantity("1", "part of the line brought to its mean so that it closes", default=0.0, ge=0, le=1)
-    shortest_wavelength: float | None = quantity("m", "wavelength below which there is no roughness", default=None, gt=0)
+    shortest_wavelength: float | None = quantity(
+        "m", "wavelength below which there is no roughness", default=None, gt=0
+    )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
 
     @model_validator(mode="before")
@@ -55,7 +59,8 @@ def _columns(profile: ProfileFile) -> tuple[Any, Any]:
     table = parse_table(profile.file.read_text(), profile.file.name)
     if table.values.shape[1] < 2:
         raise DataError(f"{profile.file.name}: expected two columns x, z, got one")
-    return tuple(table.values[:, column] * table.scale(column, profile.unit) for column in (0, 1))
+    x, z = (table.values[:, column] * table.scale(column, profile.unit) for column in (0, 1))
+    return x, z
 
 
 def _topography(profile: ProfileFile) -> tuple[Any, Any]:
@@ -70,4 +75,5 @@ def _topography(profile: ProfileFile) -> tuple[Any, Any]:
     line = SurfaceTopography.read_topography(profile.file.path)
     if line.dim != 1:
         raise DataError(f"{profile.file.name}: expected a line scan, got a map")
-    return line.to_unit("m").positions_and_heights()
+    x, z = line.to_unit("m").positions_and_heights()
+    return x, z

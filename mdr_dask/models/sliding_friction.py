@@ -94,7 +94,9 @@ class SlidingFriction(Parameters):
     shear_modulus: float | None = quantity(
         "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
     )
-    relaxation_time: float | None = quantity("s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0)
+    relaxation_time: float | None = quantity(
+        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+    )
     material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
     normal_force: float = quantity("N", "normal force F_N", gt=0)
     velocity: float = quantity("m/s", "sliding velocity v", gt=0)

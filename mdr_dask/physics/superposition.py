@@ -1,9 +1,12 @@
-"""Master curves: curves of one quantity in several groups, shifted along their logarithmic axes until they are one curve."""
+"""Master curves: curves of one quantity in several groups, shifted along their logarithmic axes until they are one
+curve.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +60,8 @@ class Superposition:
     curve_x, curve_y, curve_error : array, shape (curve points,)
         The merged curve with its standard error.
     measured : tuple of float
-        Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by superposition.
+        Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by
+        superposition.
     draws : array, shape (draws, 2 groups)
         Bootstrap samples of the factors; none unless asked for.
     """
@@ -98,7 +102,8 @@ def superpose(
 ) -> Superposition:
     """Find the shifts that make curves parts of one smooth curve, with their covariance.
 
-    All shifts and the curve are fitted together by least squares: the curve is a cubic spline whose curvature is weighted by
+    All shifts and the curve are fitted together by least squares: the curve is a cubic spline whose curvature is
+    weighted by
     restricted maximum likelihood, so that curves are joined by their overlaps, and by smoothness where those are short.
 
     Parameters
@@ -182,13 +187,14 @@ class _Problem:
 
     def first_guess(self, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
         """Shift each curve onto the one before it."""
-        pairs = [_pair_shift(*one, *other) for one, other in zip(curves[:-1], curves[1:], strict=True)]
+        pairs = [_pair_shift(*one, *other) for one, other in pairwise(curves)]
         return np.cumsum(np.array(pairs))
 
     def knots(self, x: FloatArray) -> FloatArray:
         cells = int(np.clip(np.ceil(CELLS_PER_CURVE * np.ptp(x) / self.width), 2 * DEGREE, MOST_CELLS))
         step = np.ptp(x) * (1 + 1e-9) / cells
-        return x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
+        knots = x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
+        return np.asarray(knots, dtype=np.float64)
 
     def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
         """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
@@ -257,7 +263,9 @@ class _Problem:
 
 @dataclass(frozen=True)
 class _System:
-    """The least-squares problem linearised at given shifts: unknown are spline coefficients, then steps of the shifts."""
+    """The least-squares problem linearised at given shifts: unknown are spline coefficients, then steps of the
+    shifts.
+    """
 
     splines: int
     knots: FloatArray
@@ -338,7 +346,9 @@ def _curvature(size: int) -> FloatArray:
 
 
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:
-    """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or more."""
+    """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
+    more.
+    """
     shorter = min(np.ptp(x), np.ptp(other_x))
     low, high = x[0] - other_x[-1] + shorter / 6, x[-1] - other_x[0] - shorter / 6
     best = (np.inf, 0.0)

@@ -30,7 +30,9 @@ def test_kelvin_as_a_material_is_the_kelvin_body():
 
 
 def test_a_value_does_not_depend_on_its_neighbours():
-    parameters = LINE | LOAD | {"material": {"standard_solid": SOLID}, "indenter": {"shape": "parabola", "radius": 0.01}}
+    parameters = (
+        LINE | LOAD | {"material": {"standard_solid": SOLID}, "indenter": {"shape": "parabola", "radius": 0.01}}
+    )
     columns = {"velocity": [1e-3, 0.1, 1.0, 0.1], "normal_force": [0.1, 0.2, 0.3, 0.2]}
     whole = MODEL.compute(block(parameters, columns))
     assert np.all(whole.status == Status.DONE)
