@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array, diags_array, hstack
 
 from mdr_dask.errors import DataError
 
@@ -24,6 +25,9 @@ CELLS_PER_CURVE = 8
 MOST_CELLS = 120
 SMOOTHING = np.logspace(-8, 6, 15)
 """Weights of the curvature among which the restricted likelihood chooses, relative to the data's own."""
+
+FIRST_WEIGHT = 1e-3
+"""Smoothing of the curve whose slope linearises the problem."""
 
 CURVE_POINTS = 201
 ITERATIONS = 40
@@ -280,17 +284,20 @@ class _System:
         horizontal, vertical = problem.split(shifts)
         x, target = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
         knots = problem.knots(x)
-        basis = BSpline.design_matrix(x, knots, DEGREE).toarray()
+        basis = BSpline.design_matrix(x, knots, DEGREE)
         splines = basis.shape[1]
-        penalty = _curvature(splines) * np.trace(basis.T @ basis) / splines
-        smooth = np.linalg.solve(basis.T @ basis + 1e-3 * penalty + 1e-9 * np.eye(splines), basis.T @ target)
+        gram = (basis.T @ basis).toarray()
+        penalty = _curvature(splines) * np.trace(gram) / splines
+        smooth = cho_solve(
+            cho_factor(gram + FIRST_WEIGHT * penalty + 1e-9 * np.eye(splines)), np.asarray(basis.T @ target)
+        )
         slope = BSpline(knots, smooth, DEGREE).derivative()(x)
-        moved = (problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64)
-        columns = [basis, moved * slope[:, None]] + ([-moved] if problem.vertical else [])
-        design = np.hstack(columns)
+        moved = csr_array((problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64))
+        columns = [basis, moved.multiply(slope[:, None])] + ([-moved] if problem.vertical else [])
+        design = csr_array(hstack(columns))
         padded = np.zeros((design.shape[1], design.shape[1]))
         padded[:splines, :splines] = penalty
-        return cls(splines, knots, design, target, design.T @ design, design.T @ target, padded)
+        return cls(splines, knots, design.toarray(), target, (design.T @ design).toarray(), design.T @ target, padded)
 
     def _factor(self, weight: float) -> tuple[FloatArray, bool]:
         matrix = self.normal + weight * self.penalty
@@ -307,7 +314,7 @@ class _System:
         inner = slice(self.splines)
         matrix = self.normal[inner, inner] + weight * self.penalty[inner, inner]
         matrix[np.diag_indices(self.splines)] += 1e-12 * np.trace(matrix) / self.splines
-        along = float(self.right[inner] @ np.linalg.solve(matrix, self.right[inner]))
+        along = float(self.right[inner] @ cho_solve(cho_factor(matrix), self.right[inner]))
         return float(self.target @ self.target) - along
 
     def likeliest_weight(self) -> float:
@@ -341,8 +348,9 @@ class _System:
 
 
 def _curvature(size: int) -> FloatArray:
-    second = np.diff(np.eye(size), 2, axis=0)
-    return np.asarray(second.T @ second, dtype=np.float64)
+    """Return the matrix of the sum of squared second differences."""
+    second = csr_array(diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(size - 2, size)))
+    return np.asarray(csr_array(second.T @ second).toarray(), dtype=np.float64)
 
 
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:
