@@ -171,28 +171,26 @@ def _plateau(data: xr.Dataset) -> dict[str, xr.Variable]:
 
 
 def _least_squares(
-    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], logs: FloatArray, steps: int = 30
+    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 30
 ) -> FloatArray:
-    """Fit log data of every sample, shape (samples, points), by damped Gauss-Newton; return (samples, constants)."""
-    constants = np.tile(np.array(start), (logs.shape[0], 1))
+    """Fit the data of every sample, shape (samples, points), by damped Gauss-Newton; return (samples, constants)."""
+    constants = np.tile(np.array(start), (data.shape[0], 1))
     for _ in range(steps):
         value = model(constants)
         jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * np.eye(len(start))], axis=-1)
         normal = np.einsum("spi,spj->sij", jacobian, jacobian) + 1e-12 * np.eye(len(start))
-        gradient = np.einsum("spi,sp->si", jacobian, logs - value)
+        gradient = np.einsum("spi,sp->si", jacobian, data - value)
         constants = constants + np.clip(np.linalg.solve(normal, gradient[..., None])[..., 0], -0.3, 0.3)
     return constants
 
 
-def _law_error(model: FloatArray, logs: FloatArray, suffix: str, which: str) -> dict[str, xr.Variable]:
-    deviation = np.expm1(model - logs)
+def _law_error(law: FloatArray, data: FloatArray, suffix: str, which: str) -> dict[str, xr.Variable]:
+    """Return how far a law is from the data, both in units of the plateau sqrt 2 slope."""
+    away = np.abs(law - data)
+    rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     return {
-        **_measure(
-            f"rms_error{suffix}", float(np.sqrt(np.mean(deviation**2))), f"rms relative error of the law, {which}"
-        ),
-        **_measure(
-            f"largest_error{suffix}", float(np.max(np.abs(deviation))), f"largest relative error of the law, {which}"
-        ),
+        **_measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
+        **_measure(f"largest_error{suffix}", largest, f"largest error of the law over its plateau, {which}"),
     }
 
 
@@ -206,20 +204,20 @@ def _interpolation(data: xr.Dataset) -> dict[str, xr.Variable]:
         raise FitError(
             f"expected five cases with F_N / (G h L) above {LAW_FROM} below region IV, got {int(used.sum())}"
         )
-    logs, force, velocity = np.log(_resampled(friction[used]) / np.sqrt(2)), force[used], velocity[used]
+    means, force, velocity = _resampled(friction[used]) / np.sqrt(2), force[used], velocity[used]
 
     def model(constants: FloatArray) -> FloatArray:
-        law: FloatArray = np.log(laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:])))
+        law: FloatArray = laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:]))
         return law
 
     hurst = float(data["hurst"])
-    constants = _least_squares(model, (laws.alpha(hurst), np.log(laws.BETA)), logs)
+    constants = _least_squares(model, (laws.alpha(hurst), np.log(laws.BETA)), means)
     stated = model(np.array([[laws.alpha(hurst), np.log(laws.BETA)]]))[0]
     return {
         **_interval("alpha", constants[:, 0], "exponent of the force in the interpolation law"),
         **_interval("beta", np.exp(constants[:, 1]), "factor of the interpolation law"),
-        **_law_error(model(constants[:1])[0], logs[0], "", "constants fitted"),
-        **_law_error(stated, logs[0], "_stated", "with H / (1 + H) and 1.6"),
+        **_law_error(model(constants[:1])[0], means[0], "", "constants fitted"),
+        **_law_error(stated, means[0], "_stated", "with H / (1 + H) and 1.6"),
         **_measure("cases", int(used.sum()), "number of cases fitted"),
     }
 
@@ -264,8 +262,8 @@ def _indenter(data: xr.Dataset) -> dict[str, xr.Variable]:
     stated = model(np.array([[np.log(laws.INDENTER_EXPONENT)]]))[0]
     return {
         **_interval("exponent", np.exp(constants[:, 0]), "exponent of the law of rough indenters"),
-        **_law_error(model(constants[:1])[0], logs[0], "", "exponent fitted"),
-        **_law_error(stated, logs[0], "_stated", "exponent 1.5"),
+        **_law_error(np.exp(model(constants[:1])[0]), np.exp(logs[0]), "", "exponent fitted"),
+        **_law_error(np.exp(stated), np.exp(logs[0]), "_stated", "exponent 1.5"),
     }
 
 
@@ -275,25 +273,25 @@ def _indenter_axes(data: xr.Dataset) -> list[str]:
 
 FITS: tuple[Fit, ...] = (
     Fit(
-        "friction-zone-one",
+        "zone_one",
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: _each(series, _zone_one_axes, _zone_one),
     ),
     Fit(
-        "friction-plateau",
+        "plateau",
         MODELS,
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
         lambda series: _each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
     ),
     Fit(
-        "friction-law",
+        "interpolation",
         MODELS,
         "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
         lambda series: _each(series, _zone_one_axes, _interpolation),
     ),
     Fit(
-        "friction-indenter",
+        "indenter",
         MODELS,
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
         lambda series: _each(series, _indenter_axes, _indenter),
