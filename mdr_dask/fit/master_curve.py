@@ -81,8 +81,10 @@ def master_curve(
     Returns
     -------
     Dataset
-        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the group, with
-        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``, ``point_group``: all
+        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
+        group, with
+        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
+        ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
         decades), with the range measured at the reference in its attrs; constants of the laws that apply.
 
@@ -171,7 +173,10 @@ def _curves(
 
 
 def _clusters(values: FloatArray) -> NDArray[np.intp]:
-    """Number the groups; measured values that scatter about a few set ones are split at the largest jump among their gaps."""
+    """Return the number of the group of each value.
+
+    Measured values that scatter about a few set ones are split at the largest jump among their gaps.
+    """
     distinct, place = np.unique(values, return_inverse=True)
     if distinct.size <= values.size / 3 or distinct.size < 3:
         return place
@@ -295,7 +300,8 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the friction that the force master curve is about, from the series of a store.
 
-    It is the coefficient of friction of the first series that varies force and velocity, averaged over realisations; less
+    It is the coefficient of friction of the first series that varies force and velocity, averaged over realisations;
+    less
     that of a series with the same forces and velocities and no roughness, if there is one: the bulk's own friction.
 
     Raises

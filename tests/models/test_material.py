@@ -38,7 +38,7 @@ def test_every_kind_is_the_solid_it_names():
 def test_one_kind_and_one_law_only():
     kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
     solid = {"static_modulus": 1e6, "glass_modulus": 1e7, "relaxation_time": 0.1}
-    with pytest.raises(ValidationError, match="expected one of kelvin, standard_solid, .* got none"):
+    with pytest.raises(ValidationError, match=r"expected one of kelvin, standard_solid, .* got none"):
         material()
     with pytest.raises(ValidationError, match="got kelvin, standard_solid"):
         material(kelvin=kelvin, standard_solid=solid)
@@ -90,5 +90,5 @@ def test_table_needs_a_temperature_or_a_reference():
 
 
 def test_missing_file_is_named():
-    with pytest.raises(ValidationError, match="no such file: .*nowhere.csv"):
+    with pytest.raises(ValidationError, match=r"no such file: .*nowhere.csv"):
         material(dma_table={"file": "nowhere.csv"})

@@ -34,7 +34,7 @@ def test_unit_can_be_given(tmp_path):
     write(tmp_path / "line.csv")
     line = line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "um"}))
     assert line.length == pytest.approx(16e-6)
-    with pytest.raises(DataError, match="expected one of the units .* got 'inch'"):
+    with pytest.raises(DataError, match=r"expected one of the units .* got 'inch'"):
         line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "inch"}))
 
 
@@ -64,5 +64,5 @@ def test_files_that_hold_no_line(tmp_path, text, message):
 def test_other_formats_name_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     (tmp_path / "line.al3d").write_bytes(b"\x00")
-    with pytest.raises(DataError, match="pip install mdr_dask\\[formats\\]"):
+    with pytest.raises(DataError, match=r"pip install mdr_dask\[formats\]"):
         line_of(ProfileFile.model_validate(str(tmp_path / "line.al3d")))
