@@ -33,7 +33,7 @@ def sigma(fitted, name):
 
 @pytest.mark.slow
 def test_zone_one_over_the_hurst_exponent(groups):
-    fitted = available("sliding_friction")["zone-one"].compute(groups)
+    fitted = available("sliding_friction")["zone_one"].compute(groups)
     assert (abs(fitted.alpha - ALPHA) < 4 * sigma(fitted, "alpha") + ALPHA_WINDOW).all()
     assert (abs(fitted.beta - BETA) < 4 * sigma(fitted, "beta") + BETA_WINDOW).all()
     middle = fitted.sel(hurst=slice(0.15, 0.85))

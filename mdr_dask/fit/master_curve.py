@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
+from mdr_dask.models.tables import parse_table
 from mdr_dask.physics import shift_laws, superposition
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +28,6 @@ ALIASES: dict[str, tuple[str, ...]] = {
 }
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
-COMMENT = "#%;"
 ABSOLUTE_ZERO = -273.15
 NORMAL_95 = 1.959963984540054
 
@@ -44,40 +43,14 @@ def read_table(path: str | Path) -> pd.DataFrame:
     Raises
     ------
     DataError
-        If there is no header, or an entry is not a number.
+        If there is no row of names, or an entry is not a number.
     """
-    lines = Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()
-    kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and line.lstrip()[0] not in COMMENT]
-    if len(kept) < 2:
-        raise DataError(f"{path}: expected a row of names and rows of numbers, got {len(kept)} rows")
-    dialect = "\t" if "\t" in kept[0][1] else ";" if ";" in kept[0][1] else "," if "," in kept[0][1] else " "
-    rows = [
-        [entry.strip() for entry in next(csv.reader([line], delimiter=dialect, skipinitialspace=True))]
-        for _, line in kept
-    ]
-    names, rest = rows[0], list(zip([number for number, _ in kept[1:]], rows[1:], strict=True))
-    if all(_is_number(name) for name in names):
-        raise DataError(f"{path}:{kept[0][0]}: expected names of columns, got numbers")
-    units: dict[str, str] = {}
-    if not any(_is_number(entry) for entry in rest[0][1]):
-        units = dict(zip(names, rest.pop(0)[1], strict=False))
-    table = pd.DataFrame([_numbers(row, len(names), f"{path}:{line}") for line, row in rest], columns=names)
-    table.attrs["units"] = units
+    parsed = parse_table(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
+    if not parsed.names:
+        raise DataError(f"{path}: expected names of columns, got numbers")
+    table = pd.DataFrame(parsed.values, columns=list(parsed.names))
+    table.attrs["units"] = dict(zip(parsed.names, parsed.units, strict=False))
     return table
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _numbers(row: list[str], columns: int, place: str) -> list[float]:
-    if len(row) != columns or not all(_is_number(entry) or entry == "" for entry in row):
-        raise DataError(f"{place}: expected {columns} numbers, got {row!r}")
-    return [float(entry) if entry else np.nan for entry in row]
 
 
 def master_curve(
@@ -108,8 +81,10 @@ def master_curve(
     Returns
     -------
     Dataset
-        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the group, with
-        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``, ``point_group``: all
+        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
+        group, with
+        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
+        ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
         decades), with the range measured at the reference in its attrs; constants of the laws that apply.
 
@@ -198,7 +173,10 @@ def _curves(
 
 
 def _clusters(values: FloatArray) -> NDArray[np.intp]:
-    """Number the groups; measured values that scatter about a few set ones are split at the largest jump among their gaps."""
+    """Return the number of the group of each value.
+
+    Measured values that scatter about a few set ones are split at the largest jump among their gaps.
+    """
     distinct, place = np.unique(values, return_inverse=True)
     if distinct.size <= values.size / 3 or distinct.size < 3:
         return place
@@ -289,7 +267,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         If the value lies outside the groups.
     """
     by = str(curve.attrs["group"])
-    names = [str(curve.attrs[name]) for name in ("abscissa", "ordinate")]
+    over, values = str(curve.attrs["abscissa"]), str(curve.attrs["ordinate"])
     groups = curve[by].to_numpy()
     size = groups.size
     covariance = np.zeros((2 * size, 2 * size))
@@ -312,18 +290,46 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
     )
     units = {
         by: curve[by].attrs.get("units", ""),
-        names[0]: curve["curve_abscissa"].attrs.get("units", ""),
-        names[1]: curve["curve_ordinate"].attrs.get("units", ""),
+        over: curve["curve_abscissa"].attrs.get("units", ""),
+        values: curve["curve_ordinate"].attrs.get("units", ""),
     }
     new = superposition.rereference(old, reference)
-    return _dataset(new, *names, by, units).assign(_laws(new, names[0], by, units[by]))
+    return _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
+
+
+def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return the friction that the force master curve is about, from the series of a store.
+
+    It is the coefficient of friction of the first series that varies force and velocity, averaged over realisations;
+    less
+    that of a series with the same forces and velocities and no roughness, if there is one: the bulk's own friction.
+
+    Raises
+    ------
+    DataError
+        If no series varies ``normal_force`` and ``velocity``.
+    """
+    wanted = {"normal_force", "velocity"}
+    means = [
+        (
+            float(dataset.coords.get("rms_roughness", 1.0)),
+            dataset["friction_coefficient"].mean("realisation", keep_attrs=True),
+        )
+        for dataset in series.values()
+        if wanted <= set(dataset.dims) and "friction_coefficient" in dataset
+    ]
+    rough = [mean for height, mean in means if height > 0]
+    if not rough:
+        raise DataError("a force master curve needs a series with roughness that varies normal_force and velocity")
+    friction = rough[0]
+    for smooth in (mean for height, mean in means if height == 0):
+        if all(np.array_equal(smooth[name], friction[name]) for name in wanted):
+            friction = (friction - smooth.reset_coords(drop=True)).assign_attrs(friction.attrs)
+    return friction.to_dataset(name="friction_coefficient")
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    for dataset in series.values():
-        if {"normal_force", "velocity"} <= set(dataset.dims) and "friction_coefficient" in dataset:
-            return master_curve(dataset[["friction_coefficient"]])
-    raise DataError("a force master curve needs a series that varies normal_force and velocity")
+    return master_curve(friction_of_roughness(series))
 
 
 FITS = (

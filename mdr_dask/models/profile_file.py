@@ -59,7 +59,8 @@ def _columns(profile: ProfileFile) -> tuple[Any, Any]:
     table = parse_table(profile.file.read_text(), profile.file.name)
     if table.values.shape[1] < 2:
         raise DataError(f"{profile.file.name}: expected two columns x, z, got one")
-    return tuple(table.values[:, column] * table.scale(column, profile.unit) for column in (0, 1))
+    x, z = (table.values[:, column] * table.scale(column, profile.unit) for column in (0, 1))
+    return x, z
 
 
 def _topography(profile: ProfileFile) -> tuple[Any, Any]:
@@ -74,4 +75,5 @@ def _topography(profile: ProfileFile) -> tuple[Any, Any]:
     line = SurfaceTopography.read_topography(profile.file.path)
     if line.dim != 1:
         raise DataError(f"{profile.file.name}: expected a line scan, got a map")
-    return line.to_unit("m").positions_and_heights()
+    x, z = line.to_unit("m").positions_and_heights()
+    return x, z

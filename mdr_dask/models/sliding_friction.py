@@ -25,6 +25,7 @@ ACCURACY = 0.01  # where the campaign does not say
 FINEST = 64  # oversampling beyond which `auto` gives up
 SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
 CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
+SEARCH = 1e-7  # error of the search for the depth in 99 % of cases
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
@@ -231,8 +232,7 @@ def _difference(one: Steady, other: Steady) -> FloatArray:
     with np.errstate(all="ignore"):
         change = np.abs(one.drag / other.drag - 1)
     # where a coarse grid has no solution nothing is known
-    unknown: FloatArray = np.where(np.isnan(change) & (other.status == 0), np.inf, change)
-    return unknown
+    return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
 
 
 def _canonical(number: FloatArray) -> FloatArray:

@@ -54,11 +54,13 @@ def measured_line(
     Parameters
     ----------
     position, height : array_like, shape (points,)
-        x and z, m; x ascending or descending, not necessarily uniform. The samples are one period: L = points * spacing.
+        x and z, m; x ascending or descending, not necessarily uniform. The samples are one period: L = points *
+        spacing.
     detrend : {"none", "mean", "line", "parabola"}
         Polynomial subtracted, fitted by least squares.
     taper : float
-        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so that the
+        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so
+        that the
         line closes without a step; 0 to 1.
     shortest, longest : float
         Wavelengths, m, outside of which the spectrum is cut off; 0 keeps that end.
@@ -157,9 +159,10 @@ def rms_slope(height: FloatArray, length: float) -> float:
 def power_spectrum(height: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
     """Return wavenumbers q, rad/m, and the one-dimensional spectral density C(q), m^3, of a periodic line.
 
-    C(q) = L |h_q|^2 for q > 0 with h_q the complex Fourier amplitude, so that rms^2 = sum over positive and negative q of
+    C(q) = L |h_q|^2 for q > 0 with h_q the complex Fourier amplitude, so that rms^2 = sum over positive and negative
+    q of
     C / L. The mean is left out.
     """
     waves = np.fft.rfft(height) / height.size
-    q = 2 * np.pi * np.arange(1, waves.size) / length
+    q = np.asarray(2 * np.pi * np.arange(1, waves.size) / length, dtype=np.float64)
     return q, np.asarray(length * np.abs(waves[1:]) ** 2, dtype=np.float64)

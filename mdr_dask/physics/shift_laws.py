@@ -31,7 +31,8 @@ class ShiftLaw:
     residual : float
         Root mean square distance of the factors from the law, decades.
     scatter : float
-        Standard deviation about the law beyond the errors of the factors, decades; 0 where the errors explain the distance.
+        Standard deviation about the law beyond the errors of the factors, decades; 0 where the errors explain the
+        distance.
     """
 
     name: str
@@ -75,7 +76,9 @@ def fit_arrhenius(
 
 
 def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, reference: float) -> ShiftLaw:
-    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; see `fit_power`. Temperatures in K or in degrees Celsius."""
+    """Fit ``log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref)``; see `fit_power`. Temperatures in K or in degrees
+    Celsius.
+    """
     distance = temperature - reference
     lowest = float(max(0.0, -distance.min()))
 
@@ -116,10 +119,13 @@ def _fit(
 
     def solve(scatter: float) -> tuple[FloatArray, FloatArray, float]:
         whiten = vectors.T / np.sqrt(np.maximum(values, 1e-12 * values.max()) + scatter**2)[:, None]
-        found = least_squares(
-            lambda c: whiten @ (law(c * scale) - factors)[known], np.array(guess) / scale, x_scale="jac", method="lm"
-        )
-        spread = np.linalg.pinv(found.jac.T @ found.jac)
+
+        def misfit(relative: FloatArray) -> FloatArray:
+            return np.asarray(whiten @ (law(relative * scale) - factors)[known], dtype=np.float64)
+
+        found = least_squares(misfit, np.array(guess) / scale, x_scale="jac", method="lm")
+        jacobian = np.asarray(found.jac, dtype=np.float64)
+        spread = np.linalg.pinv(jacobian.T @ jacobian)
         return found.x * scale, np.sqrt(np.diag(spread)) * scale, float(2 * found.cost / freedom)
 
     scatter = _scatter(lambda width: solve(width)[2], float(np.std(factors)))

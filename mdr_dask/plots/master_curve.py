@@ -1,4 +1,6 @@
-"""Figures of a master curve: the curves as measured, the merged curve, the shift factors (thesis figures 3.17 to 3.19)."""
+"""Figures of a master curve: the curves as measured, the merged curve, the shift factors (thesis figures 3.17 to
+3.19).
+"""
 
 from __future__ import annotations
 

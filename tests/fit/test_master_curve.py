@@ -47,8 +47,23 @@ def test_store_gives_the_exponent_it_was_made_with():
     assert result.sizes["point"] == 15 * 7
 
 
+def test_friction_of_a_smooth_body_is_taken_off():
+    rough, smooth = store(), store(noise=0.0)
+    bulk = 0.1 * smooth["velocity"] ** 0.3 * xr.ones_like(smooth["friction_coefficient"])
+    rough["friction_coefficient"] = rough["friction_coefficient"] + bulk
+    smooth["friction_coefficient"] = bulk
+    series = {
+        "rough": rough.assign_coords(rms_roughness=1e-5),
+        "smooth": smooth.assign_coords(rms_roughness=0.0),
+    }
+    (fit,) = FITS
+    assert float(fit.compute(series)["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    alone = fit.compute({"rough": series["rough"]})
+    assert abs(float(alone["power_exponent"]) - EXPONENT) > 0.02
+
+
 def test_store_without_the_axes_is_refused():
-    with pytest.raises(DataError, match="varies normal_force and velocity"):
+    with pytest.raises(DataError, match="roughness that varies normal_force and velocity"):
         FITS[0].compute({"": store().isel(velocity=0)})
 
 
@@ -98,7 +113,8 @@ def test_bootstrap_is_kept():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "expected a row of names and rows of numbers, got 0 rows"),
+        ("", "expected rows of numbers, got none"),
+        ("a,b\n", "expected rows of numbers, got only names"),
         ("1,2\n3,4\n", "expected names of columns, got numbers"),
         ("a,b\n1,2\n3,x\n", "table.csv:3: expected 2 numbers"),
         ("a,b\n1,2\n3\n", "table.csv:3: expected 2 numbers"),

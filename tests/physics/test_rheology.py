@@ -95,7 +95,7 @@ def test_power_law_series_keeps_its_promise(exponent):
 
 
 def test_power_law_series_refuses_what_is_no_power_law():
-    with pytest.raises(ValueError, match="between 0 and 1, got 1.0"):
+    with pytest.raises(ValueError, match=r"between 0 and 1, got 1.0"):
         power_law_series(1.0, 1.0, 1.0, 1.0, 1.0, 10.0)
     with pytest.raises(ValueError, match="positive and not empty, got"):
         power_law_series(1.0, 1.0, 1.0, 0.5, 10.0, 1.0)
@@ -124,7 +124,7 @@ def test_temperature_laws_agree_with_their_definitions():
     assert wlf_factor(300.0, 300.0, 17.4, 51.6) == 1
     assert np.log10(wlf_factor(310.0, 300.0, 17.4, 51.6)) == pytest.approx(-17.4 * 10 / 61.6, rel=ROUNDING)
     assert np.log(arrhenius_factor(350.0, 300.0, 8.31446261815324e4)) == pytest.approx(1e4 * (1 / 350 - 1 / 300))
-    with pytest.raises(ValueError, match="ends at 248.4 K"):
+    with pytest.raises(ValueError, match=r"ends at 248.4 K"):
         wlf_factor(248.0, 300.0, 17.4, 51.6)
     with pytest.raises(ValueError, match="absolute temperatures must be positive"):
         arrhenius_factor(0.0, 300.0, 1e4)

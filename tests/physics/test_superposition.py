@@ -46,7 +46,8 @@ def test_vertical_factors_are_found_too():
 
 
 def test_bars_of_68_percent_cover_the_truth_60_to_76_percent_of_the_time():
-    """40 families of ten curves, seeds 0..39: 360 factors; their errors are correlated, so the band is the issue's own."""
+    """40 families of ten curves, seeds 0..39: 360 factors; their errors are correlated, so the band is the issue's
+    own."""
     covered = []
     for seed in range(40):
         groups, curves, shifts, _ = family(seed)
@@ -150,7 +151,8 @@ def test_laws_refuse_groups_they_do_not_know():
 def test_relaxation_data_agree_with_their_authors():
     """The authors shift neighbours pair by pair and take 3 C as reference; here all curves are fitted at once.
 
-    Above -15 C both agree within 0.25 of 21 decades. Below, neighbours share a tenth of a decade of modulus that scatters by
+    Above -15 C both agree within 0.25 of 21 decades. Below, neighbours share a tenth of a decade of modulus that
+    scatters by
     as much, and every pair's difference adds to the next: 0.7 decades at -50 C.
     """
     table = np.array(read("time_user_raw.csv"))

@@ -95,7 +95,8 @@ def test_friction_falls_with_velocity_without_a_floor():
 
 
 def test_energy_lost_is_the_work_of_friction():
-    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight: here by time stepping the exact state."""
+    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight: here by time stepping the exact
+    state."""
     solid, velocity = standard_solid(1e7, 4e7, 1e-2), 0.05
     height, spacing, _ = line(64)
     state = steady_viscoelastic_sliding(height, spacing, solid, velocity, 0.3)

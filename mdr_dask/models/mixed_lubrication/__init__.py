@@ -159,8 +159,8 @@ def seconds(block: Block[MixedLubrication]) -> float:
     """Estimate the time of a block from points, cases and creep."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    lines = 0.08 * float(millions.max())
-    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.15, 0.004))))
+    lines = 0.06 * float(millions.max())
+    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
 
 
 MODEL = Model(
