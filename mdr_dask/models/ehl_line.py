@@ -75,7 +75,9 @@ OUTPUTS = (
     Output("discretisation_error", "1", "estimated relative error of the worse of the two films"),
     Output("central_film_thickness", "m", "central film thickness h_c (needs radius)", default=False),
     Output("minimum_film_thickness", "m", "minimum film thickness h_min (needs radius)", default=False),
-    Output("film", "1", "film thickness over the radius h/R", ("position",), default=False),
+    Output(
+        "film", "1", "film thickness over the radius h/R; where the film is torn, the gap", ("position",), default=False
+    ),
     Output("pressure", "Pa", "pressure in the film", ("position",), default=False),
     Output("formula_central_film", "1", "h_c/R by Pan and Hamrock", default=False),
     Output("formula_minimum_film", "1", "h_min/R by Pan and Hamrock", default=False),
@@ -159,8 +161,7 @@ def _case_outputs(
     }
     position = _positions(parameters)
     if "film" in wanted:
-        inside = (position >= solution.nodes[0]) & (position <= solution.nodes[-1])
-        values["film"] = np.where(inside, solution.film_at(position) * height, np.nan)
+        values["film"] = np.where(position >= solution.nodes[0], solution.film_at(position) * height, np.nan)
     if "pressure" in wanted:
         values["pressure"] = solution.pressure_at(position) * p0
     if {"traction_coefficient", "traction_error", "rolling_coefficient"} & set(wanted):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numba import njit
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
@@ -136,16 +137,33 @@ def _add_panel(
 def interpolate(panels: Panels, values: FloatArray, places: FloatArray) -> FloatArray:
     """Return the piecewise polynomial through `values`, shape (n,), at places in [0, 1), and zero beyond."""
     result = np.zeros_like(places)
-    panel = np.clip(np.searchsorted(panels.edges, places, side="right") - 1, 0, panels.edges.size - 2)
-    inside = places < 1.0
-    shift = np.arange(-1, panels.order)
-    for first, chosen in ((True, inside & (panel == 0)), (False, inside & (panel > 0))):
-        offset = shift[1:] if first else shift
-        members = panel[chosen, None] * panels.order + offset
-        weight = panels.barycentric[panel[chosen]][:, 1 if first else 0 :]
-        distance = places[chosen, None] - panels.nodes[members]
-        hit = distance == 0.0
-        share = weight / np.where(hit, 1.0, distance)
-        share = np.where(hit.any(axis=1, keepdims=True), hit, share)
-        result[chosen] = np.sum(share * values[members], axis=1) / np.sum(share, axis=1)
+    _interpolate(panels.edges, panels.nodes, panels.barycentric, panels.order, values, places, result)
     return result
+
+
+@njit(nogil=True, cache=True)
+def _interpolate(
+    edges: FloatArray,
+    nodes: FloatArray,
+    barycentric: FloatArray,
+    order: int,
+    values: FloatArray,
+    places: FloatArray,
+    result: FloatArray,
+) -> None:
+    for number in range(places.size):
+        place = places[number]
+        if place >= 1.0:
+            continue
+        panel = min(max(np.searchsorted(edges, place, side="right") - 1, 0), edges.size - 2)
+        above, below = 0.0, 0.0
+        for member in range(0 if panel > 0 else 1, order + 1):
+            node = panel * order + member - 1
+            distance = place - nodes[node]
+            if distance == 0.0:
+                above, below = values[node], 1.0
+                break
+            share = barycentric[panel, member] / distance
+            above += share * values[node]
+            below += share
+        result[number] = above / below

@@ -361,16 +361,20 @@ def gathered_at(problem: Problem, moment: Moment, radius: FloatArray) -> FloatAr
 def _newton(
     problem: Problem, guess: FloatArray, theta: float, known: Callable[[float], FloatArray]
 ) -> FloatArray | None:
-    """Solve one step; columns of the edge and the depth are differences."""
+    """Solve one step; columns of the edge and the depth are differences, renewed once."""
     nodes = problem.panels.nodes.size
     unknowns = guess.copy()
-    for _ in range(_MOST_ITERATIONS):
+    columns = np.empty((unknowns.size, unknowns.size - nodes + 1))
+    for iteration in range(_MOST_ITERATIONS):
         residual = problem.residual(unknowns, theta, known(unknowns[nodes - 1]))
         matrix = problem.jacobian(unknowns, theta)
         for column in range(nodes - 1, unknowns.size):
-            moved = unknowns.copy()
-            moved[column] += 1e-7
-            matrix[:, column] = (problem.residual(moved, theta, known(moved[nodes - 1])) - residual) / 1e-7
+            if iteration < 3:
+                moved = unknowns.copy()
+                moved[column] += 1e-7
+                shifted = problem.residual(moved, theta, known(moved[nodes - 1]))
+                columns[:, column - nodes + 1] = (shifted - residual) / 1e-7
+            matrix[:, column] = columns[:, column - nodes + 1]
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
             return None
         change = -residual

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
     from mdr_dask.physics.film import HertzLine
@@ -61,8 +62,8 @@ class MixedLubrication(Parameters):
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m", "wavelength below which there is no roughness; auto is ten spacings of the points", default="auto"
     )
-    profile_1: NamedFile | None = Field(default=None, description="measured line of roller 1: two columns x, z in m")
-    profile_2: NamedFile | None = Field(default=None, description="measured line of roller 2: two columns x, z in m")
+    profile_1: ProfileFile | None = Field(default=None, description="measured line of roller 1")
+    profile_2: ProfileFile | None = Field(default=None, description="measured line of roller 2")
     layer_thickness: float = quantity("m", "critical thickness h_c of the boundary layer", default=5e-9, gt=0)
     layer_shear_strength: float = quantity("Pa", "limiting shear stress tau0 of the boundary layer", default=1e6, ge=0)
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
