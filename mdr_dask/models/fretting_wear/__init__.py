@@ -133,7 +133,7 @@ def _seconds(block: Block[FrettingWear]) -> float:
 
 OUTPUTS = (
     Output("contact_radius", "m", "radius of the wear scar (a0 = 1 in a dimensionless campaign)"),
-    Output("wear_volume", "m3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)"),
+    Output("wear_volume", "m^3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)"),
     Output("normal_force", "N", "normal force (E* d0 a0 = 1 in a dimensionless campaign)"),
     Output("stick_border", "m", "stick radius (a0 = 1 in a dimensionless campaign)", default=False),
     Output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)", default=False),
