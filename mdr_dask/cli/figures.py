@@ -24,7 +24,7 @@ def figures(context: click.Context, /, campaigns: tuple[Path, ...], output: str,
     """
     from mdr_dask.campaign import load
 
-    codes = []
+    codes: list[int] = []
     for path in campaigns:
         codes.append(context.invoke(run, campaign=path, quiet=quiet))
         context.invoke(plot, store=load(path).store, everything=True, output=Path(output), suffix=suffix)
