@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from mdr_dask.store import Place
 from mdr_dask.task import Outcome, Work, run_block, versions, write_off
 
 if TYPE_CHECKING:
+    from dask.delayed import Delayed
     from distributed import Client, Future
 
 #: Blocks handed to the threads at a time: the graph never grows with the study.
@@ -309,7 +311,10 @@ def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], thre
         if isinstance(value, Outcome):
             account(value)
 
-    task = dask.delayed(run_block, pure=False, traverse=False)
+    def task(work: Work) -> Delayed:
+        """Make a task that Dask does not look into for tasks to wait for, which takes longer than all the rest."""
+        return dask.delayed(partial(run_block, work), name=f"block-{uuid.uuid4().hex}", traverse=False)()
+
     remaining = iter(works)
     with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
         while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
