@@ -68,15 +68,15 @@ def two_series(campaign, positions=(1.0, 2.0)):
 
 
 def adaptive(toy):
-    axes = toy.axis("position", [1.0, 2.0]), toy.axis("noise", [0.01, 0.2])
-    return toy.campaign(*axes, realisations=Replication(3, 9, {"height": Tolerance(relative=0.05)}))
+    axis = toy.axis("noise", [0.01, 0.4])
+    return toy.campaign(axis, realisations=Replication(3, 9, {"height": Tolerance(relative=0.05)}))
 
 
 #: Steps of a study by name, each a list of campaigns run one after the other, the last one with faults.
 SCENES = {
     "first layout and blocks": lambda toy: [small(toy)],
     "growth of axes and realisations": lambda toy: [small(toy), grown(toy)],
-    "growth of series": lambda toy: [two_series(small(toy)), two_series(small(toy), (1.0, 1.5, 2.0))],
+    "growth of series": lambda toy: [two_series(small(toy), (1.0,)), two_series(small(toy), (1.0, 1.5))],
     "two outputs": lambda toy: [small(toy, outputs=("height", "trace"))],
     "rounds": lambda toy: [adaptive(toy)],
     "retry": lambda toy: [small(toy, fail_above=2.0), small(toy, fail_above=2.0)],
@@ -131,5 +131,4 @@ def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_pa
         assert not list(tmp_path.glob(".*.runner"))
         run(last, url, **options)
         assert digests(url) == expected
-        assert run(last, url).done == 0
         shutil.rmtree(url)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import warnings
+from functools import partial
 from pathlib import Path
 
 import xarray as xr
 
 from mdr_dask.store.files import bytes_of, series_names
+
+#: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
+LAZY_BYTES = 2**30
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
@@ -22,7 +26,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by series name (``""`` for a study without series), lazily loaded, numeric axes in ascending order.
+        Every group by series name (``""`` for a study without series), numeric axes in ascending order. Arrays are
+        loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays, reduced chunk by chunk.
 
     Raises
     ------
@@ -33,7 +38,10 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
-    dataset: xr.Dataset = xr.open_zarr(bytes_of(url), group=series or None, chunks=None, consolidated=True)
+    opened = partial(xr.open_zarr, bytes_of(url), group=series or None, consolidated=True)
+    dataset: xr.Dataset = opened(chunks=None)
+    if dataset.nbytes > LAZY_BYTES:
+        dataset = opened(chunks={})
     for dim in dataset.dims:
         if (
             dim in dataset.indexes
