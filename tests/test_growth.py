@@ -191,6 +191,12 @@ POSITIONS = (1.0, 2.0, 3.0, 4.0)
 NOISES = (0.01, 0.2, 0.4)
 
 
+SOME = {
+    "positions": st.lists(st.sampled_from(POSITIONS), min_size=1, unique=True),
+    "noises": st.lists(st.sampled_from(NOISES), min_size=1, unique=True),
+}
+
+
 class StoreAgainstDict(RuleBasedStateMachine):
     """Any sequence of runs, of whatever is asked for, with interruptions, against what a dict would hold."""
 
@@ -224,23 +230,17 @@ class StoreAgainstDict(RuleBasedStateMachine):
     def ask(self, positions, noises, count) -> set[tuple[float, float, int]]:
         return {(p, n, r) for p in positions for n in noises for r in range(count)}
 
-    some = {
-        "positions": st.lists(st.sampled_from(POSITIONS), min_size=1, unique=True),
-        "noises": st.lists(st.sampled_from(NOISES), min_size=1, unique=True),
-    }
-
-    @rule(**some, count=st.integers(1, 5), retry=st.booleans())
+    @rule(**SOME, count=st.integers(1, 5), retry=st.booleans())
     def finish(self, positions, noises, count, retry) -> None:
         asked = self.ask(positions, noises, count)
         progress = run(self.campaign(positions, noises, Replication(count, count, {})), self.url, retry_failed=retry)
         failing = {cell for cell in asked if cell[0] > 3.5}
         assert progress.total == len(asked)
-        assert self.expected & asked - failing <= asked
         assert progress.kept >= len(self.expected & asked - failing)
         self.expected |= asked
         self.possible |= asked
 
-    @rule(**some, count=st.integers(2, 5), blocks=st.integers(1, 4))
+    @rule(**SOME, count=st.integers(2, 5), blocks=st.integers(1, 4))
     def interrupt(self, positions, noises, count, blocks) -> None:
         def stop(progress: Progress) -> None:
             if progress.blocks >= blocks:
@@ -255,7 +255,7 @@ class StoreAgainstDict(RuleBasedStateMachine):
             self.expected |= self.ask(positions, noises, count)
             self.possible |= self.expected
 
-    @rule(**some, tolerance=st.sampled_from([0.02, 0.1, 0.3]))
+    @rule(**SOME, tolerance=st.sampled_from([0.02, 0.1, 0.3]))
     def adapt(self, positions, noises, tolerance) -> None:
         until = {"height": Tolerance(relative=tolerance)}
         run(self.campaign(positions, noises, Replication(2, 6, until)), self.url)
