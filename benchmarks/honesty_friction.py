@@ -53,5 +53,5 @@ if __name__ == "__main__":
     for target in (0.05, 0.01, 0.002):
         share, over = honesty(number, target)
         print(
-            f"{number} cases at {target:g}: {share:.1%} below their estimate, which is {over:.1f} times too large (median)"
+            f"{number} cases at {target:g}: {share:.1%} below their estimate, {over:.1f} times too large in the median"
         )

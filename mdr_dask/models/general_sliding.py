@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 COARSEST, FINEST = 4, 64  # points for every Nyquist point that `auto` begins and ends with
 CELLS = 4  # the solver compares grids of every, every second and every fourth point
-NODE_ARM = 1.5e-8  # seconds for every point and arm of a solve
-SOLVE = 3e-3  # seconds for the recovery modes of three grids
+NODE_ARM, NODE_LINE = 1e-8, 1e-7  # seconds for every point and arm of a solve, and for every point of a line
+SOLVE = 3e-4  # seconds for the recovery modes of three grids
 
 
 @dataclass(frozen=True)
@@ -168,4 +168,4 @@ def seconds(case: Case) -> float:
     """Estimate the time of one solve."""
     arms = len(case.material.prony.times) + 1 if case.material.prony else 20 if case.material.power_law else 3
     grid = 2 * COARSEST if case.oversampling == "auto" else int(case.oversampling)
-    return SOLVE + NODE_ARM * arms * case.points * grid
+    return SOLVE + (NODE_ARM * arms + NODE_LINE) * case.points * grid

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+
+from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,3 +102,19 @@ def _factors(axes: Axes, curve: xr.Dataset) -> None:
     axes.set_ylabel(f"shift of log10 {str(curve.attrs['abscissa']).replace('_', ' ')} (decades)")
     axes.set_title("shift factors")
     axes.legend(fontsize="small")
+
+
+def _of_store(series: Mapping[str, xr.Dataset]) -> Figure:
+    from mdr_dask.fit.master_curve import friction_of_roughness, master_curve
+
+    return draw_master_curve(master_curve(friction_of_roughness(series)))
+
+
+PLOTS = (
+    Plot(
+        "master_curve",
+        ("sliding_friction",),
+        "coefficient of friction over force at each velocity, merged, and shift factors (figures 3.17 to 3.19)",
+        _of_store,
+    ),
+)

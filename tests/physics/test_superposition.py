@@ -151,9 +151,8 @@ def test_laws_refuse_groups_they_do_not_know():
 def test_relaxation_data_agree_with_their_authors():
     """The authors shift neighbours pair by pair and take 3 C as reference; here all curves are fitted at once.
 
-    Above -15 C both agree within 0.25 of 21 decades. Below, neighbours share a tenth of a decade of modulus that
-    scatters by
-    as much, and every pair's difference adds to the next: 0.7 decades at -50 C.
+    Above -15 C both agree within 0.25 of 21 decades. Below, neighbours share hardly any range of modulus beyond its
+    scatter, and every pair's difference adds to the next: 0.7 decades at -50 C.
     """
     table = np.array(read("time_user_raw.csv"))
     authors = np.array(read("time_user_raw__shift_factors.csv"))[::-1]
