@@ -516,6 +516,10 @@ def solve_sliding(
     imbalance, work = np.empty(arms), np.empty((10, max(arms, 1)))
     change, row, scratch = np.empty((arms, columns)), np.empty(columns), np.empty((2, arms, columns))
     matrix, residual = np.empty((columns, columns)), np.empty(columns)
+    steepest = 0.0
+    for i in range(nodes - 1):
+        steepest = max(steepest, abs(profile[i + 1] - profile[i]))
+    rounding = 1e-15 * nodes * steepest  # of a place on the line, as a height
     for sweeps in range(1, 81):
         for i in range(nodes):
             penetration[i] = unknown[arms] + profile[i]
@@ -564,6 +568,6 @@ def solve_sliding(
             unknown[unknown.size - columns + j] += residual[j]
         if not np.isfinite(largest):
             return False, sweeps, True
-        if largest <= tolerance * unknown[arms]:
+        if largest <= tolerance * unknown[arms] + rounding:
             return True, sweeps, periodic or end == CLOSED
     return False, 80, True
