@@ -26,7 +26,7 @@ but for contacts far shorter than a cell, whose ends are known to 1e-13 of the l
 """
 
 RESOLVED = 0.5
-"""Largest relative change of the friction between two grids that is extrapolated."""
+"""Largest relative change of a number between two grids that is extrapolated."""
 
 GRIDS = (1, 2, 4)
 """Every point, every second and every fourth: extrapolation and its error estimate."""
@@ -103,7 +103,7 @@ def steady_viscoelastic_sliding(
     -----
     The line is straight between points and swept exactly; the result is extrapolated from the same line with every
     second
-    point. The answer depends on nothing but the arguments: each solve starts from the statics.
+    point. The answer depends on nothing but the arguments: the coarsest grid starts from the statics.
     """
     heights = np.asarray(height, dtype=np.float64)
     _check(heights, spacing, velocity, normal_force, periodic)
@@ -114,7 +114,10 @@ def steady_viscoelastic_sliding(
     for step in reversed(GRIDS):
         start = solutions[-1].start if solutions else None
         load = _Load(solid, velocity, normal_force, spacing, SHORTEST_REACH * spacing / velocity)
-        solutions.append(_solve(below[::step], step, load, periodic, start))
+        found = _solve(below[::step], step, load, periodic, start)
+        if found.status == NOT_CONVERGED and start is not None:
+            found = _solve(below[::step], step, load, periodic, None)
+        solutions.append(found)
     mean = float(heights.mean()) if periodic else 0.0
     return _extrapolated(solutions, mean - float(heights[top]))
 
@@ -176,12 +179,11 @@ def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady
         return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, status, fine.sweeps)
     correction = (fine.values - coarse.values) / 3
     before = coarse.values + (coarse.values - coarsest.values) / 3
+    resolved = 3 * np.abs(correction) <= RESOLVED * np.abs(fine.values)
+    values = np.where(resolved, fine.values + correction, fine.values)
     change = 3 * float(abs(correction[0]))
-    if change <= RESOLVED * abs(fine.values[0]):
-        values = fine.values + correction
+    if resolved[0]:
         change = max(float(abs(values[0] - before[0])), FIRST_ORDER_SHARE * change)
-    else:
-        values = fine.values
     friction, depth, fraction, slope = (float(value) for value in values)
     error = change / abs(friction) if friction else change
     fraction = min(max(fraction, 0.0), 1.0)

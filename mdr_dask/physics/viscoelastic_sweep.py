@@ -564,7 +564,8 @@ def solve_sliding(
             return False, sweeps, True
         largest = 0.0
         for j in range(columns):
-            largest = max(largest, abs(residual[j]))
+            weight = min(1.0, moduli[j]) if j < columns - 1 else 1.0  # a soft arm cannot matter
+            largest = max(largest, weight * abs(residual[j]))
             unknown[unknown.size - columns + j] += residual[j]
         if not np.isfinite(largest):
             return False, sweeps, True
