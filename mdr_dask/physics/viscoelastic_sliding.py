@@ -21,7 +21,8 @@ SHORTEST_REACH = 1e-9
 size."""
 
 BALANCE = 1e-3
-"""Largest relative difference between the load carried and the load wanted; what there is counts as error. It is rounding
+"""Largest relative difference between the load carried and the load wanted; what there is counts as error. It is
+rounding
 but for contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
 """
 

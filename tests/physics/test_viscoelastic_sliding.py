@@ -140,7 +140,7 @@ def test_arms_slower_than_anything_share_one_limit():
 
 
 def test_error_estimate_covers_the_true_error():
-    """Sixty random cases on coarse grids: at least 90 % within the estimate (measured 96.8 % of 250)."""
+    """Sixty random cases on coarse grids: at least 90 % within the estimate (measured 96 % of 250)."""
     random, within = np.random.default_rng(5), []
     for realisation in range(60):
         arms = random.integers(0, 5)
