@@ -17,13 +17,14 @@ TOLERANCE = 1e-11
 """Last step of Newton's method, relative to the depth: far below any discretisation error, above rounding."""
 
 SHORTEST_REACH = 1e-9
-"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it: an error of that
-size."""
+"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it.
+
+The error is of that relative size.
+"""
 
 BALANCE = 1e-3
-"""Largest relative difference between the load carried and the load wanted; what there is counts as error. It is
-rounding
-but for contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
+"""Largest relative difference between the load carried and the load wanted, which counts as error. It is rounding but for
+contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
 """
 
 RESOLVED = 0.5
