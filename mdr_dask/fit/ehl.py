@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -23,6 +23,23 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
         np.float64
     )
     return np.asarray(np.log(table[:, np.isfinite(table).all(axis=0) & (table > 0).all(axis=0)]))
+
+
+def _maps(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
+    """Yield a map of films for each series and each value of what else varies there (the law, the inlet)."""
+    for name, dataset in groups.items():
+        outputs = [output for output in _FILMS if output in dataset]
+        if not outputs:
+            continue
+        varied = {str(dim) for group in groups_of(dataset.coords.get) for dim in getattr(group, "dims", ())}
+        others = [str(dim) for dim in dataset[outputs[0]].dims if dim not in varied | {"realisation"}]
+        for index in np.ndindex(*(dataset.sizes[other] for other in others)):
+            part = dataset[outputs].isel(dict(zip(others, index, strict=True)))
+            values = [
+                f"{other}={part[other].item() if other in part.coords else i}"
+                for other, i in zip(others, index, strict=True)
+            ]
+            yield " ".join([name, *values]).strip(), part
 
 
 def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -48,6 +65,8 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
 def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Fit ``h/R = factor W^load U^speed G^material`` to the films of every series that varies W, U or G.
 
+    Whatever else varies in a series (the law of the viscosity, the inlet) makes a map of its own for each value.
+
     Parameters
     ----------
     groups : mapping of str to Dataset
@@ -67,9 +86,7 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """
     results: dict[str, dict[str, float]] = {}
     problem = "expected a series with central_film or minimum_film over W, U or G, got none"
-    for name, dataset in groups.items():
-        if "inlet" in dataset.dims:
-            continue  # starved films follow another law
+    for name, dataset in _maps(groups):
         constants: dict[str, float] = {}
         try:
             for output in _FILMS.keys() & set(dataset.data_vars):
@@ -77,8 +94,7 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
         except FitError as error:
             problem = str(error)
             continue
-        if constants:
-            results[name] = constants
+        results[name] = constants
     if not results:
         raise FitError(problem)
     variables = sorted({key for constants in results.values() for key in constants})

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from mdr_dask.models.base import Block, Coordinate, FloatArray, Model, Output, Parameters, Result, Status, quantity
 
@@ -38,13 +38,13 @@ class EhlLineParameters(Parameters):
     radius: float | None = quantity("m", "reduced radius of curvature R", gt=0, default=None)
     viscosity: float | None = quantity("Pa*s", "viscosity at ambient pressure eta0", gt=6.4e-5, default=None)
     contact_modulus: float = quantity("Pa", "contact modulus E*", gt=0, default=STEEL)
-    viscosity_law: Literal["barus", "roelands"] = "barus"
-    compressible: bool = True
+    viscosity_law: Literal["barus", "roelands"] = Field("barus", description="viscosity over pressure")
+    compressible: bool = Field(True, description="whether the density follows the law of Dowson and Higginson")
     inlet: float | None = quantity(
         "1", "where the oil begins, over the half width (negative); fully flooded if not given", lt=0, default=None
     )
     slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u", ge=0, default=0.0)
-    shear_law: Literal["newtonian", "eyring"] = "newtonian"
+    shear_law: Literal["newtonian", "eyring"] = Field("newtonian", description="shear stress over shear rate")
     eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", gt=0, default=5e6)
     profile_start: float = quantity("1", "first position of film and pressure, over the half width", default=-4.0)
     profile_end: float = quantity("1", "last position of film and pressure, over the half width", default=2.0)

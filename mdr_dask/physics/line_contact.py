@@ -37,6 +37,8 @@ _WHY = {
     SINGULAR: "the Newton equations became singular",
     FILM_COLLAPSED: "the Newton iteration would have closed the film",
 }
+#: Least ratio of successive changes that an error estimate believes in.
+_SLOWEST = 1.2
 #: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
 _SPIKE = 0.01
 #: Ways to the first solution, in this order: factor on the expected film, its upper limit over the square of the
@@ -335,12 +337,15 @@ def extrapolate(values: FloatArray) -> tuple[float, float]:
     Returns
     -------
     limit, error : float
-        Richardson's limit from the last two grids; its change against the limit from the two grids before, and never
-        below a fiftieth of the correction to the finest value.
+        Richardson's limit from the last two grids; its change against the limit from the two grids before, more where
+        the values change slower than to first order (a spike at the very place), and never below a fiftieth of the
+        correction to the finest value.
     """
-    coarse, middle, fine = values[-3:]
+    coarse, middle, fine = (float(value) for value in values[-3:])
     limit, earlier = (4 * fine - middle) / 3, (4 * middle - coarse) / 3
-    return float(limit), float(max(abs(limit - earlier), abs(limit - fine) / 50))
+    change = abs(fine - middle)
+    ratio = max(_SLOWEST, abs(middle - coarse) / change) if change > 0 else np.inf
+    return limit, max(abs(limit - earlier) * max(1.0, 1 / (ratio - 1)), abs(limit - fine) / 50)
 
 
 def _failed(case: LineContact, status: int, steps: int, nodes: int) -> LineSolution:

@@ -45,7 +45,7 @@ def exact(profile: Profile, stick_radius: float, cycles: Sequence[float], tolera
     cycles : sequence of float
         N >= 0, in units of N0; any order.
     tolerance : float
-        Error of f wanted, in d0.
+        Error of f wanted, in eta d0, the scale of what can wear.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], tolerance: flo
     panels = _panels(tolerance, c)
     reach = limit_radius(profile, c)
     problem = evolution.partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
-    history = evolution.march(problem, max(wanted, default=0.0), 0.2 * tolerance)
+    history = evolution.march(problem, max(wanted, default=0.0), 0.2 * tolerance * problem.eta)
     energy = evolution.integral_along(history, [problem.wear_rate(m.unknowns) for m in history])
     result = {}
     for time in (0.0, *wanted):

@@ -48,6 +48,14 @@ def test_what_is_not_varied_has_no_exponent() -> None:
     assert float(fit["central_speed"][0]) == pytest.approx(0.692)
 
 
+def test_other_axes_make_maps_of_their_own() -> None:
+    one = power_law(*GRID)
+    both = xr.concat([one, 2 * one], dim="viscosity_law").assign_coords(viscosity_law=["barus", "roelands"])
+    fit = film_exponents({"map": both})
+    assert fit["series"].values.tolist() == ["map viscosity_law=barus", "map viscosity_law=roelands"]
+    np.testing.assert_allclose(fit["central_factor"], [2.922, 2 * 2.922], rtol=1e-9)
+
+
 def test_failed_cases_are_left_out() -> None:
     data = power_law(*GRID)
     data["central_film"][0, 0, 0] = np.nan

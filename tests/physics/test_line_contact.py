@@ -122,6 +122,12 @@ def test_extrapolation_is_exact_for_a_square_and_says_so_otherwise() -> None:
     assert abs(limit - 7) <= error
 
 
+@pytest.mark.parametrize("order", [0.5, 0.8, 1.0, 1.5, 3.0])
+def test_error_covers_other_orders(order: float) -> None:
+    limit, error = extrapolate(7 + 0.5 * np.array([4.0, 2.0, 1.0]) ** order)
+    assert abs(limit - 7) <= error * (1 + 1e-12)
+
+
 @pytest.mark.parametrize("index", range(6))
 def test_error_estimate_covers_the_error(index: int) -> None:
     W, U, G = (np.exp(np.random.default_rng(index).uniform(np.log(a), np.log(b))) for a, b in BOX)

@@ -49,3 +49,19 @@ def test_dense_solver():
     assert solve_in_place(matrix.copy(), solution)
     np.testing.assert_allclose(matrix @ solution, right, atol=1e-11)
     assert not solve_in_place(np.zeros((2, 2)), np.ones(2))
+
+
+def test_slowest_modes_of_a_flat_punch_that_wears_under_constant_force():
+    """The pressure of a punch tends to F / (pi a^2); its slowest mode decays as exp(-2.0606 s)."""
+    from scipy.linalg import eigvals
+
+    panels = graded_panels(4, 12, 6)
+    size = panels.nodes.size
+    force = np.pi / 2 * panels.full[-1] * np.sqrt(1 - panels.nodes)
+    rates, shape = np.zeros((size, size)), np.zeros((size, size))
+    rates[:-1, :-1], rates[:-1, -1], rates[-1, :-1] = -panels.outer[:-1, :-1], -1.0, force[:-1]
+    shape[:-1, :-1] = panels.full[:-1, :-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        modes = eigvals(rates, shape)
+    real = np.sort(modes[np.isfinite(modes) & (np.abs(modes.imag) < 1e-6)].real)
+    assert real[real > 0.1][0] == pytest.approx(2.0606, abs=1e-4)  # digits printed
