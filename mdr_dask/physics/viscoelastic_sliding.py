@@ -23,8 +23,9 @@ The error is of that relative size.
 """
 
 BALANCE = 1e-3
-"""Largest relative difference between the load carried and the load wanted, which counts as error. It is rounding but for
-contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
+"""Largest relative difference between the load carried and the load wanted, which counts as error.
+
+It is rounding but for contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
 """
 
 RESOLVED = 0.5
