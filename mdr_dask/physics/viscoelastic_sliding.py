@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics.rheology import LinearSolid, Recovery, recovery
 from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED, OUTSIDE_LINE
-from mdr_dask.physics.viscoelastic_sweep import solve_sliding, static_depth
+from mdr_dask.physics.viscoelastic_newton import solve_sliding, static_depth
 
 FloatArray = NDArray[np.float64]
 
