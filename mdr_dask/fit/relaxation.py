@@ -41,7 +41,7 @@ def widths(time: np.ndarray) -> np.ndarray:
 
 
 def exponential(time: np.ndarray, trace: np.ndarray, weights: np.ndarray) -> tuple[float, float, float]:
-    """Fit one exponential by weighted least squares; the amplitude is eliminated, the rate found on a grid and a parabola.
+    """Fit one exponential by weighted least squares, the rate on a grid and a parabola, the amplitude eliminated.
 
     Returns
     -------

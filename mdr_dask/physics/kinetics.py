@@ -38,9 +38,9 @@ MESSAGES = {
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-6  # of the mean displacement: changes of depth that need no finer steps
-MOMENTS = 20000
+MOMENTS = 3000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
-WIDENINGS = 6
+WIDENINGS = 3
 
 
 class Jump(NamedTuple):

@@ -717,7 +717,7 @@ def march(
         )
         miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
         if miss > 2 * pace.miss or status != 0:
-            if step < 1e-3 * pace.first:
+            if step < 1e-3 * pace.first or (status == 2 and step < 1e-2 * time[now - 1]):
                 return now, max(status, 1)
             step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
             continue
