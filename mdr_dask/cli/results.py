@@ -174,7 +174,7 @@ def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> Non
 
     \b
     mdr-dask fit results/friction_force.zarr
-    mdr-dask fit results/friction_force.zarr zone1 --json
+    mdr-dask fit results/friction_force.zarr zone_one --json
     """
     from mdr_dask import fit as room
     from mdr_dask import store as stores

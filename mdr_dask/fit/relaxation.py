@@ -128,6 +128,8 @@ def relaxation_of(
     dict
         The entries of `RATE_FIELDS`.
     """
+    if not np.all(np.any(others[:, time <= time[min(8, time.size - 1)]] != 0, axis=1)):
+        return dict.fromkeys(RATE_FIELDS, np.nan)
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])
     t, y, weights = time[inside], trace[inside], widths(time[inside])
     rate, amplitude, left = exponential(t, y, weights)

@@ -9,6 +9,9 @@ from mdr_dask.models.base import Model
 
 NAMES: tuple[str, ...] = (
     "sliding_friction",
+    "velocity_jump",
+    "fretting_wear",
+    "ehl_line",
     "mixed_lubrication",
 )
 

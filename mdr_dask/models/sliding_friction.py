@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag
+from pydantic import Field, model_validator
 
+from mdr_dask.models import general_sliding
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.material import Material
+from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
     from mdr_dask.physics.sliding import Scheme, Steady
@@ -21,8 +24,11 @@ IntArray = NDArray[np.intp]
 ACCURACY = 0.01  # where the campaign does not say
 FINEST = 64  # oversampling beyond which `auto` gives up
 SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
+CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
+SEARCH = 1e-7  # error of the search for the depth in 99 % of cases
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 6e-9  # seconds for every node of a line and of a solution
+ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
 
@@ -66,27 +72,13 @@ class Power(Parameters):
         return self.coefficient, self.exponent
 
 
-def _shape_of(value: Any) -> Any:
-    return value.get("shape") if isinstance(value, dict) else getattr(value, "shape", None)
-
-
-Indenter = Annotated[
-    Annotated[Plane, Tag("plane")]
-    | Annotated[Cone, Tag("cone")]
-    | Annotated[Parabola, Tag("parabola")]
-    | Annotated[Power, Tag("power")],
-    Discriminator(
-        _shape_of,
-        custom_error_type="unknown_shape",
-        custom_error_message="expected shape: plane, cone, parabola or power",
-    ),
-]
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
 
 
 class SlidingFriction(Parameters):
-    """A Kelvin body under a load, sliding at constant speed over a self-affine line."""
+    """A viscoelastic body under a load, sliding at constant speed over a rough line."""
 
-    length: float = quantity("m", "length L of the line, and period of its roughness", gt=0)
+    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
@@ -94,13 +86,19 @@ class SlidingFriction(Parameters):
         "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
     )
     hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float = quantity("m", "rms height h of the roughness", ge=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
         "m", "wavelength above which the spectrum is constant", default=None, gt=0
     )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    shear_modulus: float = quantity("Pa", "static shear modulus G of the incompressible Kelvin body", gt=0)
-    relaxation_time: float = quantity("s", "relaxation time tau = eta / G of the Kelvin body", gt=0)
+    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
+    shear_modulus: float | None = quantity(
+        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+    )
+    relaxation_time: float | None = quantity(
+        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+    )
+    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
     normal_force: float = quantity("N", "normal force F_N", gt=0)
     velocity: float = quantity("m/s", "sliding velocity v", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
@@ -108,6 +106,23 @@ class SlidingFriction(Parameters):
         default="hermite",
         description="exact sweep over cubic or straight cells, or the papers' time steps",
     )
+
+    @model_validator(mode="after")
+    def _one_body_and_one_line(self) -> SlidingFriction:
+        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
+        either = self.shear_modulus is not None or self.relaxation_time is not None
+        if (self.material is None and not kelvin) or (self.material is not None and either):
+            raise ValueError("expected shear_modulus with relaxation_time, or material")
+        generated = self.length is not None and self.rms_roughness is not None
+        partly = self.length is not None or self.rms_roughness is not None
+        if (self.profile is None and not generated) or (self.profile is not None and partly):
+            raise ValueError("expected length with rms_roughness, or profile")
+        return self
+
+    @property
+    def is_general(self) -> bool:
+        """Whether it is beyond the Kelvin body on a generated line."""
+        return self.material is not None or self.profile is not None
 
 
 OUTPUTS = (
@@ -164,35 +179,40 @@ class _Task:
             return height, slope
         return np.append(height, height[0]), np.append(slope, slope[0])
 
-    def solve(self, height: FloatArray, slope: FloatArray, scheme: Scheme) -> Steady:
-        """Solve the cases on a grid."""
+    def solve(
+        self, nodes: tuple[FloatArray, FloatArray], scheme: Scheme, near: Steady | None = None, close: float = 0.0
+    ) -> Steady:
+        """Solve the cases on a grid, beginning near a solution on another one."""
         from mdr_dask.physics import sliding
 
-        cases = (self.reaches, self.loads, scheme, self.contact)
-        if self.line.coefficient == 0:
+        height, slope = nodes
+        guesses = None if near is None else near.depth
+        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
+        coefficient, exponent = self.line.coefficient, self.line.exponent
+        if coefficient == 0:
             return sliding.steady_sliding(height, slope, *cases)
-        return sliding.steady_indenter(height, slope, self.line.coefficient, self.line.exponent, *cases)
+        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
 
     def on_grid(self, oversampling: int) -> Steady:
         """Solve the cases on one grid, without an estimate of the error."""
-        return self.solve(*self.nodes(oversampling), self.scheme)
+        return self.solve(self.nodes(oversampling), self.scheme)
 
-    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
+    def with_error(self, oversampling: int, near: Steady | None = None) -> tuple[Steady, FloatArray]:
         """Solve the cases on one grid and estimate the relative error of their friction.
 
         The exact sweep on a fine grid is compared with the two grids that hold every other node: two, because one may
         agree by accident. Anything else is compared with the exact sweep on a grid twice as fine.
         """
-        height, slope = self.nodes(oversampling)
-        steady = self.solve(height, slope, self.scheme)
+        nodes = self.nodes(oversampling)
+        steady = self.solve(nodes, self.scheme, near)
         if self.scheme != "hermite" or oversampling % 2 or self.line.points * oversampling < 32:
-            finer = self.solve(*self.nodes(2 * oversampling), "hermite")
+            finer = self.solve(self.nodes(2 * oversampling), "hermite")
             return steady, SAFETY_FINER * _difference(steady, finer)
-        even = _difference(self.solve(height[::2], slope[::2], self.scheme), steady)
+        even, odd = ((nodes[0][first::2], nodes[1][first::2]) for first in (0, 1))
+        error = _difference(self.solve(even, self.scheme, steady, CLOSE), steady)
         if self.line.coefficient:
-            return steady, SAFETY_EVEN * even
-        odd = _difference(self.solve(height[1::2], slope[1::2], self.scheme), steady)
-        return steady, SAFETY_BOTH * np.maximum(even, odd)
+            return steady, SAFETY_EVEN * error
+        return steady, SAFETY_BOTH * np.maximum(error, _difference(self.solve(odd, self.scheme, steady, CLOSE), steady))
 
     def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
@@ -203,15 +223,16 @@ class _Task:
             if not np.any(wanting):
                 break
             oversampling *= 2
-            finer, error[wanting] = self.only(wanting).with_error(oversampling)
+            finer, error[wanting] = self.only(wanting).with_error(oversampling, steady.only(wanting))
             steady = steady.replaced(wanting, finer)
         return steady, error
 
 
 def _difference(one: Steady, other: Steady) -> FloatArray:
     with np.errstate(all="ignore"):
-        change: FloatArray = np.abs(one.drag / other.drag - 1)
-    return change
+        change = np.abs(one.drag / other.drag - 1)
+    # where a coarse grid has no solution nothing is known
+    return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
 
 
 def _canonical(number: FloatArray) -> FloatArray:
@@ -308,8 +329,39 @@ class _Answer:
         self.messages.update({(int(j), r): sentence for j in members for r in range(self.status.shape[1])})
 
 
+def _general_cases(block: Block[SlidingFriction]) -> list[general_sliding.Case]:
+    """Return the cases of a block whose material or line is not the Kelvin solver's."""
+    rolloff, longest = _harmonic(block, "rolloff_wavelength"), _harmonic(block, "longest_wavelength")
+    found = []
+    for j, body in enumerate(_shapes(block)):
+        case = block.case(j)
+        material = case.material
+        if material is None:
+            material = general_sliding.kelvin_material(case.shear_modulus or 0.0, case.relaxation_time or 0.0)
+        measured = case.profile is not None
+        found.append(
+            general_sliding.Case(
+                profile=case.profile,
+                length=case.length or 0.0,
+                points=case.points,
+                hurst=case.hurst,
+                rms=case.rms_roughness or 0.0,
+                rolloff=0.0 if measured else float(rolloff[j]),
+                longest=0.0 if measured else float(longest[j]),
+                body=body,
+                material=material,
+                velocity=case.velocity,
+                force=case.normal_force,
+                oversampling=case.oversampling,
+            )
+        )
+    return found
+
+
 def compute(block: Block[SlidingFriction]) -> Result:
     """Solve the cases of a block, each different one once."""
+    if block.parameters.is_general:
+        return general_sliding.compute(block, _general_cases(block), block.accuracy or ACCURACY)
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
@@ -401,6 +453,8 @@ STATUS = np.array([Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.FAIL
 
 def distinct(block: Block[SlidingFriction]) -> int:
     """Return how many different cases a block holds, over all realisations."""
+    if block.parameters.is_general:
+        return general_sliding.distinct(_general_cases(block), len(block.realisations))
     cases = _cases(block)
     rough = cases.height > 0
     different = set(zip(cases.keys, cases.loads.tolist(), cases.reaches.tolist(), rough, strict=True))
@@ -410,6 +464,9 @@ def distinct(block: Block[SlidingFriction]) -> int:
 
 def seconds(block: Block[SlidingFriction]) -> float:
     """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
+    if block.parameters.is_general:
+        general = dict.fromkeys(_general_cases(block))
+        return sum(general_sliding.seconds(case) for case in general) * len(block.realisations)
     cases = _cases(block)
     total = 1e-4
     for (line, oversampling, scheme), members in cases.groups():
@@ -423,6 +480,12 @@ def seconds(block: Block[SlidingFriction]) -> float:
     return total
 
 
+def memory(block: Block[SlidingFriction]) -> float:
+    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
+    grid = [FINEST if value == "auto" else 2 * int(value) for value in block.column("oversampling")]
+    return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
+
+
 MODEL = Model(
     name="sliding_friction",
     version=1,
@@ -433,4 +496,5 @@ MODEL = Model(
     seconds=seconds,
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=distinct,
+    memory=memory,
 )

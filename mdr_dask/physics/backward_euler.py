@@ -1,8 +1,9 @@
 """The papers' method: the stationary state of a Kelvin foundation by backward Euler, many cases on a line at once.
 
 u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because a turn closes,
-F_N / (4 G dx) is the sum of u, and F_x / (4 G) that of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)). The inner loops
-run over cases, so that they are vector instructions; each case does the same arithmetic whatever runs beside it.
+F_N / (4 G dx) is the sum of u, and F_x / (4 G) that of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
+The inner loops run over cases, so that they are vector instructions; each case does the same arithmetic whatever runs
+beside it.
 """
 
 from __future__ import annotations

@@ -85,8 +85,8 @@ def smooth(
 ) -> None:
     """Slide smooth lines c |x|^n towards -x at prescribed loads.
 
-    The contact lies between -a with c a^n = d and b with d = c (b^n + n v tau b^(n-1)), or the apex; the load is convex in d,
-    with slope a + b + v tau, so that Newton from the static depth comes down to the root.
+    The contact lies between -a with c a^n = d and b with d = c (b^n + n v tau b^(n-1)), or the apex; the load is
+    convex in d, with slope a + b + v tau, so that Newton from the static depth comes down to the root.
 
     Parameters
     ----------
@@ -95,7 +95,8 @@ def smooth(
     coefficients, exponents : array, shape (cases,)
         c_n > 0 and n >= 1 of the lines, already mapped.
     results : array, shape (cases, COLUMNS)
-        Written: the depth, F_x / (4 G), a, b, and the integral of the slope squared over the contact; NaN where no depth is found.
+        Written: the depth, F_x / (4 G), a, b, and the integral of the slope squared over the contact; NaN where no
+        depth is found.
     """
     results[:] = np.nan
     for k in range(loads.size):

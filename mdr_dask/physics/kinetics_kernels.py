@@ -356,7 +356,7 @@ def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: floa
 
 
 @njit(nogil=True, cache=True)
-def touch(  # noqa: C901 - one pass over the line; taken apart it runs slower than what it saves to read
+def touch(
     profile: Profile,
     runs: IntArray,
     floor: FloatArray,

@@ -27,8 +27,8 @@ class Profile:
     periodic : bool
         Whether the last cell ends at the first node.
     smooth : bool
-        Whether the slopes of a periodic line are continuous, so that the integral of their square is summed by Euler and
-        Maclaurin: exact over the whole line if that is resolved.
+        Whether the slopes of a periodic line are continuous, so that the integral of their square is summed by Euler
+        and Maclaurin: exact over the whole line if that is resolved.
     """
 
     height: FloatArray
@@ -128,7 +128,7 @@ def cut(profile: Profile) -> tuple[Cells, float]:
 
 
 def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
-    """Return the integrals of the slope squared over cells by Euler and Maclaurin, with the same integral over the line.
+    """Return the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
 
     The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
     """

@@ -51,7 +51,8 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that time (s).
+    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that
+    time (s).
 
     Raises
     ------
@@ -328,7 +329,8 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its distance from
+    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its
+    distance from
     the nearer pole, so that differences keep their relative precision over any number of decades; the modes are
     orthogonal under the weights G_m / tau_m, which makes the inverse of `stretch` explicit.
     """

@@ -160,21 +160,38 @@ def _solve(
 
 @njit(nogil=True, cache=True)
 def _states(
-    cells: Cells, reaches: FloatArray, loads: FloatArray, results: FloatArray, status: NDArray[np.int8]
+    cells: Cells,
+    reaches: FloatArray,
+    loads: FloatArray,
+    guesses: FloatArray,
+    close: float,
+    results: FloatArray,
+    status: NDArray[np.int8],
 ) -> None:
-    """Solve the cases of one profile, ordered by reach and load, each from the one before; see `Steady` for the columns."""
+    """Solve the cases of one profile, ordered by reach and load; see `Steady` for the columns of the results.
+
+    The search for a depth follows that of the case before, or starts from its guess where that is a number. Where the
+    tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
+    """
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK)
     sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
     reach = -1.0
-    first[:] = math.log(loads[0]), math.log(loads[0] * n), 0.7, 0.0
+    first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
     for k in range(loads.size):
         starts = reaches[k] != reach
         if starts:
             reach = reaches[k]
             barrier(cells, reach, barriers, block_barriers)
             trail[:] = first
-        depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k], trail, sums)
+        depth, converged = guesses[k], False
+        if guesses[k] > 0:
+            trail[:] = math.log(guesses[k]), math.log(loads[k]), 0.7, 0.0
+            if close > 0:
+                sweep(cells, barriers, block_barriers, reach, depth, sums)
+                converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
+        if not converged:
+            depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k], trail, sums)
         if not converged:
             status[k] = NOT_CONVERGED
             trail[:] = first
@@ -196,6 +213,8 @@ def steady_sliding(
     loads: FloatArray,
     scheme: Scheme = "hermite",
     contact: bool = True,
+    guesses: FloatArray | None = None,
+    close: float = 0.0,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation sliding over a periodic line.
 
@@ -213,6 +232,10 @@ def steady_sliding(
         Exact sweep over cubic cells or over straight ones, or the papers' time steps.
     contact : bool
         Whether fraction and slope of the contact are wanted where they cost extra.
+    guesses : array, shape (cases,), optional
+        Depths to start the exact sweeps from; the answer does not depend on them while `close` is 0.
+    close : float
+        Relative change of a guess that its tangent is trusted with instead of a search: for comparisons only.
 
     Returns
     -------
@@ -224,7 +247,8 @@ def steady_sliding(
     ValueError
         If the scheme needs slopes that are not given.
     """
-    return _steady(periodic_line(height, _needed(slope, scheme)), reaches, loads, scheme, contact)
+    profile = periodic_line(height, _needed(slope, scheme))
+    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
 
 
 def steady_indenter(
@@ -236,6 +260,8 @@ def steady_indenter(
     loads: FloatArray,
     scheme: Scheme = "hermite",
     contact: bool = True,
+    guesses: FloatArray | None = None,
+    close: float = 0.0,
 ) -> Steady:
     """Return the steady states of a Kelvin foundation under a rough line -c |x|^n + h(x) that it enters undeformed.
 
@@ -245,7 +271,7 @@ def steady_indenter(
         The roughness h, both ends included, and its derivative as in :func:`steady_sliding`.
     coefficient, exponent : float
         c > 0 and n >= 1 of the line, x in units of its length from its middle node n // 2.
-    reaches, loads, scheme, contact
+    reaches, loads, scheme, contact, guesses, close
         As in :func:`steady_sliding`.
 
     Returns
@@ -254,7 +280,7 @@ def steady_indenter(
         With status `OUTSIDE_LINE` where an end of the line is in contact.
     """
     profile = indented_line(height, _needed(slope, scheme), coefficient, exponent)
-    return _steady(profile, reaches, loads, scheme, contact)
+    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
 
 
 def _needed(slope: FloatArray | None, scheme: Scheme) -> FloatArray | None:
@@ -266,7 +292,15 @@ def _needed(slope: FloatArray | None, scheme: Scheme) -> FloatArray | None:
     return slope
 
 
-def _steady(profile: Profile, reaches: FloatArray, loads: FloatArray, scheme: Scheme, contact: bool) -> Steady:
+def _steady(
+    profile: Profile,
+    reaches: FloatArray,
+    loads: FloatArray,
+    scheme: Scheme,
+    contact: bool,
+    guesses: FloatArray | None,
+    close: float,
+) -> Steady:
     """Solve the cases that are numbers."""
     good = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
     good &= bool(np.all(np.isfinite(profile.height)) and np.all(np.isfinite(profile.enter)))
@@ -276,17 +310,20 @@ def _steady(profile: Profile, reaches: FloatArray, loads: FloatArray, scheme: Sc
     if np.any(good) and scheme == "backward_euler":
         results[:, good], status[good] = _stepped(profile, reaches[good] * n, loads[good] * n, contact)
     elif np.any(good):
-        results[:, good], status[good] = _swept(profile, reaches[good] * n, loads[good] * n)
+        start = np.full(int(good.sum()), np.nan) if guesses is None else guesses[good]
+        results[:, good], status[good] = _swept(profile, reaches[good] * n, loads[good] * n, start, close)
     results[:, status != CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
-def _swept(profile: Profile, reaches: FloatArray, loads: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
+def _swept(
+    profile: Profile, reaches: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
+) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; reaches in cells, loads over 4 G dx."""
     cells, top = cut(profile)
     order = np.lexsort((loads, reaches))
     ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
-    _states(cells, reaches[order], loads[order], ordered, ordered_status)
+    _states(cells, reaches[order], loads[order], guesses[order] + top, close, ordered, ordered_status)
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= top

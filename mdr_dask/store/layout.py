@@ -60,7 +60,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 
 def _open_plainly(url: str, series: str) -> zarr.Group:
     """Open or make a group by what its members say of themselves, not by consolidated metadata of an earlier shape."""
-    marker = {"mdr_dask_layout": LAYOUT}
+    marker: dict[str, Any] = {"mdr_dask_layout": LAYOUT}
     return zarr.open_group(url, path=series or None, mode="a", use_consolidated=False, attributes=marker)
 
 

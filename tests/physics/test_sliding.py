@@ -123,3 +123,20 @@ def test_bad_numbers_are_a_status():
 def test_hermite_needs_slopes():
     with pytest.raises(ValueError, match="expected slopes at the nodes"):
         sliding.steady_sliding(np.zeros(32), None, np.ones(1), np.ones(1))
+
+
+@pytest.mark.parametrize("load", [0.05, 2.0])
+@pytest.mark.parametrize("reach", [1e-3, 1e-1, 10.0])
+def test_friction_is_the_energy_lost(load, reach):
+    """F_x = 4 G v tau times the integral of u'^2, with u marched finely as the running maximum of w exp(s / v tau)."""
+    height, slope, _ = rough(30, 0.7, 400)
+    steady = sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]))
+    n, w = height.size, height + steady.depth[0]
+    decay, u = np.exp(-1 / (reach * n)), np.empty(2 * n)
+    u[0] = max(w[0], 0.0)
+    for i in range(1, 2 * n):
+        u[i] = max(w[i % n], decay * u[i - 1])
+    lost = reach * np.sum(np.diff(u[n - 1 :]) ** 2) * n
+    # the running maximum at the nodes is first order where u turns: 12000 nodes
+    assert steady.drag[0] == pytest.approx(lost, rel=5e-3)
+    assert np.mean(u[n:]) == pytest.approx(load, rel=1e-3)

@@ -1,0 +1,80 @@
+"""Error against kernel time of steady friction: ``python -m benchmarks.work_precision_friction [FIGURE.png]``.
+
+Easy, typical and hard cases on ten lines each, every scheme on finer and finer grids; the reference is the cubic sweep
+at oversampling 128. Time is that of the solution alone, per case, in processor time of this process.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+from mdr_dask.physics import roughness, sliding
+
+SCHEMES = {"backward_euler": "thesis: backward Euler", "piecewise_linear": "straight cells", "hermite": "cubic cells"}
+#: name: (Hurst exponent, force number F_N / (G h L), v tau slope / h)
+CASES = {
+    "easy: full contact": (0.7, 30.0, 1.0),
+    "typical: transition": (0.7, 1.0, 1.0),
+    "hard: rough, low load": (0.3, 0.01, 1.0),
+}
+GRIDS = (1, 2, 4, 8, 16, 32)
+LINES, POINTS, REPEATS = 10, 1000, 3
+
+
+def measure(hurst, force, velocity):
+    """Return {scheme: [(oversampling, rms relative error, seconds a case)]}."""
+    amplitude = roughness.amplitudes(POINTS // 2, hurst)
+    reach = np.array([velocity / roughness.spectral_slope(amplitude)])
+    load = np.array([force / 4])
+
+    def solve(realisation, grid, scheme):
+        phase = roughness.phases(0, realisation, POINTS // 2)
+        height, slope = (roughness.line(amplitude, phase, POINTS * grid, order) for order in (0, 1))
+        times = []
+        for _ in range(REPEATS):
+            start = time.process_time()
+            drag = sliding.steady_sliding(height, slope, reach, load, scheme).drag[0]
+            times.append(time.process_time() - start)
+        return drag, min(times)
+
+    exact = np.array([solve(line, 128, "hermite")[0] for line in range(LINES)])
+    table = {}
+    for scheme in SCHEMES:
+        solve(0, 1, scheme)
+        rows = []
+        for grid in GRIDS:
+            drags, times = np.array([solve(line, grid, scheme) for line in range(LINES)]).T
+            rows.append((grid, float(np.sqrt(np.mean((drags / exact - 1) ** 2))), float(np.mean(times))))
+        table[scheme] = rows
+    return table
+
+
+def draw(tables, path):
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11, 4), layout="constrained")
+    for axes, (case, table) in zip(figure.subplots(1, len(tables), sharey=True), tables.items(), strict=True):
+        for scheme, rows in table.items():
+            _, errors, seconds = zip(*rows, strict=True)
+            axes.loglog(np.array(seconds) * 1e6, errors, "o-", ms=4, label=SCHEMES[scheme])
+        axes.set(title=case, xlabel="time per case (µs)")
+        axes.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("rms relative error of μ")
+    figure.axes[0].legend(fontsize="small")
+    figure.savefig(path, dpi=120)
+
+
+def main(path=None):
+    tables = {case: measure(*numbers) for case, numbers in CASES.items()}
+    for case, table in tables.items():
+        print(f"{case}\n| scheme | oversampling | rms error of μ | µs a case |\n|---|---|---|---|")
+        for scheme, rows in table.items():
+            for grid, error, seconds in rows:
+                print(f"| {SCHEMES[scheme]} | {grid} | {error:.1e} | {seconds * 1e6:.0f} |")
+    if path:
+        draw(tables, path)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,98 @@
+"""Closed-form laws of sliding friction (thesis chapter 3) and the dimensionless numbers that they are written in.
+
+All functions are arithmetic on whatever broadcasts: numbers, numpy arrays, labelled arrays. "Slope" is the spectral rms
+slope.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+INDENTER_EXPONENT = 1.5  # alpha of eq. 3.40
+BETA = 1.6  # beta of eq. 3.11, all Hurst exponents: measured 1.57..1.68 (docs/friction.md)
+
+
+def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:
+    """Return F_N / (G h L) (eq. 3.20)."""
+    return force / (shear_modulus * rms * length)
+
+
+def velocity_number(velocity: Any, relaxation_time: Any, slope: Any, rms: Any) -> Any:
+    """Return v tau slope / (sqrt 2 h) (eq. 3.19): near 1 the contacts become one-sided."""
+    return velocity * relaxation_time * slope / (math.sqrt(2) * rms)
+
+
+def alpha(hurst: Any) -> Any:
+    """Return the exponent of zone 1, H / (1 + H) (eq. 3.13)."""
+    return hurst / (1 + hurst)
+
+
+def zone_one(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
+    """Return mu / slope at low velocity and low force (eq. 3.11).
+
+    Parameters
+    ----------
+    force, velocity : array_like
+        `force_number` and `velocity_number`.
+    exponent, beta : array_like
+        Constants of the law.
+    """
+    return math.sqrt(2) * beta * velocity * force**-exponent
+
+
+def full_contact(force: Any, velocity: Any) -> Any:
+    """Return mu / slope in full contact, 4 eta v L slope / F_N (eq. 3.14): exact."""
+    return 4 * math.sqrt(2) * velocity / force
+
+
+def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
+    """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`."""
+    return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
+
+
+def crossover(force: Any, exponent: Any, beta: Any) -> Any:
+    """Return the `velocity_number` at which the law of low velocities meets the plateau."""
+    return force / 4 + force**exponent / beta
+
+
+def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
+    """Return the velocity numbers that end region I and begin region III of eq. 3.18.
+
+    Parameters
+    ----------
+    force, exponent, beta : array_like
+        As in `zone_one`.
+    share : float
+        Region I ends where mu is that share of the linear law, region III begins where it is that share of the plateau.
+    """
+    width = math.sqrt(share**-2 - 1)
+    middle = crossover(force, exponent, beta)
+    return middle * width, middle / width
+
+
+def indenter_low(
+    half_width: Any, velocity: Any, relaxation_time: Any, shear_modulus: Any, force: Any, slope: Any
+) -> Any:
+    """Return mu of a rough indenter at low velocity, 8 G a tau v slope^2 / F_N (eq. 3.34 with L_cont = 2a)."""
+    return 8 * shear_modulus * half_width * relaxation_time * velocity * slope**2 / force
+
+
+def material_low(half_width: Any, loss_modulus: Any, q_max: Any, force: Any, slope: Any) -> Any:
+    """Return mu of a rough indenter on a general material, 8 a G''(q_max v) / (q_max F_N) slope^2 (eq. 3.42)."""
+    return 8 * half_width * loss_modulus / (q_max * force) * slope**2
+
+
+def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
+    """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
+
+    Parameters
+    ----------
+    xi : array_like
+        mu at low velocity over sqrt 2 slope.
+    exponent : array_like
+        alpha of the law.
+    """
+    return np.exp(-np.logaddexp(0.0, -exponent * np.log(xi)) / exponent)

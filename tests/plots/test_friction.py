@@ -1,0 +1,60 @@
+import numpy as np
+import pytest
+
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.plots.friction import PLOTS
+from tests.friction_store import store
+
+DRAW = {plot.name: plot.draw for plot in PLOTS}
+PLANE = ("regions", "velocity", "force", "zone_one", "plateau")
+
+
+@pytest.fixture(scope="module")
+def forces():
+    axes = {
+        "hurst": [0.1, 0.4, 0.7],
+        "normal_force": np.geomspace(1e-3, 1e2, 12),
+        "velocity": np.geomspace(1e-4, 1e3, 15),
+    }
+    return store(axes, realisations=6)
+
+
+@pytest.fixture(scope="module")
+def cone():
+    shape = {"shape": "cone", "angle": 0.17}
+    return store({"velocity": np.geomspace(1e-4, 1, 9)}, 4, rms_roughness=5e-6, shear_modulus=1e6, indenter=shape)
+
+
+def check(figure, tmp_path):
+    axes = figure.axes[0]
+    assert axes.get_xlabel()
+    assert axes.get_ylabel()
+    assert axes.get_legend() is not None
+    assert max(len(line.get_xdata()) for line in axes.get_lines()) > 2
+    figure.savefig(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("name", PLANE)
+def test_a_figure_is_labelled_and_drawn(name, forces, tmp_path):
+    check(DRAW[name]({"": forces}), tmp_path)
+
+
+def test_the_figure_of_indenters_is_labelled_and_drawn(cone, tmp_path):
+    check(DRAW["indenter"]({"cone": cone}), tmp_path)
+
+
+def test_curves_hold_the_mean_over_realisations(forces):
+    axes = DRAW["force"]({"": forces}).axes[0]
+    expected = (forces.friction_coefficient / forces.rms_slope).mean("realisation").isel(hurst=1)
+    drawn = np.array([line.get_ydata() for line in axes.get_lines()])
+    assert drawn == pytest.approx(expected.values)
+
+
+def test_a_store_that_does_not_fit_the_figure_is_refused(forces):
+    with pytest.raises(DataError, match="expected a series whose axes include velocity"):
+        DRAW["velocity"]({"": forces.isel(velocity=0)})
+    with pytest.raises(DataError, match="expected a store with an axis hurst"):
+        DRAW["plateau"]({"": forces.isel(hurst=0)})
+    with pytest.raises(FitError, match="expected a store with an indenter"):
+        DRAW["indenter"]({"": forces})
