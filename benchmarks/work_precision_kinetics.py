@@ -29,9 +29,7 @@ def line(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def march(oversampling: int, per_decade: float) -> tuple[np.ndarray, float]:
-    found = velocity_jump(
-        *line(oversampling), LOAD, (REACH, REACH * (1 + CHANGE)), TIMES, np.pi * POINTS, per_decade
-    )
+    found = velocity_jump(*line(oversampling), LOAD, (REACH, REACH * (1 + CHANGE)), TIMES, np.pi * POINTS, per_decade)
     return found.trace, found.after
 
 

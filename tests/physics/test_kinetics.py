@@ -41,7 +41,7 @@ def test_ends_in_the_direct_steady_state(change: float) -> None:
 
 
 def test_full_contact_jumps_straight_to_the_end() -> None:
-    height, slope = line()
+    _, slope = line()
     found = jump(load=100.0)
     grad2 = np.mean(slope**2)
     assert np.allclose(found.trace, found.after, rtol=0, atol=0)
