@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from tests.friction_store import store
+from friction_store import store
 
 from mdr_dask.errors import FitError
 from mdr_dask.fit.friction import FITS

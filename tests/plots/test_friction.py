@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from tests.friction_store import store
+from friction_store import store
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots.friction import PLOTS
