@@ -287,7 +287,7 @@ def _client(resources: Resources) -> Iterator[Client]:
         cluster = LocalCluster(
             n_workers=resources.workers,
             threads_per_worker=1,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             scheduler_port=0,
             protocol="tcp://",
         )

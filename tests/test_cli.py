@@ -172,13 +172,14 @@ def test_a_running_scheduler_and_a_cluster_file_are_used(campaign, tmp_path):
 
     campaign.write_text(CAMPAIGN)
     Path("cluster.yaml").write_text(
-        "class: distributed.LocalCluster\narguments: {n_workers: 1, threads_per_worker: 1, dashboard_address: null}\n"
+        "class: distributed.LocalCluster\n"
+        "arguments: {n_workers: 1, threads_per_worker: 1, dashboard_address: '127.0.0.1:0'}\n"
         "scale: {n: 1}\n"
     )
     subprocess.run(
         command("run", str(campaign), "--cluster", "cluster.yaml", "--store", "a.zarr"), check=True, capture_output=True
     )
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         options = ["--scheduler", cluster.scheduler_address, "--store", "b.zarr"]
         subprocess.run(command("run", str(campaign), *options), check=True, capture_output=True)
     assert digests("a.zarr") == digests("b.zarr")

@@ -166,6 +166,17 @@ def test_a_new_series_leaves_the_old_one_untouched(toy, url):
     assert set(store.datasets(url)) == {"near", "far"}
 
 
+def test_series_grow_too(toy, url):
+    small = toy.campaign(toy.axis("position", [1.0, 2.0]), name="near")
+    run(small, url)
+    large = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), name="near", realisations=Replication(9, 9, {}))
+    assert run(large, url).done == 27 - 12
+    assert xr.open_zarr(url, group="near").height.shape == (3, 9)
+    tree = xr.open_datatree(url, engine="zarr")
+    assert tree["near"].height.shape == (3, 9)
+    tree.close()
+
+
 def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
     run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
     before = digests(url), (Path(url) / "zarr.json").read_bytes()

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import click
 import pytest
-from mdr_dask.campaign.reference import reference_page
 
 from mdr_dask import campaign, fit, models, plots
+from mdr_dask.campaign.reference import reference_page
 from mdr_dask.cli import cli
 from mdr_dask.cli.reference import commands_page
 

@@ -72,6 +72,7 @@ poise = 0.1 * pascal * second = P
 stokes = 1e-4 * meter ** 2 / second = St
 volt = joule / ampere / second = V
 ohm = volt / ampere = Ω
+siemens = ampere / volt = S
 """
 
 #: What a quantity of a SI unit is called in messages, with an example of how to write one.

@@ -8,6 +8,8 @@ import click
 
 from mdr_dask import __version__
 from mdr_dask.cli.campaigns import check, models, run, schema
+from mdr_dask.cli.figures import figures
+from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
 
 INTERRUPTED = 130
@@ -29,7 +31,7 @@ def cli() -> None:
     """
 
 
-for command in (models, check, run, status, show, aggregate, fit, plot, schema):
+for command in (models, check, run, status, show, aggregate, fit, plot, figures, master_curve, schema):
     cli.add_command(command)
 
 

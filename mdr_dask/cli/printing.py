@@ -92,7 +92,7 @@ def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict
 
 
 def _with_error(mean: float, error: float) -> str:
-    return f"{mean:.4g} +- {error:.1g}"
+    return f"{mean:.4g} +- {error:.1g}" if math.isfinite(error) else _short(mean)
 
 
 def _short(value: Any) -> str:

@@ -174,7 +174,7 @@ def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> Non
 
     \b
     mdr-dask fit results/friction_force.zarr
-    mdr-dask fit results/friction_force.zarr zone1 --json
+    mdr-dask fit results/friction_force.zarr zone_one --json
     """
     from mdr_dask import fit as room
     from mdr_dask import store as stores
@@ -222,7 +222,7 @@ def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | No
     """
     from mdr_dask import plots as room
     from mdr_dask import store as stores
-    from mdr_dask.errors import DataError
+    from mdr_dask.errors import DataError, FitError
 
     model = stores.attributes(store)["model"]
     known = room.available(model)
@@ -234,7 +234,7 @@ def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | No
     for name in names or tuple(known):
         try:
             figure = known[name].draw(groups)
-        except DataError as error:
+        except (DataError, FitError) as error:
             if not everything:
                 raise
             click.echo(f"{name}: left out: {error}", err=True)

@@ -7,7 +7,7 @@ from importlib import import_module
 from mdr_dask.fit.base import Fit
 
 #: Modules of this room that hold ``FITS``.
-SUBJECTS: tuple[str, ...] = ()
+SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "wear")
 
 
 def available(model: str) -> dict[str, Fit]:

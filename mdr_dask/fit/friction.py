@@ -273,25 +273,25 @@ def _indenter_axes(data: xr.Dataset) -> list[str]:
 
 FITS: tuple[Fit, ...] = (
     Fit(
-        "friction-zone-one",
+        "zone_one",
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: _each(series, _zone_one_axes, _zone_one),
     ),
     Fit(
-        "friction-plateau",
+        "plateau",
         MODELS,
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
         lambda series: _each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
     ),
     Fit(
-        "friction-law",
+        "interpolation",
         MODELS,
         "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
         lambda series: _each(series, _zone_one_axes, _interpolation),
     ),
     Fit(
-        "friction-indenter",
+        "indenter",
         MODELS,
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
         lambda series: _each(series, _indenter_axes, _indenter),

@@ -7,7 +7,13 @@ from typing import Any
 
 from mdr_dask.models.base import Model
 
-NAMES: tuple[str, ...] = ("sliding_friction",)
+NAMES: tuple[str, ...] = (
+    "sliding_friction",
+    "velocity_jump",
+    "fretting_wear",
+    "ehl_line",
+    "mixed_lubrication",
+)
 
 
 def load(name: str) -> Model[Any]:

@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from mdr_dask.models import general_sliding
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.material import Material
+from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
     from mdr_dask.physics.sliding import Scheme, Steady
@@ -74,9 +77,9 @@ Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape
 
 
 class SlidingFriction(Parameters):
-    """A Kelvin body under a load, sliding at constant speed over a self-affine line."""
+    """A viscoelastic body under a load, sliding at constant speed over a rough line."""
 
-    length: float = quantity("m", "length L of the line, and period of its roughness", gt=0)
+    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
@@ -84,13 +87,19 @@ class SlidingFriction(Parameters):
         "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
     )
     hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float = quantity("m", "rms height h of the roughness", ge=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
         "m", "wavelength above which the spectrum is constant", default=None, gt=0
     )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    shear_modulus: float = quantity("Pa", "static shear modulus G of the incompressible Kelvin body", gt=0)
-    relaxation_time: float = quantity("s", "relaxation time tau = eta / G of the Kelvin body", gt=0)
+    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
+    shear_modulus: float | None = quantity(
+        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+    )
+    relaxation_time: float | None = quantity(
+        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+    )
+    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
     normal_force: float = quantity("N", "normal force F_N", gt=0)
     velocity: float = quantity("m/s", "sliding velocity v", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
@@ -98,6 +107,23 @@ class SlidingFriction(Parameters):
         default="hermite",
         description="exact sweep over cubic or straight cells, or the papers' time steps",
     )
+
+    @model_validator(mode="after")
+    def _one_body_and_one_line(self) -> SlidingFriction:
+        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
+        either = self.shear_modulus is not None or self.relaxation_time is not None
+        if (self.material is None and not kelvin) or (self.material is not None and either):
+            raise ValueError("expected shear_modulus with relaxation_time, or material")
+        generated = self.length is not None and self.rms_roughness is not None
+        partly = self.length is not None or self.rms_roughness is not None
+        if (self.profile is None and not generated) or (self.profile is not None and partly):
+            raise ValueError("expected length with rms_roughness, or profile")
+        return self
+
+    @property
+    def is_general(self) -> bool:
+        """Whether it is beyond the Kelvin body on a generated line."""
+        return self.material is not None or self.profile is not None
 
 
 OUTPUTS = (
@@ -309,8 +335,39 @@ class _Answer:
         self.messages.update({(int(j), r): sentence for j in members for r in range(self.status.shape[1])})
 
 
+def _general_cases(block: Block[SlidingFriction]) -> list[general_sliding.Case]:
+    """Return the cases of a block whose material or line is not the Kelvin solver's."""
+    rolloff, longest = _harmonic(block, "rolloff_wavelength"), _harmonic(block, "longest_wavelength")
+    found = []
+    for j, body in enumerate(_shapes(block)):
+        case = block.case(j)
+        material = case.material
+        if material is None:
+            material = general_sliding.kelvin_material(case.shear_modulus or 0.0, case.relaxation_time or 0.0)
+        measured = case.profile is not None
+        found.append(
+            general_sliding.Case(
+                profile=case.profile,
+                length=case.length or 0.0,
+                points=case.points,
+                hurst=case.hurst,
+                rms=case.rms_roughness or 0.0,
+                rolloff=0.0 if measured else float(rolloff[j]),
+                longest=0.0 if measured else float(longest[j]),
+                body=body,
+                material=material,
+                velocity=case.velocity,
+                force=case.normal_force,
+                oversampling=case.oversampling,
+            )
+        )
+    return found
+
+
 def compute(block: Block[SlidingFriction]) -> Result:
     """Solve the cases of a block, each different one once."""
+    if block.parameters.is_general:
+        return general_sliding.compute(block, _general_cases(block), block.accuracy or ACCURACY)
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
@@ -402,6 +459,8 @@ STATUS = np.array([Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.FAIL
 
 def distinct(block: Block[SlidingFriction]) -> int:
     """Return how many different cases a block holds, over all realisations."""
+    if block.parameters.is_general:
+        return general_sliding.distinct(_general_cases(block), len(block.realisations))
     cases = _cases(block)
     rough = cases.height > 0
     different = set(zip(cases.keys, cases.loads.tolist(), cases.reaches.tolist(), rough, strict=True))
@@ -411,6 +470,9 @@ def distinct(block: Block[SlidingFriction]) -> int:
 
 def seconds(block: Block[SlidingFriction]) -> float:
     """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
+    if block.parameters.is_general:
+        general = dict.fromkeys(_general_cases(block))
+        return sum(general_sliding.seconds(case) for case in general) * len(block.realisations)
     cases = _cases(block)
     total = 1e-4
     for (line, oversampling, scheme), members in cases.groups():

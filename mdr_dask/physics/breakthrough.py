@@ -253,45 +253,54 @@ def mean_overlap(clusters: Clusters, window: int) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _overlap(line_1, line_2, level, p, q):  # type: ignore[no-untyped-def]
-    """Return by how much point p of one line overlaps point q of the other; both are counted around the line."""
+def _beyond(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped-def]
+    """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
     points = line_1.size
-    return line_1[p % points] + line_2[q % points] - level
-
-
-@njit(nogil=True, cache=True)
-def _run(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped-def]
-    """Follow a run of overlapping points from (p, q) on; return their number, at most `most`, and sum of overlaps."""
     n = 0
     total = 0.0
-    overlap = _overlap(line_1, line_2, level, p, q)
-    while n < most and overlap > 0.0:
+    while n < most:
+        overlap = line_1[(p + n * step) % points] + line_2[(q + n * step) % points] - level
+        if overlap <= 0.0:
+            break
         total += overlap
         n += 1
-        overlap = _overlap(line_1, line_2, level, p + n * step, q + n * step)
     return n, total
 
 
 @njit(nogil=True, cache=True)
-def _windows(line_1, line_2, level, limit, window, first_1, first_2, rule, contact, overlap):  # type: ignore[no-untyped-def]
-    """Judge each window by itself; ``rule`` is the index in EDGE_RULES."""
+def _fill(line_1, line_2, level, p, q, overlap):  # type: ignore[no-untyped-def]
+    """Fill the overlaps of the window that stands at (p, q)."""
     points = line_1.size
+    for k in range(overlap.size):
+        overlap[k] = line_1[p] + line_2[q] - level
+        p = p + 1 if p + 1 < points else 0
+        q = q + 1 if q + 1 < points else 0
+
+
+@njit(nogil=True, cache=True)
+def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, contact, total_overlap):  # type: ignore[no-untyped-def]
+    """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` room for a window."""
+    points, window = line_1.size, overlap.size
     for w in range(first_1.size):
         p, q = first_1[w], first_2[w]
+        _fill(line_1, line_2, level, p, q, overlap)
         k = 0
         while k < window:
-            inside, total = _run(line_1, line_2, level, p + k, q + k, 1, window - k)
-            if inside == 0:
+            if overlap[k] <= 0.0:
                 k += 1
                 continue
-            overlap[w] += total
-            n = inside
-            if k == 0 and rule != _PART:
-                more, extra = _run(line_1, line_2, level, p - 1, q - 1, -1, points - n)
+            begin = k
+            total = 0.0
+            while k < window and overlap[k] > 0.0:
+                total += overlap[k]
+                k += 1
+            total_overlap[w] += total
+            n = inside = k - begin
+            if begin == 0 and rule != _PART:
+                more, extra = _beyond(line_1, line_2, level, p - 1, q - 1, -1, points - n)
                 n, total = n + more, total + extra
-            k += inside
             if k == window and rule != _PART:
-                more, extra = _run(line_1, line_2, level, p + k, q + k, 1, points - n)
+                more, extra = _beyond(line_1, line_2, level, p + k, q + k, 1, points - n)
                 n, total = n + more, total + extra
             if total > limit * float(n) ** 3 and (rule != _INSIDE or n == inside):
                 contact[w] += inside if rule == _CLIP else n
@@ -330,10 +339,11 @@ def judge_windows(
         One of `EDGE_RULES`.
     """
     first_1, first_2 = positions
-    contact, overlap = np.zeros(first_1.size, dtype=np.int64), np.zeros(first_1.size)
-    limit = strength * spacing**2
-    _windows(line_1, line_2, level, limit, window, first_1, first_2, EDGE_RULES.index(rule), contact, overlap)
-    return Windows(contact, overlap)
+    contact, total = np.zeros(first_1.size, dtype=np.int64), np.zeros(first_1.size)
+    if line_1.max() + line_2.max() > level:
+        limit, room = strength * spacing**2, np.empty(window)
+        _windows(line_1, line_2, level, limit, first_1, first_2, EDGE_RULES.index(rule), room, contact, total)
+    return Windows(contact, total)
 
 
 def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
@@ -397,23 +407,17 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
     Returns
     -------
     Interval
-        From the means of batches at least five windows long (40 at most), with Student's t; cut to [0, 1].
-
-    Raises
-    ------
-    ValueError
-        If the trace holds fewer than two batches.
+        From the means of batches at least five windows long (40 at most), with Student's t, cut to [0, 1]; NaN for all
+        but the mean if the trace is too short for two batches.
     """
-    batches = min(40, in_contact.size // (5 * window))
-    if batches < 2:
-        raise ValueError(
-            f"expected a trace of at least ten windows, got {in_contact.size} positions of window {window}"
-        )
     from scipy.special import stdtrit
 
+    mean = float(in_contact.mean())
+    batches = min(40, in_contact.size // (5 * window))
+    if batches < 2:
+        return Interval(mean, np.nan, np.nan, np.nan)
     size = in_contact.size // batches
     means = in_contact[: batches * size].reshape(batches, size).mean(axis=1)
     error = float(means.std(ddof=1) / np.sqrt(batches))
-    mean = float(in_contact.mean())
     reach = float(stdtrit(batches - 1, (1 + confidence) / 2)) * error
     return Interval(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))

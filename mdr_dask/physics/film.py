@@ -81,7 +81,7 @@ def fluid_friction(
     contact: HertzLine,
     film: float,
     sliding_velocity: float,
-    viscosity: Callable[[FloatArray], FloatArray],
+    log_viscosity: Callable[[FloatArray], FloatArray],
     eyring_stress: float,
 ) -> float:
     """Return the coefficient of friction of a uniform film under the Hertzian pressure.
@@ -94,10 +94,10 @@ def fluid_friction(
         Film thickness in m.
     sliding_velocity : float
         Difference of the two surface velocities in m/s.
-    viscosity : callable
-        Viscosity in Pa s at pressures in Pa.
+    log_viscosity : callable
+        Natural logarithm of the viscosity in Pa s at pressures in Pa.
     eyring_stress : float
-        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; infinite for a Newtonian liquid.
+        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; a great one makes the liquid Newtonian.
 
     Returns
     -------
@@ -107,8 +107,13 @@ def fluid_friction(
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
-    newtonian = viscosity(contact.pressure * cosine) * abs(sliding_velocity) / film
-    stress = newtonian if np.isinf(eyring_stress) else eyring_stress * np.arcsinh(newtonian / eyring_stress)
+    if sliding_velocity == 0:
+        return 0.0
+    logarithm = log_viscosity(contact.pressure * cosine) + np.log(abs(sliding_velocity) / (film * eyring_stress))
+    # asinh(e^l) is l + ln 2 long before e^l overflows
+    stress = eyring_stress * np.where(
+        logarithm > 30, logarithm + np.log(2), np.arcsinh(np.exp(np.minimum(logarithm, 30)))
+    )
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 

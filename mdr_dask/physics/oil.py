@@ -187,36 +187,48 @@ OILS: dict[str, Oil] = {
 }
 
 
-def barus(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return ``eta0 exp(alpha p)`` in Pa s (thesis eq. B.4)."""
-    return np.asarray(np.asarray(viscosity, float) * np.exp(np.asarray(alpha, float) * np.asarray(pressure, float)))
-
-
 #: Roelands' constants: pressure in Pa and logarithm of the viscosity (Pa s) at the common pole, with opposite sign.
 ROELANDS_PRESSURE = 1.9609e8
 ROELANDS_LOGARITHM = 9.67
 
 
-def roelands(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
-    """Return the viscosity under pressure by Roelands' law with the slope alpha at ambient pressure.
+def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return the natural logarithm of the viscosity (Pa s) under pressure, which does not overflow.
 
     Parameters
     ----------
+    law : str
+        ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
+        ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa, which has the slope alpha at ambient pressure.
     pressure : array_like
         In Pa.
     viscosity, alpha : array_like
         Viscosity in Pa s and pressure-viscosity coefficient in 1/Pa at ambient pressure.
 
-    Returns
-    -------
-    array
-        ``eta0 exp((ln eta0 + 9.67) ((1 + p/p_r)^z - 1))`` with ``z = alpha p_r/(ln eta0 + 9.67)``, p_r = 196.09 MPa.
+    Raises
+    ------
+    ValueError
+        If there is no such law.
     """
-    logarithm = np.log(np.asarray(viscosity, dtype=np.float64)) + ROELANDS_LOGARITHM
-    z = np.asarray(alpha) * ROELANDS_PRESSURE / logarithm
+    p, logarithm = np.asarray(pressure, dtype=np.float64), np.log(np.asarray(viscosity, dtype=np.float64))
+    if law == "barus":
+        return np.asarray(logarithm + np.asarray(alpha) * p)
+    if law != "roelands":
+        raise ValueError(f"expected a viscosity law of barus, roelands, got {law!r}")
+    scale = logarithm + ROELANDS_LOGARITHM
     return np.asarray(
-        np.asarray(viscosity) * np.exp(logarithm * ((1 + np.asarray(pressure) / ROELANDS_PRESSURE) ** z - 1))
+        logarithm + scale * ((1 + p / ROELANDS_PRESSURE) ** (np.asarray(alpha) * ROELANDS_PRESSURE / scale) - 1)
     )
+
+
+def barus(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return ``eta0 exp(alpha p)`` in Pa s (thesis eq. B.4)."""
+    return np.exp(log_viscosity("barus", pressure, viscosity, alpha))
+
+
+def roelands(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return the viscosity in Pa s under pressure by Roelands' law; see `log_viscosity`."""
+    return np.exp(log_viscosity("roelands", pressure, viscosity, alpha))
 
 
 #: Constants of the density law in 1/Pa (thesis eq. B.6).

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
@@ -51,7 +52,8 @@ def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
 
 
 def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
-    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that time (s).
+    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that
+    time (s).
 
     Raises
     ------
@@ -328,7 +330,8 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its distance from
+    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its
+    distance from
     the nearer pole, so that differences keep their relative precision over any number of decades; the modes are
     orthogonal under the weights G_m / tau_m, which makes the inverse of `stretch` explicit.
     """
@@ -339,22 +342,35 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     return Recovery(zeros, stretch, amplitude, -zeros / distance)
 
 
+@njit(nogil=True, cache=True, error_model="numpy")
+def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> float:
+    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`."""
+    total = 1.0
+    for m in range(times.size):
+        total += weight[m] / ((times[m] - times[k]) - offset)
+    return total
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def _zeros_between(moduli: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return lambda_k, and tau_m - lambda_k with full relative precision, shape (arms, arms)."""
     arms = times.size
-    gap = np.append(np.diff(times), times[-1:] * moduli.sum() * 2 if arms else [])
-    weight = (moduli * times)[:, None]
-
-    def imbalance(origin: FloatArray, offset: FloatArray) -> FloatArray:
-        return np.asarray(1 + np.sum(weight / ((times[:, None] - origin) - offset), axis=0), dtype=np.float64)
-
-    near_left = (imbalance(times, gap / 2) >= 0) | (np.arange(arms) == arms - 1)
-    origin = np.where(near_left, times, np.append(times[1:], 0.0) if arms else times)
-    sign = np.where(near_left, 1.0, -1.0)
-    low, high = np.log(gap) - 80.0, np.log(gap)
-    for _ in range(60):
-        middle = (low + high) / 2
-        beyond = sign * imbalance(origin, sign * np.exp(middle)) > 0
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    offset = sign * np.exp((low + high) / 2)
-    return origin + offset, (times[:, None] - origin) - offset
+    zeros, distance, weight = np.empty(arms), np.empty((arms, arms)), moduli * times
+    for k in range(arms):
+        last = k == arms - 1
+        gap = 2 * times[k] * moduli.sum() if last else times[k + 1] - times[k]
+        left = last or _imbalance(k, gap / 2, weight, times) >= 0
+        pole, sign = (k, 1.0) if left else (k + 1, -1.0)
+        high = np.log(gap)
+        low = high - 80.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if sign * _imbalance(pole, sign * np.exp(middle), weight, times) > 0:
+                high = middle
+            else:
+                low = middle
+        offset = sign * np.exp(0.5 * (low + high))
+        zeros[k] = times[pole] + offset
+        for m in range(arms):
+            distance[m, k] = (times[m] - times[pole]) - offset
+    return zeros, distance

@@ -1,14 +1,18 @@
-"""Master curves: curves of one quantity in several groups, shifted along their logarithmic axes until they are one curve."""
+"""Master curves: curves of one quantity in several groups, shifted along their logarithmic axes until they are one
+curve.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array, diags_array, hstack
 
 from mdr_dask.errors import DataError
 
@@ -22,8 +26,14 @@ MOST_CELLS = 120
 SMOOTHING = np.logspace(-8, 6, 15)
 """Weights of the curvature among which the restricted likelihood chooses, relative to the data's own."""
 
+FIRST_WEIGHT = 1e-3
+"""Smoothing of the curve whose slope linearises the problem."""
+
 CURVE_POINTS = 201
 ITERATIONS = 40
+DRAW_ITERATIONS = 3
+"""A bootstrap sample starts from the solution, where Gauss-Newton steps converge at once."""
+
 WEIGHED = (0, 1, 2, 4, 8)
 """Iterations that choose the smoothing anew."""
 
@@ -54,7 +64,8 @@ class Superposition:
     curve_x, curve_y, curve_error : array, shape (curve points,)
         The merged curve with its standard error.
     measured : tuple of float
-        Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by superposition.
+        Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by
+        superposition.
     draws : array, shape (draws, 2 groups)
         Bootstrap samples of the factors; none unless asked for.
     """
@@ -95,7 +106,8 @@ def superpose(
 ) -> Superposition:
     """Find the shifts that make curves parts of one smooth curve, with their covariance.
 
-    All shifts and the curve are fitted together by least squares: the curve is a cubic spline whose curvature is weighted by
+    All shifts and the curve are fitted together by least squares: the curve is a cubic spline whose curvature is
+    weighted by
     restricted maximum likelihood, so that curves are joined by their overlaps, and by smoothness where those are short.
 
     Parameters
@@ -179,19 +191,20 @@ class _Problem:
 
     def first_guess(self, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
         """Shift each curve onto the one before it."""
-        pairs = [_pair_shift(*one, *other) for one, other in zip(curves[:-1], curves[1:], strict=True)]
+        pairs = [_pair_shift(*one, *other) for one, other in pairwise(curves)]
         return np.cumsum(np.array(pairs))
 
     def knots(self, x: FloatArray) -> FloatArray:
         cells = int(np.clip(np.ceil(CELLS_PER_CURVE * np.ptp(x) / self.width), 2 * DEGREE, MOST_CELLS))
         step = np.ptp(x) * (1 + 1e-9) / cells
-        return x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
+        knots = x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
+        return np.asarray(knots, dtype=np.float64)
 
-    def fit(self, shifts: FloatArray, weight: float | None) -> tuple[FloatArray, float]:
+    def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
         """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
         smoothing, longest = weight, 0.3 * self.width
         system, step = _System.at(self, shifts), np.zeros(self.free)
-        for iteration in range(ITERATIONS):
+        for iteration in range(iterations):
             if weight is None and iteration in WEIGHED:
                 smoothing = system.likeliest_weight()
             assert smoothing is not None
@@ -248,13 +261,15 @@ class _Problem:
         for row in samples:
             drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
             again = replace(self, y=fitted + drawn - vertical)
-            row[:] = np.concatenate(self.split(again.fit(shifts, weight)[0]))
+            row[:] = np.concatenate(self.split(again.fit(shifts, weight, DRAW_ITERATIONS)[0]))
         return samples
 
 
 @dataclass(frozen=True)
 class _System:
-    """The least-squares problem linearised at given shifts: unknown are spline coefficients, then steps of the shifts."""
+    """The least-squares problem linearised at given shifts: unknown are spline coefficients, then steps of the
+    shifts.
+    """
 
     splines: int
     knots: FloatArray
@@ -269,17 +284,20 @@ class _System:
         horizontal, vertical = problem.split(shifts)
         x, target = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
         knots = problem.knots(x)
-        basis = BSpline.design_matrix(x, knots, DEGREE).toarray()
+        basis = BSpline.design_matrix(x, knots, DEGREE)
         splines = basis.shape[1]
-        penalty = _curvature(splines) * np.trace(basis.T @ basis) / splines
-        smooth = np.linalg.solve(basis.T @ basis + 1e-3 * penalty + 1e-9 * np.eye(splines), basis.T @ target)
+        gram = (basis.T @ basis).toarray()
+        penalty = _curvature(splines) * np.trace(gram) / splines
+        smooth = cho_solve(
+            cho_factor(gram + FIRST_WEIGHT * penalty + 1e-9 * np.eye(splines)), np.asarray(basis.T @ target)
+        )
         slope = BSpline(knots, smooth, DEGREE).derivative()(x)
-        moved = (problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64)
-        columns = [basis, moved * slope[:, None]] + ([-moved] if problem.vertical else [])
-        design = np.hstack(columns)
+        moved = csr_array((problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64))
+        columns = [basis, moved.multiply(slope[:, None])] + ([-moved] if problem.vertical else [])
+        design = csr_array(hstack(columns))
         padded = np.zeros((design.shape[1], design.shape[1]))
         padded[:splines, :splines] = penalty
-        return cls(splines, knots, design, target, design.T @ design, design.T @ target, padded)
+        return cls(splines, knots, design.toarray(), target, (design.T @ design).toarray(), design.T @ target, padded)
 
     def _factor(self, weight: float) -> tuple[FloatArray, bool]:
         matrix = self.normal + weight * self.penalty
@@ -296,7 +314,7 @@ class _System:
         inner = slice(self.splines)
         matrix = self.normal[inner, inner] + weight * self.penalty[inner, inner]
         matrix[np.diag_indices(self.splines)] += 1e-12 * np.trace(matrix) / self.splines
-        along = float(self.right[inner] @ np.linalg.solve(matrix, self.right[inner]))
+        along = float(self.right[inner] @ cho_solve(cho_factor(matrix), self.right[inner]))
         return float(self.target @ self.target) - along
 
     def likeliest_weight(self) -> float:
@@ -330,16 +348,19 @@ class _System:
 
 
 def _curvature(size: int) -> FloatArray:
-    second = np.diff(np.eye(size), 2, axis=0)
-    return np.asarray(second.T @ second, dtype=np.float64)
+    """Return the matrix of the sum of squared second differences."""
+    second = csr_array(diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(size - 2, size)))
+    return np.asarray(csr_array(second.T @ second).toarray(), dtype=np.float64)
 
 
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:
-    """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or more."""
+    """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
+    more.
+    """
     shorter = min(np.ptp(x), np.ptp(other_x))
     low, high = x[0] - other_x[-1] + shorter / 6, x[-1] - other_x[0] - shorter / 6
     best = (np.inf, 0.0)
-    for shift in np.linspace(low, high, 121):
+    for shift in np.linspace(low, high, 61):
         moved = other_x + shift
         inside, own = (moved >= x[0]) & (moved <= x[-1]), (x >= moved[0]) & (x <= moved[-1])
         difference = np.append(

@@ -17,7 +17,8 @@ TOLERANCE = 1e-11
 """Last step of Newton's method, relative to the depth: far below any discretisation error, above rounding."""
 
 SHORTEST_REACH = 1e-9
-"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it: an error of that size."""
+"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it: an error of that
+size."""
 
 BALANCE = 1e-7
 """Largest relative difference between the load carried and the load wanted in a converged state."""
@@ -76,7 +77,8 @@ def steady_viscoelastic_sliding(
     Parameters
     ----------
     height : array, shape (points,)
-        Heights h, m, positive into the elastomer, in the order in which an element meets them. A multiple of four points
+        Heights h, m, positive into the elastomer, in the order in which an element meets them. A multiple of four
+        points
         if `periodic`, one more otherwise, so that every fourth point spans the same line.
     spacing : float
         Distance of points, m.
@@ -94,7 +96,8 @@ def steady_viscoelastic_sliding(
 
     Notes
     -----
-    The line is straight between points and swept exactly; the result is extrapolated from the same line with every second
+    The line is straight between points and swept exactly; the result is extrapolated from the same line with every
+    second
     point. The answer depends on nothing but the arguments: each solve starts from the statics.
     """
     heights = np.asarray(height, dtype=np.float64)

@@ -170,7 +170,7 @@ def sweep(
     totals : array, shape (6,), output
         Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
         beyond the line.
-    work : array, shape (9, arms), scratch
+    work : array, shape (10, max(arms, 1)), scratch
 
     Returns
     -------
@@ -178,7 +178,7 @@ def sweep(
         Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
     """
     arms, last = moduli.size, penetration.size - 1
-    e, following, modes = work[0], work[1], work[2]
+    e, modes = work[0], work[1]
     step_factors(1.0, reach, work[3], work[4], work[5])
     imbalance[:] = 0.0
     totals[:] = 0.0
@@ -189,7 +189,7 @@ def sweep(
         push += moduli[m] * e[m]
         modes[m] = 0.0
     place, pieces, node = 0.0, 0, 1
-    flying = undeformed or push < 0
+    flying, left = undeformed or push < 0, True
     if flying and not undeformed:
         _into_flight(penetration[0], push / glass, e, moduli, modes, amplitude_of)
     while True:
@@ -203,59 +203,86 @@ def sweep(
             for k in range(arms):
                 totals[5] += modes[k] * times[k]
             return pieces, CLOSED
-        place = goal
-        begin = place
-        node = int(place) + 1
-        if node > last:
+        if int(goal) >= last:
             return pieces, OPEN_END
-        strain = penetration[node] - (penetration[node] - penetration[node - 1]) * (node - place)
-        first = strain
-        left = False
-        while node <= last and not left:
-            slope = penetration[node] - penetration[node - 1]
-            length = node - place
-            if length == 1.0:
-                decay, gain, area = work[3], work[4], work[5]
-            else:
-                decay, gain, area = work[6], work[7], work[8]
-                step_factors(length, reach, decay, gain, area)
-            pressure = penetration[node]
-            for m in range(arms):
-                following[m] = decay[m] * e[m] + gain[m] * slope
-                pressure += moduli[m] * following[m]
-            if pressure < 0:
-                left = True
-                length = leaving_point(length, strain, slope, e, moduli, reach)
-                decay, gain, area = work[6], work[7], work[8]
-                step_factors(length, reach, decay, gain, area)
-                pressure = strain + slope * length
-                for m in range(arms):
-                    following[m] = decay[m] * e[m] + gain[m] * slope
-                    pressure += moduli[m] * following[m]
-            viscous = 0.0
-            for m in range(arms):
-                integral = gain[m] * e[m] + area[m] * slope
-                imbalance[m] += integral
-                viscous += moduli[m] * integral
-            elastic = length * (strain + 0.5 * slope * length)
-            totals[0] += elastic
-            totals[1] += elastic + viscous
-            totals[2] += viscous * slope
-            totals[4] += slope * slope * length
-            strain = strain + slope * length if left else penetration[node]
-            place = place + length if left else float(node)
-            node += 1
-            e, following = following, e
-        totals[2] += 0.5 * (strain - first) * (strain + first)
-        totals[3] += place - begin
-        lengths[pieces] = place - begin
+        place, strain, pressure, left = _contact(goal, penetration, moduli, reach, imbalance, totals, work)
+        lengths[pieces] = place - goal
         pieces += 1
         if not left:
-            for m in range(arms):
-                work[0, m] = e[m]
             return pieces, OPEN_END
+        node = int(work[2, 0])
         _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
         flying = True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _contact(
+    begin: float,
+    penetration: FloatArray,
+    moduli: FloatArray,
+    reach: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+    work: FloatArray,
+) -> tuple[float, float, float, bool]:  # pragma: no cover
+    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep` for the arrays.
+
+    Returns
+    -------
+    place, strain, pressure, left
+        Where it ends, with what strain and rest of stress, and whether it left the profile there; the stretches stay in
+        ``work[0]``, and ``work[2, 0]`` is the next node that a flight may meet.
+    """
+    arms, last = moduli.size, penetration.size - 1
+    e, following = work[0], work[9]
+    place, node = begin, int(begin) + 1
+    rise = penetration[node] - penetration[node - 1]
+    first = strain = penetration[node] - rise * (node - place)
+    pressure, left = 0.0, False
+    while node <= last and not left:
+        slope = penetration[node] - penetration[node - 1]
+        length = node - place
+        factors = work[3:6]
+        if length != 1.0:
+            factors = work[6:9]
+            step_factors(length, reach, factors[0], factors[1], factors[2])
+        pressure = _stretch(penetration[node], slope, e, following, moduli, factors)
+        if pressure < 0:
+            left = True
+            length = leaving_point(length, strain, slope, e, moduli, reach)
+            factors = work[6:9]
+            step_factors(length, reach, factors[0], factors[1], factors[2])
+            pressure = _stretch(strain + slope * length, slope, e, following, moduli, factors)
+        viscous = 0.0
+        for m in range(arms):
+            integral = factors[1, m] * e[m] + factors[2, m] * slope
+            imbalance[m] += integral
+            viscous += moduli[m] * integral
+            e[m] = following[m]
+        elastic = length * (strain + 0.5 * slope * length)
+        totals[0] += elastic
+        totals[1] += elastic + viscous
+        totals[2] += viscous * slope
+        totals[4] += slope * slope * length
+        strain = strain + slope * length if left else penetration[node]
+        place = place + length if left else float(node)
+        node += 1
+    totals[2] += 0.5 * (strain - first) * (strain + first)
+    totals[3] += place - begin
+    work[2, 0] = node
+    return place, strain, pressure, left
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _stretch(
+    strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
+) -> float:  # pragma: no cover
+    """Carry the stretches along a straight piece and return the stress at its end, where the strain is `strain`."""
+    pressure = strain
+    for m in range(moduli.size):
+        following[m] = factors[0, m] * e[m] + factors[1, m] * slope
+        pressure += moduli[m] * following[m]
+    return pressure
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -327,7 +354,8 @@ def tangent(
     memory_of : array, shape (arms, arms)
         a_m in each mode.
     periodic : bool
-        Whether the line closes; otherwise there is only the column of the depth, and the recovery beyond the line counts.
+        Whether the line closes; otherwise there is only the column of the depth, and the recovery beyond the line
+        counts.
     change : array, shape (arms, columns), output
         Derivative of a(end) - a(start); the last column belongs to the depth, the others to e(start).
     strain_area : array, shape (columns,), output
@@ -485,7 +513,7 @@ def solve_sliding(
     arms, nodes = moduli.size, profile.size
     columns = arms + 1 if periodic else 1
     lengths, penetration = np.empty(2 * nodes + 4), np.empty(nodes)
-    imbalance, work = np.empty(arms), np.empty((9, arms))
+    imbalance, work = np.empty(arms), np.empty((10, max(arms, 1)))
     change, row, scratch = np.empty((arms, columns)), np.empty(columns), np.empty((2, arms, columns))
     matrix, residual = np.empty((columns, columns)), np.empty(columns)
     for sweeps in range(1, 81):

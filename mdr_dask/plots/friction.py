@@ -187,7 +187,7 @@ def _per_series(found: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
 
 def _draw_zone_one(series: Mapping[str, xr.Dataset]) -> Figure:
     """Figure 3.10: alpha and beta over the Hurst exponent, with H / (1 + H)."""
-    found = FIT["friction-zone-one"](series)
+    found = FIT["zone_one"](series)
     if "hurst" not in found.dims:
         raise DataError("expected a store with an axis hurst, for alpha and beta over it")
     figure, axes = _figure("Hurst exponent H", "α", "law of zone 1: μ/slope = β (v τ slope/h) (GhL/F)^α (bars: 95 %)")
@@ -217,7 +217,7 @@ def _draw_zone_one(series: Mapping[str, xr.Dataset]) -> Figure:
 
 def _draw_plateau(series: Mapping[str, xr.Dataset]) -> Figure:
     """Figure 3.11: the plateau over the Hurst exponent, one curve for every load."""
-    found = FIT["friction-plateau"](series)
+    found = FIT["plateau"](series)
     if "hurst" not in found.dims:
         raise DataError("expected a store with an axis hurst, for the plateau over it")
     figure, axes = _figure("Hurst exponent H", "largest μ / rms slope", "plateau of friction (bars: 95 %)")
@@ -265,14 +265,10 @@ def _draw_indenter(series: Mapping[str, xr.Dataset]) -> Figure:
 
 
 PLOTS: tuple[Plot, ...] = (
-    Plot("friction-regions", MODELS, "friction over velocity with regions I to IV (Fig. 3.7)", _draw_regions),
-    Plot(
-        "friction-velocity", MODELS, "friction over velocity and the law, e.g. for several H (Fig. 3.8)", _draw_velocity
-    ),
-    Plot("friction-force", MODELS, "friction over velocity for many loads, logarithmic (Fig. 3.9)", _draw_forces),
-    Plot("friction-zone-one", MODELS, "alpha and beta over the Hurst exponent (Fig. 3.10)", _draw_zone_one),
-    Plot("friction-plateau", MODELS, "plateau of friction over the Hurst exponent (Fig. 3.11)", _draw_plateau),
-    Plot(
-        "friction-indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", _draw_indenter
-    ),
+    Plot("regions", MODELS, "friction over velocity with regions I to IV (Fig. 3.7)", _draw_regions),
+    Plot("velocity", MODELS, "friction over velocity and the law, e.g. for several H (Fig. 3.8)", _draw_velocity),
+    Plot("force", MODELS, "friction over velocity for many loads, logarithmic (Fig. 3.9)", _draw_forces),
+    Plot("zone_one", MODELS, "alpha and beta over the Hurst exponent (Fig. 3.10)", _draw_zone_one),
+    Plot("plateau", MODELS, "plateau of friction over the Hurst exponent (Fig. 3.11)", _draw_plateau),
+    Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", _draw_indenter),
 )

@@ -39,12 +39,12 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     """
     if all(_is_laid_out(url, template) for template in layout):
         return
-    root = zarr.open_group(url, mode="a", use_consolidated=False, attributes={"mdr_dask_layout": LAYOUT})
+    root = _open_plainly(url, "")
     earlier = dict(root.attrs)
     shared = _study_attributes(layout[0].campaign, earlier)
     for template in layout:
         name = template.series.name
-        group = root.require_group(name) if name else root
+        group = _open_plainly(url, name)
         _lay_out_group(group, template)
         own = shared | _series_attributes(template)
         if name:
@@ -52,10 +52,16 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
         else:
             shared = own
     members = _members(root, "")
-    for name, group in root.groups():
-        members |= _members(group, f"{name}/")
+    for name in sorted(root.group_keys()):
+        members |= _members(_open_plainly(url, name), f"{name}/")
     _publish(url, "", members, shared)
     forget_open_groups()
+
+
+def _open_plainly(url: str, series: str) -> zarr.Group:
+    """Open or make a group by what its members say of themselves, not by consolidated metadata of an earlier shape."""
+    marker: dict[str, Any] = {"mdr_dask_layout": LAYOUT}
+    return zarr.open_group(url, path=series or None, mode="a", use_consolidated=False, attributes=marker)
 
 
 def _is_laid_out(url: str, template: Template) -> bool:

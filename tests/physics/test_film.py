@@ -139,15 +139,21 @@ def test_gap_beside_a_dry_contact_starts_at_zero_and_ends_at_the_parabola():
 
 def test_friction_of_an_isoviscous_newtonian_film_is_shear_times_width():
     contact = film.hertz_line(8e4, 115e9, 0.025)
-    found = film.fluid_friction(contact, 1e-6, -0.3, lambda p: 0.1 + 0 * p, np.inf)
+    found = film.fluid_friction(contact, 1e-6, -0.3, lambda p: np.log(0.1) + 0 * p, 1e12)
     assert found == pytest.approx(0.1 * 0.3 / 1e-6 * 2 * contact.half_width / 8e4, rel=1e-12)
 
 
 def test_eyring_friction_is_newtonian_for_slow_shear_and_smaller_for_fast():
     contact = film.hertz_line(8e4, 115e9, 0.025)
     slow, fast = (
-        [film.fluid_friction(contact, 1e-6, v, lambda p: 0.1 * np.exp(1e-8 * p), stress) for stress in (5e6, np.inf)]
+        [film.fluid_friction(contact, 1e-6, v, lambda p: np.log(0.1) + 1e-8 * p, stress) for stress in (5e6, 1e12)]
         for v in (1e-3, 10.0)
     )
     assert slow[0] == pytest.approx(slow[1], rel=1e-6)
     assert fast[0] < 0.9 * fast[1]
+
+
+def test_friction_stays_finite_where_the_viscosity_overflows():
+    contact = film.hertz_line(1e9, 115e9, 0.025)
+    assert 0 < film.fluid_friction(contact, 1e-9, 1.0, lambda p: 1e-5 * p, 5e6) < np.inf
+    assert film.fluid_friction(contact, 1e-9, 0.0, lambda p: 1e-5 * p, 5e6) == 0.0

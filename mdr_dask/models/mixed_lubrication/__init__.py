@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Statu
 from mdr_dask.models.mixed_lubrication.lines import Source, problem_of
 from mdr_dask.models.mixed_lubrication.operation import Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
-from mdr_dask.models.mixed_lubrication.turn import POSITIONS, creeping, profiles, rolling, trace, turn_values
+from mdr_dask.models.mixed_lubrication.turn import POSITIONS, Turn, creeping, profiles, rolling, trace, turn_values
 
 if TYPE_CHECKING:
     from mdr_dask.physics.breakthrough import Excursions
@@ -27,7 +28,8 @@ OUTPUTS = (
     Output("film", "m", "film thickness h0"),
     Output("film_ratio", "1", "film thickness over combined rms height"),
     Output("load_share", "1", "share of the load on overlapping asperities"),
-    Output("discretisation_error", "1", "breakthrough probability less that on every second point", default=True),
+    Output("discretisation_error", "1", "breakthrough probability less that on every second point"),
+    Output("turn_error", "1", "standard error of the probability of one turn, from its batches", default=False),
     Output("contact_conductance", "S", "mean electrical conductance of the spots in contact", default=False),
     Output("contact_resistance", "ohm", "reciprocal of the mean conductance, infinite without contact", default=False),
     Output("friction_coefficient", "1", "coefficient of friction of film and spots in contact", default=False),
@@ -63,10 +65,12 @@ def compute(block: Block[MixedLubrication]) -> Result:
         case = block.case(index)
         problem = problem_of(case)
         if problem:
-            result.status[index] = Status.FAILED
-            result.messages.update({(index, r): problem for r in range(len(block.realisations))})
+            _refuse(result, index, Status.FAILED, problem)
             continue
         operation = operation_of(case)
+        if operation.problem:
+            _refuse(result, index, Status.NOT_CONVERGED, operation.problem)
+            continue
         groups.setdefault(operation.source, []).append((index, operation))
         _store(result, block, index, slice(None), fixed_values(operation))
     if set(block.outputs) - _UNROUGH:
@@ -90,6 +94,12 @@ def _empty(block: Block[MixedLubrication]) -> Result:
     return Result(values, np.full(shape, Status.MISSING, dtype=np.int8))
 
 
+def _refuse(result: Result, index: int, status: Status, why: str) -> None:
+    """Give up a case in all its realisations."""
+    result.status[index] = status
+    result.messages.update({(index, position): why for position in range(result.status.shape[1])})
+
+
 def _store(
     result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
 ) -> None:
@@ -110,16 +120,13 @@ def _realise(
     lines = source.lines(block.seed, block.realisations[position])
     above: Excursions | None = None
     for index, operation in members:
+        solve: Callable[..., Turn] = partial(creeping, operation, lines)
         if operation.case.slide_roll_ratio == 0:
-            above = (
-                breakthrough.excursions(lines[0] + lines[1], operation.level)
-                if above is None
-                else above.above(operation.level)
-            )
-            turn = rolling(operation, above)
-        else:
-            turn = creeping(operation, lines)
-        _store(result, block, index, position, turn_values(operation, turn))
+            level = operation.level
+            above = breakthrough.excursions(lines[0] + lines[1], level) if above is None else above.above(level)
+            solve = partial(rolling, operation, above)
+        turn = solve()
+        _store(result, block, index, position, turn_values(operation, turn, partial(solve, coarser=2), block.outputs))
         if "contact_length_trace" in block.outputs:
             _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
         if _PROFILES & set(block.outputs):
@@ -152,8 +159,8 @@ def seconds(block: Block[MixedLubrication]) -> float:
     """Estimate the time of a block from points, cases and creep."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    lines = 0.08 * float(millions.max())
-    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.15, 0.004))))
+    lines = 0.06 * float(millions.max())
+    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
 
 
 MODEL = Model(

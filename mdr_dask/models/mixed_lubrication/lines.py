@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, FloatArray
+from mdr_dask.models.base import FloatArray
+from mdr_dask.models.profile_file import ProfileFile, line_of
 
 if TYPE_CHECKING:
     from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
@@ -48,18 +48,18 @@ class Generated:
 class Measured:
     """Two measured lines, closed to rings; a realisation turns one ring against the other."""
 
-    file_1: DataFile
-    file_2: DataFile
+    file_1: ProfileFile
+    file_2: ProfileFile
     scaled: bool  # to unit rms height
 
     @property
     def points(self) -> int:
         """Number of points of the shorter file; the longer one is cut."""
-        return min(heights.size for _, heights in (_profile(self.file_1), _profile(self.file_2)))
+        return min(line_of(file).height.size for file in (self.file_1, self.file_2))
 
     def spacing(self, case: MixedLubrication) -> float:
         """Return the distance of the points in m, as in the files."""
-        return _profile(self.file_1)[0]
+        return line_of(self.file_1).spacing
 
     def combined_rms(self) -> float:
         """Return the rms height of both lines together, in m unless scaled."""
@@ -72,45 +72,15 @@ class Measured:
         return line_1, np.roll(line_2, int(np.random.Generator(stream).integers(line_2.size)))
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
-        lines = [_levelled(_profile(file)[1][: self.points]) for file in (self.file_1, self.file_2)]
-        rms = [float(np.sqrt(np.mean(line**2))) for line in lines]
-        first, second = (line / scale if self.scaled else line for line, scale in zip(lines, rms, strict=True))
+        """Return the lines without mean and tilt, so that their ends nearly meet."""
+        from mdr_dask.physics.measured import detrended, rms_height
+
+        lines = [detrended(line_of(file).height[: self.points], "line") for file in (self.file_1, self.file_2)]
+        first, second = (line / rms_height(line) if self.scaled else line for line in lines)
         return first, second
 
 
 Source = Generated | Measured
-
-
-@lru_cache(maxsize=8)
-def _profile(file: DataFile) -> tuple[float, FloatArray]:
-    """Return spacing and heights in m of a measured line.
-
-    Raises
-    ------
-    DataError
-        If the file does not hold two columns of numbers with evenly spaced places.
-    """
-    rows = [line.replace(",", " ").split() for line in file.read_text().splitlines() if line.strip() and line[0] != "#"]
-    try:
-        table = np.array(rows, dtype=np.float64)
-    except ValueError:
-        raise DataError(f"{file.name}: expected two columns of numbers, place and height in m") from None
-    if table.ndim != 2 or table.shape[1] != 2 or table.shape[0] < 64 or not np.all(np.isfinite(table)):
-        raise DataError(f"{file.name}: expected at least 64 rows of place and height in m, got shape {table.shape}")
-    steps = np.diff(table[:, 0])
-    spacing = float(steps.mean())
-    if not spacing > 0 or np.ptp(steps) > 1e-3 * spacing:
-        raise DataError(
-            f"{file.name}: expected evenly spaced, rising places, got steps of {steps.min():.4g} to {steps.max():.4g} m"
-        )
-    return spacing, table[:, 1]
-
-
-def _levelled(heights: FloatArray) -> FloatArray:
-    """Return heights without their mean and tilt, so that the ends of the line nearly meet."""
-    place = np.arange(heights.size) - (heights.size - 1) / 2
-    tilt = float(place @ heights) / float(place @ place)
-    return np.asarray(heights - heights.mean() - tilt * place)
 
 
 def source_of(case: MixedLubrication) -> Source:
@@ -158,7 +128,7 @@ def _problem_of_waves(case: MixedLubrication, source: Generated) -> str:
 
 
 def _problem_of_profiles(source: Measured) -> str:
-    one, two = (_profile(file)[0] for file in (source.file_1, source.file_2))
+    one, two = (line_of(file).spacing for file in (source.file_1, source.file_2))
     if abs(one - two) > 1e-3 * one:
         return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
     return ""

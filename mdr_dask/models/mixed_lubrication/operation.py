@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from mdr_dask.models.mixed_lubrication.lines import Source, source_of
 
 if TYPE_CHECKING:
     from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
-    from mdr_dask.physics.film import HertzLine
+    from mdr_dask.physics.film import Groups, HertzLine
+    from mdr_dask.physics.line_contact import LineContact
+
+
+class Film(NamedTuple):
+    """Thickness over R*, a warning, and why there is none (then it is NaN)."""
+
+    thickness: float
+    warning: str = ""
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -28,6 +40,7 @@ class Operation:
     window: int
     strength: float  # of the layer, for lines in units of `scale`
     warning: str
+    problem: str
 
     @property
     def level(self) -> float:
@@ -50,7 +63,7 @@ def operation_of(case: MixedLubrication) -> Operation:
     velocity = case.rotation_speed * case.roller_radius
     line_load = case.normal_force / case.roller_width
     groups = film.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
-    formula = film.FORMULAS[case.film_formula]
+    smooth = Film(case.film_thickness / radius) if case.film_thickness else _film(case, groups, E_star, viscosity)
     contact = case.dry_contact(case.normal_force)
     spacing = source.spacing(case)
     scale = case.rms_roughness or 1.0
@@ -59,15 +72,38 @@ def operation_of(case: MixedLubrication) -> Operation:
         source=source,
         contact=contact,
         E_star=E_star,
-        film=case.film_thickness or float(formula(*groups)) * radius,
+        film=case.film_thickness or smooth.thickness * radius,
         viscosity=viscosity,
         alpha=alpha,
         scale=scale,
         spacing=spacing,
         window=breakthrough.window_points(float(contact.half_width), spacing, source.points),
         strength=float(breakthrough.layer_strength(case.layer_shear_strength, E_star, case.layer_thickness)) / scale,
-        warning="" if case.film_thickness else formula.outside(*(float(group) for group in groups)),
+        warning=smooth.warning,
+        problem=smooth.problem,
     )
+
+
+def _film(case: MixedLubrication, groups: Groups, E_star: float, viscosity: float) -> Film:
+    from mdr_dask.physics import film, line_contact
+
+    W, U, G = (float(group) for group in groups)
+    if case.film_formula == "ehl":
+        law = case.viscosity_law
+        return _solved(line_contact.line_contact(W, U, G, E_star, viscosity_law=law, viscosity=viscosity), W)
+    formula = film.FORMULAS[case.film_formula]
+    return Film(float(formula(W, U, G)), formula.outside(W, U, G))
+
+
+@lru_cache(maxsize=1024)
+def _solved(contact: LineContact, W: float) -> Film:
+    """Return the central film of the EHL solution, once for all realisations: Hertz units are ``a^2/R^2 = 8 W/pi``."""
+    from mdr_dask.physics import line_contact
+
+    solution = line_contact.solve(contact)
+    if solution.status:
+        return Film(np.nan, problem=solution.reason)
+    return Film(solution.central_film * 8 * W / np.pi, solution.reason)
 
 
 def fixed_values(operation: Operation) -> dict[str, float]:
@@ -85,12 +121,11 @@ def friction(operation: Operation, share: float) -> float:
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
     if sliding == 0:
         return 0.0
-    law = oil.barus if case.viscosity_law == "barus" else oil.roelands
     liquid = film.fluid_friction(
         operation.contact,
         operation.film,
         sliding,
-        lambda pressure: law(pressure, operation.viscosity, operation.alpha),
+        lambda pressure: oil.log_viscosity(case.viscosity_law, pressure, operation.viscosity, operation.alpha),
         case.eyring_stress,
     )
     return share * case.boundary_friction + (1 - share) * liquid

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
     from mdr_dask.physics.film import HertzLine
@@ -61,8 +62,8 @@ class MixedLubrication(Parameters):
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m", "wavelength below which there is no roughness; auto is ten spacings of the points", default="auto"
     )
-    profile_1: NamedFile | None = Field(default=None, description="measured line of roller 1: two columns x, z in m")
-    profile_2: NamedFile | None = Field(default=None, description="measured line of roller 2: two columns x, z in m")
+    profile_1: ProfileFile | None = Field(default=None, description="measured line of roller 1")
+    profile_2: ProfileFile | None = Field(default=None, description="measured line of roller 2")
     layer_thickness: float = quantity("m", "critical thickness h_c of the boundary layer", default=5e-9, gt=0)
     layer_shear_strength: float = quantity("Pa", "limiting shear stress tau0 of the boundary layer", default=1e6, ge=0)
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
@@ -71,8 +72,8 @@ class MixedLubrication(Parameters):
     pressure_viscosity: (
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
     ) = quantity("1/Pa", "pressure-viscosity coefficient alpha, or the correlation that gives it", default="oil")
-    film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson"] = Field(
-        default="pan_hamrock", description="where the film thickness comes from"
+    film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"] = Field(
+        default="pan_hamrock", description="formula of the film thickness, or the central film of the EHL solution"
     )
     film_thickness: Positive | None = quantity("m", "film thickness, instead of the formula's", default=None)
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
@@ -86,7 +87,7 @@ class MixedLubrication(Parameters):
     boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
     eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", default=5e6, gt=0)
     viscosity_law: Literal["barus", "roelands"] = Field(
-        default="barus", description="viscosity under pressure, for the friction of the film"
+        default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
     trace_points: int = quantity("1", "angles of contact_length_trace in a turn", default=3600, ge=2, le=10**6)
     measured: NamedFile | None = Field(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from mdr_dask.models.base import FloatArray
 from mdr_dask.models.mixed_lubrication.operation import Operation, friction
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.breakthrough import Excursions, Windows
+    from mdr_dask.physics.breakthrough import Excursions
 
 STRIDES = 8  # windows with creep that overlap by more than 1 - 1/8 tell the same
 #: Places of the profiles in half widths of the contact.
@@ -25,70 +26,74 @@ class Turn:
 
     contact_points: NDArray[np.int32] | NDArray[np.int64]
     overlap: float  # mean sum in the window, in units of the lines
-    coarse: float  # probability on every second point
+    apart: int  # positions after which windows share no point
+
+    @property
+    def probability(self) -> float:
+        """Share of windows in intimate contact."""
+        return np.count_nonzero(self.contact_points) / self.contact_points.size
 
 
-def rolling(operation: Operation, above: Excursions) -> Turn:
-    """Return a turn of pure rolling, from the excursions of the combined line above the film or less."""
+def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:
+    """Return a turn of pure rolling, from the excursions of the combined line above the film or less.
+
+    With ``coarser = 2`` it is that of every second point.
+    """
     from mdr_dask.physics import breakthrough
 
-    level, spacing, rule = operation.level, operation.spacing, operation.case.edge_rule
-    clusters = breakthrough.find_clusters(above, level, spacing, operation.strength)
-    halved = breakthrough.find_clusters(above.every_second(), level, 2 * spacing, operation.strength)
-    window = operation.window
-    return Turn(
-        breakthrough.contact_points(clusters, window, rule),
-        breakthrough.mean_overlap(clusters, window),
-        _share(breakthrough.contact_points(halved, (window + 1) // 2, rule)),
-    )
+    points = above if coarser == 1 else above.every_second()
+    window = _window(operation, coarser)
+    clusters = breakthrough.find_clusters(points, operation.level, coarser * operation.spacing, operation.strength)
+    contact_points = breakthrough.contact_points(clusters, window, operation.case.edge_rule)
+    return Turn(contact_points, breakthrough.mean_overlap(clusters, window), window)
 
 
-def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray]) -> Turn:
-    """Return a turn with creep, from windows an eighth of their width apart."""
-    stride = max(2, operation.window // STRIDES // 2 * 2)
-    fine = _windows(operation, lines, stride)
-    even = lines[0].size // 2 * 2
-    halved = _windows(operation, (lines[0][:even:2].copy(), lines[1][:even:2].copy()), stride // 2, 2)
-    return Turn(fine.contact_points, float(fine.overlap.mean()), _share(halved.contact_points))
-
-
-def _windows(operation: Operation, lines: tuple[FloatArray, FloatArray], stride: int, coarser: int = 1) -> Windows:
+def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], coarser: int = 1) -> Turn:
+    """Return a turn with creep, from windows an eighth of their width apart, or that of every second point."""
     from mdr_dask.physics import breakthrough
 
-    points = lines[0].size
-    return breakthrough.judge_windows(
-        *lines,
+    even = lines[0].size // coarser * coarser
+    line_1, line_2 = (np.ascontiguousarray(line[:even:coarser]) for line in lines)
+    stride = max(2, operation.window // STRIDES // 2 * 2) // coarser
+    window = _window(operation, coarser)
+    found = breakthrough.judge_windows(
+        line_1,
+        line_2,
         operation.level,
         coarser * operation.spacing,
         operation.strength,
-        (operation.window + coarser - 1) // coarser,
-        breakthrough.creep_positions(np.arange(0, points, stride), points, operation.case.slide_roll_ratio),
+        window,
+        breakthrough.creep_positions(np.arange(0, line_1.size, stride), line_1.size, operation.case.slide_roll_ratio),
         operation.case.edge_rule,
     )
+    return Turn(found.contact_points, float(found.overlap.mean()), -(-window // stride))
 
 
-def _share(contact_points: NDArray[np.int32] | NDArray[np.int64]) -> float:
-    """Return the share of windows in intimate contact."""
-    return np.count_nonzero(contact_points) / contact_points.size
+def _window(operation: Operation, coarser: int) -> int:
+    return -(-operation.window // coarser)
 
 
-def turn_values(operation: Operation, turn: Turn) -> dict[str, float]:
-    """Return the scalar outputs of a realisation."""
+def turn_values(
+    operation: Operation, turn: Turn, halved: Callable[[], Turn], wanted: Collection[str]
+) -> dict[str, float]:
+    """Return those scalar outputs of a realisation that are wanted; `halved` gives the turn of every second point."""
     from mdr_dask.physics import breakthrough
 
     case = operation.case
-    probability = _share(turn.contact_points)
     length = float(turn.contact_points.sum(dtype=np.int64)) / turn.contact_points.size * operation.spacing
     force = operation.E_star * operation.spacing * operation.scale * turn.overlap
-    return {
-        "breakthrough_probability": probability,
-        "contact_length": length,
-        "load_share": force / case.normal_force,
-        "discretisation_error": probability - turn.coarse,
-        "contact_conductance": length / case.resistivity,
-        "contact_resistance": float(breakthrough.contact_resistance(case.resistivity, length)),
-        "friction_coefficient": friction(operation, length / (operation.window * operation.spacing)),
+    share = length / (operation.window * operation.spacing)
+    found: dict[str, Callable[[], float]] = {
+        "breakthrough_probability": lambda: turn.probability,
+        "contact_length": lambda: length,
+        "load_share": lambda: force / case.normal_force,
+        "discretisation_error": lambda: turn.probability - halved().probability,
+        "turn_error": lambda: breakthrough.probability_interval(turn.contact_points > 0, turn.apart).error,
+        "contact_conductance": lambda: length / case.resistivity,
+        "contact_resistance": lambda: float(breakthrough.contact_resistance(case.resistivity, length)),
+        "friction_coefficient": lambda: friction(operation, share),
     }
+    return {name: value() for name, value in found.items() if name in wanted}
 
 
 def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]) -> FloatArray:

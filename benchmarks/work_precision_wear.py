@@ -1,0 +1,137 @@
+"""Error against run time of the ways to the worn profile, side by side: ``python -m benchmarks.work_precision_wear``.
+
+The case is figure 6.2's (parabola, c = 0.455 a0) at N = 2 and N = 8; errors are the largest difference of f from the
+exact evolution at tolerance 1e-6, over 400 radii from 0 to 1.4 a0, in d0. The literal simulation counts 16 sub-steps a
+cycle and as few cycles as are stable. ``--figure FILE`` draws the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.physics import wear_cases
+from mdr_dask.physics.revolution import PowerProfile
+from mdr_dask.physics.wear import Worn, fast
+from mdr_dask.physics.wear_exact import exact, exact_without_error
+from mdr_dask.physics.wear_literal import literal
+
+PARABOLA = PowerProfile(2.0)
+STICK = 0.455
+RADII = np.linspace(0.0, 1.4, 400)
+
+
+class Row(NamedTuple):
+    method: str
+    setting: str
+    cycles: float
+    seconds: float
+    error: float
+
+
+def best_of(repeats: int, run: Callable[[], Worn]) -> tuple[float, Worn]:
+    """Return the shortest time of several runs, and a result."""
+    run()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        result = run()
+        times.append(time.perf_counter() - start)
+    return min(times), result
+
+
+def fast_seconds(cases: int = 20000) -> float:
+    """Return the time of one case of the fast rule among many: a(c) solved, scar, volume and force."""
+    c, n = np.linspace(0.05, 0.95, cases), np.full(cases, 2.0)
+    radius = wear_cases.limit_cases(n[:2], c[:2])[0]
+    wear_cases.fast_cases(n[:2], c[:2], 2.0, 0.8, radius)
+    start = time.perf_counter()
+    radius = wear_cases.limit_cases(n, c)[0]
+    wear_cases.fast_cases(n, c, 2.0, 0.8, radius)
+    return (time.perf_counter() - start) / cases
+
+
+def rows() -> list[Row]:
+    """Measure everything once."""
+    table = []
+    for cycles in (2.0, 8.0):
+        truth = exact(PARABOLA, STICK, [cycles], 1e-5)[0].height(RADII)
+
+        def measure(method: str, setting: str, repeats: int, run: Callable[[], Worn]) -> None:
+            seconds, worn = best_of(repeats, run)
+            error = float(np.max(np.abs(worn.height(RADII) - truth)))  # noqa: B023
+            table.append(Row(method, setting, cycles, seconds, error))  # noqa: B023
+
+        for xi in (0.8, 0.95):
+            measure("fast", f"xi {xi}, one case with profile", 3, lambda xi=xi: fast(PARABOLA, STICK, cycles, xi))  # noqa: B023
+        for tolerance in (3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4):
+            measure(
+                "exact",
+                f"tolerance {tolerance:g}",
+                3,
+                lambda tolerance=tolerance: exact_without_error(PARABOLA, STICK, cycles, tolerance),  # noqa: B023
+            )
+        for cells in (50, 100, 200, 400):
+            measure(
+                "literal",
+                f"{cells} cells",
+                1,
+                lambda cells=cells: literal(PARABOLA, STICK, cycles, cells=cells, substeps=16),  # noqa: B023
+            )
+    return table
+
+
+def draw(table: list[Row], path: str) -> None:
+    """Draw error over time."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4), layout="constrained")
+    for axes, cycles in zip(figure.subplots(1, 2), (2.0, 8.0), strict=True):
+        for method in ("fast", "exact", "literal"):
+            points = [row for row in table if row.method == method and row.cycles == cycles]
+            axes.loglog([row.seconds for row in points], [row.error for row in points], "o-", label=method)
+        axes.set_xlabel("run time, s")
+        axes.set_ylabel("largest |Δf| / $d_0$")
+        axes.set_title(f"parabola, c = 0.455, N = {cycles:g}", fontsize=10)
+        axes.legend()
+    figure.savefig(path, dpi=120)
+
+
+def main() -> None:
+    """Print the table, and ratios of times at an error of 1e-3."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--figure")
+    options = parser.parse_args()
+    table = rows()
+    print(f"{'method':8} {'setting':34} {'N':>4} {'seconds':>10} {'error':>9}")
+    for row in table:
+        print(f"{row.method:8} {row.setting:34} {row.cycles:4g} {row.seconds:10.2e} {row.error:9.1e}")
+    single = fast_seconds()
+    print(f"fast, one of 20000 compiled cases: {single:.2e} s")
+    for cycles in (2.0, 8.0):
+        literal_time = at_error([r for r in table if r.method == "literal" and r.cycles == cycles])
+        exact_time = min(r.seconds for r in table if r.method == "exact" and r.cycles == cycles and r.error <= 1e-3)
+        print(
+            f"N = {cycles:g}, error 1e-3: literal {literal_time:.3g} s, exact {exact_time:.3g} s: "
+            f"exact {literal_time / exact_time:.3g} times faster; fast rule (its own equation solved to 2e-6) "
+            f"{literal_time / single:.3g} times"
+        )
+    if options.figure:
+        draw(table, options.figure)
+
+
+def at_error(points: list[Row], error: float = 1e-3) -> float:
+    """Return the time at which a method reaches an error; beyond its points along their regression, log over log."""
+    reached = [row.seconds for row in points if row.error <= error]
+    if reached:
+        return min(reached)
+    slope, level = np.polyfit(np.log([row.error for row in points]), np.log([row.seconds for row in points]), 1)
+    return float(np.exp(level) * error**slope)
+
+
+if __name__ == "__main__":
+    main()

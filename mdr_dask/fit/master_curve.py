@@ -1,0 +1,342 @@
+"""Master curves of a store or of any table: shift factors, the merged curve, and the laws that the factors follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fit.base import Fit
+from mdr_dask.models.tables import parse_table
+from mdr_dask.physics import shift_laws, superposition
+
+FloatArray = NDArray[np.float64]
+
+ALIASES: dict[str, tuple[str, ...]] = {
+    "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
+    "normal_force": ("force", "load", "f_n", "fn"),
+    "velocity": ("v", "speed", "sliding_velocity"),
+    "temperature": ("T", "t_c", "t_k", "temp"),
+    "frequency": ("f", "freq", "omega"),
+    "time": ("t",),
+    "modulus": ("relaxation_modulus", "e_relax", "g_relax", "storage_modulus", "e_stor", "g_stor", "e'", "g'"),
+}
+"""Names of columns that are understood, beside the names themselves; case does not matter."""
+
+ABSOLUTE_ZERO = -273.15
+NORMAL_95 = 1.959963984540054
+
+
+def read_table(path: str | Path) -> pd.DataFrame:
+    """Read a table of numbers: one row of names, perhaps a row of units, comments and a byte-order mark tolerated.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Floating-point columns under their own names; ``attrs["units"]`` holds the units found.
+
+    Raises
+    ------
+    DataError
+        If there is no row of names, or an entry is not a number.
+    """
+    parsed = parse_table(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
+    if not parsed.names:
+        raise DataError(f"{path}: expected names of columns, got numbers")
+    table = pd.DataFrame(parsed.values, columns=list(parsed.names))
+    table.attrs["units"] = dict(zip(parsed.names, parsed.units, strict=False))
+    return table
+
+
+def master_curve(
+    table: xr.Dataset | pd.DataFrame,
+    abscissa: str | None = None,
+    ordinate: str | None = None,
+    group: str | None = None,
+    vertical: bool = False,
+    reference: float | None = None,
+    draws: int = 0,
+) -> xr.Dataset:
+    """Shift curves of a table into one.
+
+    Parameters
+    ----------
+    table : Dataset or DataFrame
+        A series of a store (realisations are averaged) or columns of numbers.
+    abscissa, ordinate, group : str, optional
+        Columns: what curves are drawn over, their values, and what they differ in. By default the coefficient of
+        friction over force by velocity (or temperature), or the modulus over frequency or time by temperature.
+    vertical : bool
+        Whether curves may shift along the ordinate too.
+    reference : float, optional
+        Group whose factors are zero; the nearest one to it if it was not measured exactly; the middle one by default.
+    draws : int
+        Bootstrap samples of the factors.
+
+    Returns
+    -------
+    Dataset
+        ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
+        group, with
+        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
+        ``point_group``: all
+        points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
+        decades), with the range measured at the reference in its attrs; constants of the laws that apply.
+
+    Raises
+    ------
+    DataError
+        If a column is missing, not positive, or the curves do not overlap.
+    """
+    frame = _frame(table)
+    over, values, by = _columns(frame, abscissa, ordinate, group)
+    _require_one_group(frame, {over, values, by})
+    groups, curves = _curves(frame, over, values, by)
+    nearest = None if reference is None else _nearest(groups, reference)
+    result = superposition.superpose(groups, curves, vertical, nearest, draws)
+    units = frame.attrs.get("units", {})
+    dataset = _dataset(result, over, values, by, units)
+    return dataset.assign(_laws(result, over, by, units.get(by, "")))
+
+
+def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
+    if isinstance(table, pd.DataFrame):
+        return table
+    mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table
+    numeric = [name for name in mean.variables if mean[name].dtype.kind in "fiu" and name != "status"]
+    frame = mean[[name for name in numeric if name in mean.data_vars]].to_dataframe().reset_index()
+    frame.attrs["units"] = {str(name): str(mean[name].attrs.get("units", "1")) for name in numeric}
+    return frame
+
+
+def _find(frame: pd.DataFrame, wanted: str) -> str | None:
+    """Return the column of a name or of one of its aliases, as written or else in any case."""
+    columns = [str(name) for name in frame.columns]
+    lowered = [name.strip().lower().replace(" ", "_") for name in columns]
+    names = (wanted, *ALIASES.get(wanted, ()))
+    exact = [name for name in names if name in columns]
+    loose = [columns[lowered.index(name.lower())] for name in names if lowered.count(name.lower()) == 1]
+    return (exact + loose + [None])[0]
+
+
+def _columns(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
+    """Return the columns to use: those given, else the first family of which the table has all."""
+    families = [
+        ("normal_force", "friction_coefficient", "velocity"),
+        ("normal_force", "friction_coefficient", "temperature"),
+        ("frequency", "modulus", "temperature"),
+        ("time", "modulus", "temperature"),
+    ]
+    found = []
+    for family in families:
+        names = [
+            _find(frame, name) if wish is None else _find(frame, wish) for wish, name in zip(given, family, strict=True)
+        ]
+        if None not in names and (all(given) or _varies(frame, names)):
+            found.append(names)
+    if not found:
+        wanted = (
+            ", ".join(repr(name) for name in given if name is not None)
+            or "a coefficient over force or a modulus over time"
+        )
+        raise DataError(f"expected columns for {wanted}, got {[str(name) for name in frame.columns]!r}")
+    return str(found[0][0]), str(found[0][1]), str(found[0][2])
+
+
+def _varies(frame: pd.DataFrame, names: list[str | None]) -> bool:
+    return all(frame[name].nunique() > 1 for name in (names[0], names[2]))
+
+
+def _require_one_group(frame: pd.DataFrame, used: set[str]) -> None:
+    for name in ("velocity", "temperature", "normal_force"):
+        column = _find(frame, name)
+        if column is not None and column not in used and frame[column].nunique() > 1:
+            raise DataError(f"the table varies in {column!r} too: keep one of its values, or group by it")
+
+
+def _curves(
+    frame: pd.DataFrame, over: str, values: str, by: str
+) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
+    rows = frame[[over, values, by]].to_numpy(dtype=np.float64)
+    rows = rows[np.all(np.isfinite(rows), axis=1)]
+    if rows.size == 0 or np.any(rows[:, :2] <= 0):
+        raise DataError(f"{over!r} and {values!r} must be positive: curves are shifted along logarithmic axes")
+    labels = _clusters(rows[:, 2])
+    parts = [rows[labels == label] for label in np.unique(labels)]
+    centres = np.array([np.median(part[:, 2]) for part in parts])
+    return centres, [(np.log10(part[:, 0]), np.log10(part[:, 1])) for part in parts]
+
+
+def _clusters(values: FloatArray) -> NDArray[np.intp]:
+    """Return the number of the group of each value.
+
+    Measured values that scatter about a few set ones are split at the largest jump among their gaps.
+    """
+    distinct, place = np.unique(values, return_inverse=True)
+    if distinct.size <= values.size / 3 or distinct.size < 3:
+        return place
+    gaps = np.sort(np.diff(distinct))
+    jump = int(np.argmax(gaps[1:] / gaps[:-1]))
+    threshold = np.sqrt(gaps[jump] * gaps[jump + 1])
+    return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
+
+
+def _nearest(groups: FloatArray, reference: float) -> float:
+    if len(groups) > 1 and not groups.min() - 0.5 * np.ptp(groups) <= reference <= groups.max() + 0.5 * np.ptp(groups):
+        raise DataError(f"the reference {reference:g} is far from the groups {groups.min():g} to {groups.max():g}")
+    return float(groups[np.argmin(np.abs(groups - reference))])
+
+
+def _dataset(
+    result: superposition.Superposition, over: str, values: str, by: str, units: Mapping[str, str]
+) -> xr.Dataset:
+    size = result.groups.size
+    dataset = xr.Dataset(
+        coords={by: (by, result.groups, {"units": units.get(by, "")})},
+        attrs={
+            "abscissa": over,
+            "ordinate": values,
+            "group": by,
+            "reference": result.reference,
+            "noise": result.noise,
+        },
+    )
+    factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
+    factors["vertical_factor"] = (result.vertical, result.vertical_error)
+    for name, (factor, error) in factors.items():
+        meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
+        dataset[name] = (by, factor, {"units": "1", "long_name": meaning})
+        dataset[f"{name}_error"] = (by, error, {"units": "1", "long_name": "standard error"})
+        dataset[f"{name}_low"] = (by, factor - NORMAL_95 * error, {"units": "1"})
+        dataset[f"{name}_high"] = (by, factor + NORMAL_95 * error, {"units": "1"})
+    dataset["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
+    dataset["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
+    dataset["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
+    dataset["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
+    dataset["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
+    measured = {"measured_low": 10 ** result.measured[0], "measured_high": 10 ** result.measured[1]}
+    dataset["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
+    dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
+    dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
+    if result.draws.size:
+        dataset["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+    return dataset
+
+
+def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.DataArray]:
+    """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
+    size = result.groups.size
+    covariance = result.covariance[:size, :size]
+    is_temperature = by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
+    fits = []
+    try:
+        if is_temperature:
+            sign = -1 if over == "t" or over.lower() == "time" else 1
+            kelvin = 0.0 if unit.upper() in ("K", "KELVIN", "") and np.all(result.groups > 0) else -ABSOLUTE_ZERO
+            temperatures = result.groups + kelvin, sign * result.horizontal, covariance, result.reference + kelvin
+            fits = [shift_laws.fit_arrhenius(*temperatures), shift_laws.fit_wlf(*temperatures)]
+        elif np.all(result.groups > 0):
+            fits = [shift_laws.fit_power(result.groups, result.horizontal, covariance, result.reference)]
+    except FitError:
+        return {}
+    return {name: value for law in fits for name, value in _constants(law).items()}
+
+
+def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.DataArray]:
+    units = {"activation_energy": "J/mol", "c2": "K"}
+    found = {}
+    for key, (value, low, high) in law.constants.items():
+        for suffix, number in (("", value), ("_low", low), ("_high", high)):
+            found[f"{law.name}_{key}{suffix}"] = xr.DataArray(number, attrs={"units": units.get(key, "1")})
+    meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
+    found[f"{law.name}_residual"] = xr.DataArray(law.residual, attrs=meaning)
+    return found
+
+
+def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
+    """Return a master curve, as `master_curve` made or a file kept it, with the factors zero at another group.
+
+    Raises
+    ------
+    DataError
+        If the value lies outside the groups.
+    """
+    by = str(curve.attrs["group"])
+    over, values = str(curve.attrs["abscissa"]), str(curve.attrs["ordinate"])
+    groups = curve[by].to_numpy()
+    size = groups.size
+    covariance = np.zeros((2 * size, 2 * size))
+    covariance[:size, :size], covariance[size:, size:] = curve["covariance"], curve["vertical_covariance"]
+    old = superposition.Superposition(
+        groups=groups,
+        horizontal=curve["shift_factor"].to_numpy(),
+        vertical=curve["vertical_factor"].to_numpy(),
+        covariance=covariance,
+        reference=float(curve.attrs["reference"]),
+        noise=float(curve.attrs["noise"]),
+        x=np.log10(curve["point_abscissa"].to_numpy()),
+        y=np.log10(curve["point_ordinate"].to_numpy()),
+        member=np.searchsorted(groups, curve["point_group"].to_numpy()),
+        curve_x=np.log10(curve["curve_abscissa"].to_numpy()),
+        curve_y=np.log10(curve["curve_ordinate"].to_numpy()),
+        curve_error=curve["curve_error"].to_numpy(),
+        measured=(0.0, 0.0),
+        draws=np.empty((0, 2 * size)),
+    )
+    units = {
+        by: curve[by].attrs.get("units", ""),
+        over: curve["curve_abscissa"].attrs.get("units", ""),
+        values: curve["curve_ordinate"].attrs.get("units", ""),
+    }
+    new = superposition.rereference(old, reference)
+    return _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
+
+
+def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return the friction that the force master curve is about, from the series of a store.
+
+    It is the coefficient of friction of the first series that varies force and velocity, averaged over realisations;
+    less
+    that of a series with the same forces and velocities and no roughness, if there is one: the bulk's own friction.
+
+    Raises
+    ------
+    DataError
+        If no series varies ``normal_force`` and ``velocity``.
+    """
+    wanted = {"normal_force", "velocity"}
+    means = [
+        (
+            float(dataset.coords.get("rms_roughness", 1.0)),
+            dataset["friction_coefficient"].mean("realisation", keep_attrs=True),
+        )
+        for dataset in series.values()
+        if wanted <= set(dataset.dims) and "friction_coefficient" in dataset
+    ]
+    rough = [mean for height, mean in means if height > 0]
+    if not rough:
+        raise DataError("a force master curve needs a series with roughness that varies normal_force and velocity")
+    friction = rough[0]
+    for smooth in (mean for height, mean in means if height == 0):
+        if all(np.array_equal(smooth[name], friction[name]) for name in wanted):
+            friction = (friction - smooth.reset_coords(drop=True)).assign_attrs(friction.attrs)
+    return friction.to_dataset(name="friction_coefficient")
+
+
+def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    return master_curve(friction_of_roughness(series))
+
+
+FITS = (
+    Fit(
+        "master_curve",
+        ("sliding_friction",),
+        "mu(F_N, v) = Q(log F_N + shift(v)), shift = exponent log v (thesis 3.44-3.46)",
+        _of_store,
+    ),
+)

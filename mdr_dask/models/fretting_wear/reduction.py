@@ -1,0 +1,152 @@
+"""From the parameters of a block to what the physics of wear needs: n, g_c and N of every case and realisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.models.base import Block
+from mdr_dask.models.fretting_wear.parameters import EXPONENTS, FrettingWear, PowerShape, TableShape
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.revolution import TableProfile
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What the physics needs of every case and realisation, and the units of the case; shape (cases, realisations).
+
+    `level` is g_c = 1 - eta, the image at the stick border; `advance` is the factor from cycles to N.
+    """
+
+    exponent: FloatArray
+    level: FloatArray
+    advance: FloatArray
+    cycles: FloatArray
+    xi: FloatArray
+    length: FloatArray
+    height: FloatArray
+    force: FloatArray
+
+
+def shapes(block: Block[FrettingWear]) -> list[object]:
+    """Return the shape of every case, or the one that all share."""
+    return list(block.columns["shape"]) if "shape" in block.columns else [block.parameters.shape]
+
+
+def _exponents(block: Block[FrettingWear]) -> FloatArray:
+    if "shape.exponent" in block.columns:
+        return np.asarray(block.columns["shape.exponent"], dtype=float)
+    powers = [s.exponent if isinstance(s, PowerShape) else EXPONENTS.get(str(s), np.nan) for s in shapes(block)]
+    return np.broadcast_to(np.array(powers, dtype=float), (block.cases,))
+
+
+def _column(block: Block[FrettingWear], name: str) -> FloatArray:
+    """Return a number of every case, NaN where it is not given."""
+    if name not in block.columns:
+        value = getattr(block.parameters, name)
+        return np.full(block.cases, np.nan if value is None else float(value))
+    return np.array([np.nan if v is None else v for v in block.columns[name]], dtype=float)
+
+
+def _scatter(block: Block[FrettingWear]) -> FloatArray:
+    """Return standard normal numbers for friction, amplitude and wear coefficient, shape (realisations, 3)."""
+    return np.array(
+        [
+            np.random.Generator(np.random.Philox(np.random.SeedSequence(block.seed, spawn_key=(r,)))).standard_normal(3)
+            for r in block.realisations
+        ]
+    ).reshape(-1, 3)
+
+
+def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatArray:
+    """Return log-normal factors of mean one, shape (cases, realisations)."""
+    width = np.sqrt(np.log1p(_column(block, name) ** 2))[:, None]
+    return np.asarray(np.exp(width * normal - 0.5 * width**2))
+
+
+def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
+    """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0."""
+    n, normal = _exponents(block), _scatter(block)
+    amplitude = _factor(block, "amplitude_scatter", normal[:, 1])
+    widening = amplitude / _factor(block, "friction_scatter", normal[:, 0])
+    advance = amplitude * _factor(block, "wear_coefficient_scatter", normal[:, 2])
+    messages: dict[tuple[int, int], str] = {}
+    if block.parameters.stick_radius is not None or "stick_radius" in block.columns:
+        level = (1.0 - widening) + widening * (_column(block, "stick_radius") ** n)[:, None]
+        length = height = force = np.ones(block.cases)
+    else:
+        modulus = _column(block, "modulus")
+        length, height = _first_contact(block, n, modulus, messages)
+        force = modulus * height * length
+        share = _column(block, "shear_modulus") * _column(block, "amplitude")
+        level = 1.0 - widening * (share / (_column(block, "friction") * modulus * height))[:, None]
+        rate = 4.0 * _column(block, "amplitude") * _column(block, "wear_coefficient") * modulus
+        advance = advance * (rate / (length * _column(block, "hardness")))[:, None]
+    columns = (n, _column(block, "cycles"), _column(block, "xi"), length, height, force)
+    n, cycles, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
+    return Numbers(n, level, advance, cycles * advance, xi, length, height, force), messages
+
+
+def _first_contact(
+    block: Block[FrettingWear], n: FloatArray, modulus: FloatArray, messages: dict[tuple[int, int], str]
+) -> tuple[FloatArray, FloatArray]:
+    """Return a0 and d0 of dimensional cases; a table that cannot be pressed so deep is a message."""
+    from mdr_dask.physics import axisymmetric as contact
+
+    depth, load, angle = _column(block, "depth"), _column(block, "load"), _column(block, "angle")
+    if any(isinstance(shape, TableShape) for shape in shapes(block)):
+        length = np.full(block.cases, np.nan)
+        for case, (shape, deep) in enumerate(zip(_every_shape(block), depth, strict=True)):
+            try:
+                length[case] = table_profile(shape, float(deep)).length
+            except ValueError as problem:
+                messages.update({(case, position): str(problem) for position in range(len(block.realisations))})
+        return length, depth
+    scale = np.where(np.isnan(angle), _column(block, "curvature_radius") ** (1.0 - n) / n, np.tan(angle))
+    from_load = contact.radius_from_force(load, scale, n, modulus)
+    length = np.where(np.isnan(depth), from_load, contact.contact_radius(depth, scale, n))
+    return length, np.where(np.isnan(depth), contact.depth(length, scale, n), depth)
+
+
+def _every_shape(block: Block[FrettingWear]) -> list[object]:
+    listed = shapes(block)
+    return listed if len(listed) == block.cases else listed * block.cases
+
+
+def table_profile(shape: object, depth: float) -> TableProfile:
+    """Read a table and press it; cached by content."""
+    if not isinstance(shape, TableShape):
+        raise ValueError("tables and formulas of profiles cannot be mixed along one axis")
+    return _pressed_table(shape.table.read_text(), depth)
+
+
+@lru_cache(maxsize=64)
+def _pressed_table(text: str, depth: float) -> TableProfile:
+    from mdr_dask.physics.revolution import from_table
+
+    rows = [line.split(",") for line in text.splitlines()[1:] if line.strip()]
+    try:
+        data = np.array([[float(row[0]), float(row[1])] for row in rows])
+    except (ValueError, IndexError) as problem:
+        raise ValueError(f"a table of a profile needs two columns of numbers below its header: {problem}") from None
+    return from_table(data[:, 0], data[:, 1], depth)
+
+
+def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
+    """Note every case in which nothing sticks, unless its blocks of load are allowed to slip."""
+    if block.parameters.history or "history" in block.columns:
+        return
+    for case, realisation in np.argwhere(~(numbers.level > 0.0)):
+        eta = 1.0 - numbers.level[case, realisation]
+        messages.setdefault(
+            (int(case), int(realisation)),
+            f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {eta:.4g} times that; "
+            "lower the amplitude or raise friction or load",
+        )

@@ -1,0 +1,187 @@
+"""Solutions that several cases share: each is computed once, for all the cycles asked of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.fretting_wear.parameters import FrettingWear, TableShape
+from mdr_dask.models.fretting_wear.reduction import Numbers, table_profile
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.revolution import Profile
+    from mdr_dask.physics.wear import Worn
+    from mdr_dask.physics.wear_history import Record
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What makes a solution that several cases share: everything but the number of cycles and xi."""
+
+    shape: object
+    depth: float
+    exponent: float
+    level: float
+    method: str
+    hold: str
+    tolerance: float
+    cells: int
+    blocks: tuple[tuple[float, float, float], ...]
+
+
+def solve_each(
+    block: Block[FrettingWear],
+    numbers: Numbers,
+    values: dict[str, FloatArray],
+    status: NDArray[np.int8],
+    messages: dict[tuple[int, int], str],
+) -> int:
+    """Solve one task after the other, with all the cycles asked of it."""
+    solves = 0
+    for task, wanted in _tasks(block, numbers, status).items():
+        try:
+            contacts = _contacts(task, list(wanted))
+        except (ValueError, ArithmeticError) as problem:
+            kind = Status.FAILED if isinstance(problem, ValueError) else Status.NOT_CONVERGED
+            for position in (p for positions in wanted.values() for p in positions):
+                status[position], messages[position] = kind, str(problem)
+            continue
+        solves += 1
+        for positions, contact in zip(wanted.values(), contacts, strict=True):
+            _write(block, values, positions, contact)
+    return solves
+
+
+def _tasks(
+    block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
+) -> dict[_Task, dict[tuple[float, float], list[tuple[int, int]]]]:
+    """Gather the positions of each task by (N, xi)."""
+    tasks: dict[_Task, dict[tuple[float, float], list[tuple[int, int]]]] = {}
+    for case in range(block.cases):
+        parameters = block.case(case)
+        for position in range(len(block.realisations)):
+            place = (case, position)
+            if status[place] != Status.DONE:
+                continue
+            task = _task(parameters, numbers, place)
+            key = (float(numbers.cycles[place]), float(numbers.xi[place]) if task.method == "fast" else 0.0)
+            tasks.setdefault(task, {}).setdefault(key, []).append(place)
+    return tasks
+
+
+def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) -> _Task:
+    dimensional = parameters.stick_radius is None
+    blocks = tuple(
+        (
+            step.cycles * float(numbers.advance[place]) * (step.amplitude_factor if dimensional else 1.0),
+            step.amplitude_factor,
+            step.load_factor,
+        )
+        for step in parameters.history
+    )
+    table = isinstance(parameters.shape, TableShape)
+    return _Task(
+        parameters.shape if table else None,
+        float(numbers.height[place]) if table else 1.0,
+        0.0 if table else float(numbers.exponent[place]),
+        float(numbers.level[place]),
+        parameters.method,
+        parameters.hold,
+        parameters.tolerance if parameters.method == "exact" else 0.0,
+        parameters.cells if parameters.method == "literal" or parameters.hold == "force" or blocks else 0,
+        blocks,
+    )
+
+
+def _contacts(task: _Task, wanted: list[tuple[float, float]]) -> list[Worn | Record]:
+    """Solve a task for all its (N, xi)."""
+    from mdr_dask.physics import wear
+    from mdr_dask.physics.revolution import PowerProfile
+    from mdr_dask.physics.wear_exact import exact
+    from mdr_dask.physics.wear_literal import literal
+
+    profile = PowerProfile(task.exponent) if task.shape is None else table_profile(task.shape, task.depth)
+    if task.blocks or task.hold == "force":
+        return [_loaded(task, profile, cycles) for cycles, _ in wanted]
+    stick = profile.inside(task.level)
+    if task.method == "limit":
+        return [wear.limit(profile, stick)] * len(wanted)
+    if task.method == "fast":
+        return [wear.fast(profile, stick, cycles, xi) for cycles, xi in wanted]
+    if task.method == "exact":
+        return list(exact(profile, stick, [cycles for cycles, _ in wanted], task.tolerance))
+    return [literal(profile, stick, cycles, cells=task.cells) for cycles, _ in wanted]
+
+
+def _loaded(task: _Task, profile: Profile, cycles: float) -> Record:
+    """Run the blocks of a history, or one block at constant force."""
+    from mdr_dask.physics.transforms import gauss
+    from mdr_dask.physics.wear_history import LoadBlock, history
+
+    if task.method in {"limit", "fast"}:
+        raise ValueError(
+            f"the {task.method} method holds for one block at constant depth only; use method exact for hold force "
+            "and for histories"
+        )
+    abscissa, weight = gauss(64)
+    first = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
+    blocks = [
+        LoadBlock(
+            path,
+            (1.0 - task.level) * amplitude,
+            depth=factor if task.hold == "depth" else None,
+            force=first * factor if task.hold == "force" else None,
+        )
+        for path, amplitude, factor in (task.blocks or ((cycles, 1.0, 1.0),))
+    ]
+    deepest = max(block.depth or 1.0 for block in blocks) if task.hold == "depth" else 2.0
+    return history(profile, blocks, cells=task.cells, reach=min(1.7 * deepest, profile.largest_radius))[-1]
+
+
+def _write(
+    block: Block[FrettingWear],
+    values: dict[str, FloatArray],
+    positions: list[tuple[int, int]],
+    contact: Worn | Record,
+) -> None:
+    """Write one solution to every case that shares it, dimensionless."""
+    places = axes(block.parameters)
+    for name, array in values.items():
+        answer = _answer(contact, name, places)
+        for position in positions:
+            array[position] = answer
+
+
+def _answer(contact: Worn | Record, name: str, x: FloatArray) -> float | FloatArray:
+    """Return one output of a solution."""
+    from mdr_dask.physics.wear import Worn
+
+    if isinstance(contact, Worn):
+        if name == "worn_profile":
+            return contact.height(x)
+        if name == "worn_image":
+            return contact.image(x)
+        if name == "pressure":
+            return contact.pressure(x)
+        if name == "worn_depth":
+            return contact.worn_depth()
+        plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
+        return float(getattr(contact, plain))
+    fields = {"worn_profile": contact.height, "worn_image": contact.image, "pressure": contact.pressure}
+    if name in fields:
+        return np.asarray(np.interp(x, contact.radius, fields[name], right=np.nan))
+    if name == "worn_depth":
+        return contact.worn_depth
+    plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
+    return float(getattr(contact, plain))
+
+
+def axes(parameters: FrettingWear) -> FloatArray:
+    """Return the radii, or positions, of the profiles, over a0."""
+    return np.linspace(0.0, parameters.extent, parameters.points)

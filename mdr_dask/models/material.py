@@ -1,0 +1,212 @@
+"""Linear viscoelastic materials as a campaign names them."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import FloatArray, NamedFile, Parameters, quantity
+from mdr_dask.models.tables import Table, parse_table
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.rheology import LinearSolid
+
+Numbers = Annotated[tuple[float, ...], Field(strict=False)]
+SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
+
+
+class Kelvin(Parameters):
+    """A spring and a dashpot side by side."""
+
+    shear_modulus: float = quantity("Pa", "shear modulus G", gt=0)
+    relaxation_time: float = quantity("s", "relaxation time tau = eta / G", gt=0)
+
+
+class StandardSolid(Parameters):
+    """A spring beside one relaxing arm."""
+
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
+    glass_modulus: float = quantity("Pa", "shear modulus of sudden deformation, above the static one", gt=0)
+    relaxation_time: float = quantity("s", "relaxation time of the arm", gt=0)
+
+
+class PronySeries(Parameters):
+    """A spring beside any number of relaxing arms and perhaps a dashpot."""
+
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
+    moduli: Numbers = quantity("Pa", "shear modulus of each arm")
+    times: Numbers = quantity("s", "relaxation time of each arm")
+    viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
+
+
+class PowerLaw(Parameters):
+    """A Prony series whose loss modulus is a power of the frequency."""
+
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
+    loss_modulus: float = quantity("Pa", "loss modulus G'' at the frequency given", gt=0)
+    frequency: float = quantity("rad/s", "angular frequency at which the loss modulus holds", gt=0)
+    exponent: float = quantity("1", "exponent beta of G'' ~ omega^beta", gt=0, lt=1)
+    lowest: float = quantity("rad/s", "lowest angular frequency of the law", gt=0)
+    highest: float = quantity("rad/s", "highest angular frequency of the law", gt=0)
+
+
+class ModulusTable(Parameters):
+    """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
+
+    file: NamedFile = Field(description="table with columns frequency, storage modulus, loss modulus[, temperature]")
+    frequency_unit: str = Field(
+        default="Hz", description="unit of the frequencies, where the table has no row of units"
+    )
+    modulus_unit: str = Field(default="Pa", description="unit of the moduli, where the table has no row of units")
+    table_temperature: float | None = quantity(
+        "K",
+        "measured temperature to use; tables of several are otherwise superposed at `reference`",
+        default=None,
+        gt=0,
+    )
+    reference: float | None = quantity("K", "temperature to superpose at", default=None, gt=0)
+    poisson_ratio: float | None = quantity(
+        "1", "given where the moduli are of tension: divides them by 2 (1 + nu)", default=None, ge=-1, le=0.5
+    )
+    arms_per_decade: float = quantity("1", "density of relaxation times", default=1.0, gt=0, le=5)
+
+
+class Wlf(Parameters):
+    """Temperature by Williams, Landel and Ferry."""
+
+    c1: float = quantity("1", "constant c1 of the law", gt=0)
+    c2: float = quantity("K", "constant c2 of the law", gt=0)
+    reference: float = quantity("K", "temperature at which the relaxation times hold", gt=0)
+
+
+class Arrhenius(Parameters):
+    """Temperature by an activation energy."""
+
+    activation_energy: float = quantity("J/mol", "activation energy", gt=0)
+    reference: float = quantity("K", "temperature at which the relaxation times hold", gt=0)
+
+
+KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
+
+
+class Material(Parameters):
+    """One linear viscoelastic material, and perhaps its temperature."""
+
+    kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
+    standard_solid: StandardSolid | None = Field(default=None, description="spring and one relaxing arm")
+    prony: PronySeries | None = Field(default=None, description="spring and any number of relaxing arms")
+    power_law: PowerLaw | None = Field(default=None, description="loss modulus as a power of frequency")
+    dma_table: ModulusTable | None = Field(default=None, description="fit to measured moduli")
+    temperature: float | None = quantity("K", "temperature, with wlf or arrhenius", default=None, gt=0)
+    wlf: Wlf | None = Field(default=None, description="shift of relaxation times by Williams, Landel and Ferry")
+    arrhenius: Arrhenius | None = Field(default=None, description="shift of relaxation times by an activation energy")
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> Material:
+        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(kinds) != 1:
+            raise ValueError(f"expected one of {', '.join(KINDS)}, got {', '.join(kinds) or 'none'}")
+        if self.wlf is not None and self.arrhenius is not None:
+            raise ValueError("expected wlf or arrhenius, got both")
+        if (self.temperature is None) != (self.wlf is None and self.arrhenius is None):
+            raise ValueError("a temperature needs wlf or arrhenius, and these need a temperature")
+        return self
+
+
+@lru_cache(maxsize=256)
+def solid_of(material: Material) -> LinearSolid:
+    """Return the material's springs, arms and dashpot at its temperature.
+
+    Raises
+    ------
+    DataError, ValueError
+        If the numbers do not make a solid or the table cannot be fitted.
+    """
+    from mdr_dask.physics import rheology
+
+    solid = _solid(material)
+    if material.temperature is None:
+        return solid
+    if material.wlf is not None:
+        law = material.wlf
+        factor = rheology.wlf_factor(material.temperature, law.reference, law.c1, law.c2)
+    else:
+        assert material.arrhenius is not None
+        shift = material.arrhenius
+        factor = rheology.arrhenius_factor(material.temperature, shift.reference, shift.activation_energy)
+    return rheology.at_temperature(solid, float(factor))
+
+
+def _solid(material: Material) -> LinearSolid:
+    from mdr_dask.physics import rheology
+
+    if material.kelvin is not None:
+        return rheology.kelvin(material.kelvin.shear_modulus, material.kelvin.relaxation_time)
+    if material.standard_solid is not None:
+        one = material.standard_solid
+        return rheology.standard_solid(one.static_modulus, one.glass_modulus, one.relaxation_time)
+    if material.prony is not None:
+        arms = material.prony
+        return rheology.prony(arms.static_modulus, arms.moduli, arms.times, arms.viscosity)
+    if material.power_law is not None:
+        law = material.power_law
+        numbers = law.static_modulus, law.loss_modulus, law.frequency, law.exponent, law.lowest, law.highest
+        return rheology.power_law_series(*numbers).solid
+    assert material.dma_table is not None
+    return _fitted(material.dma_table)
+
+
+def _fitted(table: ModulusTable) -> LinearSolid:
+    from mdr_dask.physics import rheology
+
+    omega, storage, loss = _moduli(table)
+    divisor = 1.0 if table.poisson_ratio is None else 2 * (1 + table.poisson_ratio)
+    return rheology.fit_series(omega, storage / divisor, loss / divisor, table.arms_per_decade).solid
+
+
+def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return angular frequency, storage and loss modulus in SI, at one temperature."""
+    table = parse_table(chosen.file.read_text(), chosen.file.name)
+    if table.values.shape[1] < 3:
+        raise DataError(
+            f"{chosen.file.name}: expected frequency, storage and loss modulus, got {table.values.shape[1]} columns"
+        )
+    scales = [table.scale(0, chosen.frequency_unit), *(table.scale(column, chosen.modulus_unit) for column in (1, 2))]
+    omega, storage, loss = (table.values[:, column] * scale for column, scale in enumerate(scales))
+    temperature = _temperatures(table)
+    if temperature is None or np.ptp(temperature) < SAME_TEMPERATURE:
+        return omega, storage, loss
+    if chosen.table_temperature is not None:
+        near = np.abs(temperature - chosen.table_temperature) <= SAME_TEMPERATURE
+        if np.count_nonzero(near) < 2:
+            raise DataError(f"{chosen.file.name}: got no rows at {chosen.table_temperature:g} K")
+        return omega[near], storage[near], loss[near]
+    return _superposed(chosen, temperature, omega, storage, loss)
+
+
+def _temperatures(table: Table) -> FloatArray | None:
+    if table.values.shape[1] < 4:
+        return None
+    unit = table.units[3].strip("[]() ").lower() if table.units else "k"
+    return np.asarray(table.values[:, 3] + (0.0 if unit == "k" else 273.15), dtype=np.float64)
+
+
+def _superposed(
+    chosen: ModulusTable, temperature: FloatArray, omega: FloatArray, storage: FloatArray, loss: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Shift every temperature to the reference by its storage modulus."""
+    from mdr_dask.physics.superposition import superpose
+
+    if chosen.reference is None:
+        raise DataError(f"{chosen.file.name}: has several temperatures: name one by table_temperature, or a reference")
+    order = np.argsort(temperature, kind="stable")
+    member = np.empty(order.size, dtype=np.intp)
+    member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
+    parts = [member == number for number in range(int(member.max()) + 1)]
+    curves = [(np.log10(omega[part]), np.log10(storage[part])) for part in parts]
+    found = superpose([temperature[part].mean() for part in parts], curves, reference=chosen.reference)
+    return omega * 10 ** found.horizontal[member], storage, loss

@@ -1,0 +1,107 @@
+"""Tables of numbers as people keep them: one row of names, perhaps one of units, comments and a byte-order mark."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import FloatArray
+
+COMMENT = "#%"
+SEPARATORS = "\t;,"
+SCALES = {
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "µm": 1e-6,
+    "μm": 1e-6,
+    "nm": 1e-9,
+    "pa": 1.0,
+    "kpa": 1e3,
+    "mpa": 1e6,
+    "gpa": 1e9,
+    "hz": 2 * np.pi,
+    "1/s": 1.0,
+    "rad/s": 1.0,
+    "s": 1.0,
+}
+"""Units of lengths, moduli, times and frequencies that a row of units may hold, in SI (frequencies in rad/s)."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of numbers.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the columns; empty if the table has none.
+    units : tuple of str
+        Units as written; empty if the table has none.
+    values : array, shape (rows, columns)
+        NaN where an entry is empty.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+
+    def scale(self, column: int, unit: str) -> float:
+        """Return the factor to SI of a column, by its own unit or by one given for the table.
+
+        Raises
+        ------
+        DataError
+            If the unit is not known.
+        """
+        written = self.units[column].strip("[]() ") if self.units else unit
+        if written.lower() not in SCALES:
+            raise DataError(f"expected one of the units {', '.join(SCALES)}, got {written!r}")
+        return SCALES[written.lower()]
+
+
+def parse_table(text: str, source: str) -> Table:
+    """Read a table from its text.
+
+    Raises
+    ------
+    DataError
+        If there are no rows, or an entry is not a number: ``source:line`` says where.
+    """
+    lines = [line.strip() for line in text.lstrip("\ufeff").splitlines()]
+    kept = [(number, line) for number, line in enumerate(lines, 1) if line and line[0] not in COMMENT]
+    if not kept:
+        raise DataError(f"{source}: expected rows of numbers, got none")
+    separator = next((mark for mark in SEPARATORS if mark in kept[0][1]), None)
+    rows = [(number, _entries(line, separator)) for number, line in kept]
+    headings: list[tuple[str, ...]] = []
+    while rows and len(headings) < 2 and not any(_is_number(entry) for entry in rows[0][1]):
+        headings.append(tuple(rows.pop(0)[1]))
+    if not rows:
+        raise DataError(f"{source}: expected rows of numbers, got only names")
+    width = len(headings[0]) if headings else len(rows[0][1])
+    values = np.array([_numbers(row, width, f"{source}:{number}") for number, row in rows])
+    return Table(headings[0] if headings else (), headings[1] if len(headings) == 2 else (), values)
+
+
+def _entries(line: str, separator: str | None) -> list[str]:
+    if separator is None:
+        return line.split()
+    return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _numbers(row: list[str], width: int, place: str) -> list[float]:
+    if len(row) != width or not all(_is_number(entry) or entry == "" for entry in row):
+        raise DataError(f"{place}: expected {width} numbers, got {row!r}")
+    return [float(entry) if entry else np.nan for entry in row]

@@ -1,0 +1,362 @@
+"""Friction after a jump of the velocity at constant load, from one steady state to the next."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from mdr_dask.physics.kinetics_kernels import (
+    BLOCK,
+    DRAG,
+    LENGTH,
+    LOAD,
+    STIFFNESS,
+    Course,
+    Pace,
+    Patches,
+    Profile,
+    block_least,
+    height_at,
+    march,
+    released,
+    touch,
+)
+from mdr_dask.physics.sliding import steady_sliding
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+CONVERGED, NOT_CONVERGED, INVALID = 0, 1, 2
+MESSAGES = {
+    NOT_CONVERGED: "the depth for the load was not found at one moment after the jump",
+    INVALID: "load, velocity and profile must be finite, the load and both velocities positive",
+}
+STEPS_PER_DECADE = 24
+MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
+NEGLIGIBLE = 1e-6  # of the mean displacement: changes of depth that need no finer steps
+MOMENTS = 20000
+FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
+WIDENINGS = 6
+
+
+class Jump(NamedTuple):
+    """Friction before, at and after a jump of the velocity.
+
+    Parameters
+    ----------
+    before, at, after : float
+        F_x / (4 G L) in the unit of height squared over that of length, steady at v_1, at t_0+, and steady at v_2.
+    trace : array, shape (times,)
+        The same at the times asked for.
+    depth : array, shape (2,)
+        Depth before and after.
+    moments : int
+        Number of moments computed; the rest is in equilibrium.
+    status : int
+        `CONVERGED` or a key of `MESSAGES`.
+    """
+
+    before: float
+    at: float
+    after: float
+    trace: FloatArray
+    depth: FloatArray
+    moments: int
+    status: int
+
+
+def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float]:
+    """Return a periodic profile of cubic cells that begins at its highest point.
+
+    Parameters
+    ----------
+    height : array, shape (n,)
+        Heights at equidistant nodes of a line of unit length, positive into the elastomer, which moves along it in the
+        order of the nodes.
+    slope : array, shape (n,)
+        Derivative at the nodes.
+
+    Returns
+    -------
+    profile : Profile
+        With heights from the highest point, so that a light contact loses no digits.
+    top : float
+        Height of that point.
+    """
+    n = height.size
+    best, place, top = _summit(height, slope)
+    index = (np.arange(n + 2) + best) % n
+    height, slope = height[index] - top, slope[index]
+    enter, leave = slope[:-1] / n, slope[1:] / n
+    area = 0.5 * (height[1:] + height[:-1]) + (enter - leave) / 12
+    squared = enter**2
+    bend = (np.roll(slope[:-2], -1) ** 2 - np.roll(slope[:-2], 1) ** 2) / (24 * n**2)
+    bend = np.append(bend, [bend[0], bend[1]])
+    # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
+    square = 0.5 * (squared + leave**2) + bend[:-1] - bend[1:]
+    profile = Profile(
+        height,
+        slope,
+        np.concatenate([[0.0], np.cumsum(area)]) / n,
+        np.concatenate([[0.0], np.cumsum(square)]) * n,
+        1 / n,
+        place / n,
+        True,
+    )
+    return profile, top
+
+
+def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
+    """Return the cell of the highest point, where in the cell it is, 0..1, and its height."""
+    n = height.size
+    after = np.roll(height, -1)
+    enter, leave = slope / n, np.roll(slope, -1) / n
+    b, c = 3 * (after - height) - 2 * enter - leave, enter + leave - 2 * (after - height)
+    with np.errstate(all="ignore"):
+        place = -enter / (b - np.sqrt(np.maximum(b * b - 3 * enter * c, 0)))
+    place = np.where((enter > 0) & (leave < 0), np.nan_to_num(place), 0.0).clip(0, 1)
+    peak = height + place * (enter + place * (b + place * c))
+    best = int(np.argmax(peak))
+    return best, float(place[best]), float(peak[best])
+
+
+@njit(nogil=True, cache=True)
+def _settle(
+    profile: Profile, runs: IntArray, floor: FloatArray, reach: float, load: float, depth: float, sums: FloatArray
+) -> tuple[Patches, bool]:
+    """Find the steady state at a load, from a depth near it."""
+    nothing = np.empty(0)
+    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
+    start, end = np.empty(floor.size), np.empty(floor.size)
+    least = np.empty(floor.size // BLOCK)
+    block_least(profile, reach, least)
+    moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
+    converged, found = False, 0
+    for _ in range(60):
+        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums)
+        if found < 0:
+            break
+        if abs(sums[LOAD] - load) <= 1e-12 * load:
+            converged = True
+            break
+        step = (load - sums[LOAD]) / sums[STIFFNESS]
+        if abs(step) < 1e-14 * abs(at[0]):
+            converged = True
+            break
+        at[0] += step
+    converged = converged or (found > 0 and abs(sums[LOAD] - load) <= 1e-8 * load)
+    pressed = np.empty(max(found, 0))
+    for k in range(pressed.size):
+        pressed[k] = at[0] + height_at(profile, end[k])[0]
+    return Patches(
+        start[: pressed.size].copy(), end[: pressed.size].copy(), pressed, pressed.size, at[0], reach
+    ), converged
+
+
+@njit(nogil=True, cache=True)
+def _fill(profile: Profile, state: Patches, floor: FloatArray) -> None:
+    """Write the displacement of a steady state at the nodes."""
+    k = -1
+    for i in range(floor.size):
+        x = i * profile.cell
+        while k + 1 < state.count and state.start[k + 1] <= x:
+            k += 1
+        if k < 0:
+            floor[i] = -np.inf if profile.periodic else 0.0
+        elif x <= state.end[k]:
+            floor[i] = state.depth + profile.height[i]
+        else:
+            floor[i] = state.pressed[k] * np.exp(-(x - state.end[k]) / state.reach)
+
+
+@njit(nogil=True, cache=True)
+def _release(profile: Profile, first: Patches, reach: float, load: float, sums: FloatArray) -> tuple[float, bool]:
+    """Solve the jump condition: the rate of the depth that carries the load right after the jump."""
+    rate = 0.0
+    for _ in range(60):
+        released(profile, first, reach, rate, sums)
+        if abs(sums[LOAD] - load) <= 1e-13 * load or sums[LENGTH] <= 0:
+            break
+        rate += (load - sums[LOAD]) / sums[LENGTH]
+    return rate, abs(sums[LOAD] - load) <= 1e-9 * load
+
+
+def _full(state: Patches, profile: Profile) -> bool:
+    """Return whether all of a periodic line is in contact: then u = d + p, d is constant and nothing relaxes."""
+    return state.count == 1 and profile.periodic and state.end[0] - state.start[0] >= 1
+
+
+def _reachable(profile: Profile, floor: FloatArray, highest: float) -> IntArray:
+    """Return the stretches of nodes in which an element can be in contact up to a depth."""
+    active = highest + profile.height > floor
+    active[1:] |= active[:-1].copy()
+    active[:-1] |= active[1:].copy()
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
+    runs: IntArray = edges.reshape(-1, 2).astype(np.int64)
+    runs[:, 1] = np.minimum(runs[:, 1], profile.height.size - 1)
+    return runs
+
+
+def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, change: float, load: float) -> Pace:
+    """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio, up to `last`.
+
+    Parameters
+    ----------
+    last : float
+        Last time, in relaxation times.
+    reach : float
+        v_2 tau / L.
+    wavenumber : float
+        q_max L of the profile.
+    per_decade : float
+        Steps in a factor ten of the time.
+    change : float
+        Difference of the depths before and after.
+    load : float
+        F_N / (4 G L), in the same unit.
+    """
+    finer = STEPS_PER_DECADE / per_decade
+    first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * max(abs(change), NEGLIGIBLE * load), last)
+
+
+def velocity_jump(
+    height: FloatArray,
+    slope: FloatArray,
+    load: float,
+    reaches: tuple[float, float],
+    times: FloatArray,
+    wavenumber: float,
+    per_decade: float = STEPS_PER_DECADE,
+    resolution: float = 0.0,
+) -> Jump:
+    """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
+
+    The start is the direct steady state at v_1; the instant t_0+ solves the jump condition (displacements and depth
+    do not change at once, the rate of the depth does); then the depth is marched by backward differentiation of order
+    three over graded steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+        See :func:`cubic_profile`.
+    load : float
+        F_N / (4 G L), in the unit of height.
+    reaches : tuple of float
+        v_1 tau / L and v_2 tau / L.
+    times : array, shape (m,)
+        (t - t_0) / tau at which friction is wanted, increasing.
+    wavenumber : float
+        q_max L, which fixes the first step.
+    per_decade : float
+        Steps in a factor ten of the time.
+    resolution : float
+        The march ends when drag and depth have been this near to their end for eight moments.
+
+    Returns
+    -------
+    Jump
+        With ``mu = drag / load`` times height over length.
+    """
+    empty = np.full(times.size, np.nan)
+    failed = Jump(np.nan, np.nan, np.nan, empty, np.full(2, np.nan), 0, INVALID)
+    both = np.array(reaches)
+    good = np.all(np.isfinite(height)) and np.all(both > 0) and np.all(np.isfinite(both)) and 0 < load < np.inf
+    if not good:
+        return failed
+    steady = steady_sliding(height, slope, both, np.full(2, load))
+    if steady.status.any():
+        return failed._replace(status=NOT_CONVERGED)
+    profile, top = cubic_profile(height, slope)
+    pace = pace_after(
+        float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
+    )
+    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, resolution)
+    return jump._replace(depth=jump.depth - top)
+
+
+def _relax(
+    profile: Profile,
+    load: float,
+    reaches: tuple[float, float],
+    depths: FloatArray,
+    times: FloatArray,
+    pace: Pace,
+    resolution: float,
+) -> Jump:
+    """Solve both steady states on one profile and march between them."""
+    sums = np.empty(4)
+    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
+    floor = np.zeros(profile.height.size)
+    low, high = float(depths.min()), float(depths.max())
+    margin = 0.25 * (high - low) + 1e-9 * abs(high)
+    for _ in range(WIDENINGS):
+        floor[:] = 0.0
+        everywhere = _reachable(profile, floor, high + margin)
+        lowest = _settle_at(profile, everywhere, floor, min(reaches), low - margin)
+        _fill(profile, lowest, floor)
+        runs = _reachable(profile, floor, high + margin)
+        first, good_first = _settle(profile, runs, floor, reaches[0], load, float(depths[0]), sums)
+        before = sums[DRAG]
+        last, good_last = _settle(profile, runs, floor, reaches[1], load, float(depths[1]), sums)
+        after = sums[DRAG]
+        if not (good_first and good_last):
+            margin *= 4
+            continue
+        if _full(first, profile) and _full(last, profile):
+            return Jump(
+                before, after, after, np.full(times.size, after), np.array([first.depth, last.depth]), 0, CONVERGED
+            )
+        rate, good = _release(profile, first, reaches[1], load, sums)
+        if not good:
+            return failed
+        course = np.empty((4, MOMENTS))
+        course[:, 0] = 0.0, first.depth, rate, sums[DRAG]
+        count, status = march(
+            profile,
+            runs,
+            floor,
+            first,
+            reaches[1],
+            load,
+            pace,
+            (low - margin, high + margin),
+            (last.depth, after, resolution),
+            *course,
+        )
+        if status == 1:
+            return failed
+        if status == 0:
+            trace = _at_times(course[0, :count], course[3, :count], times, after)
+            return Jump(before, course[3, 0], after, trace, np.array([first.depth, last.depth]), count, CONVERGED)
+        margin *= 4
+    return failed
+
+
+@njit(nogil=True, cache=True)
+def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float, depth: float) -> Patches:
+    """Return the steady state at a depth."""
+    nothing = np.empty(0)
+    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
+    start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(4)
+    least = np.empty(floor.size // BLOCK)
+    block_least(profile, reach, least)
+    course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1)
+    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums), 0)
+    pressed = np.empty(found)
+    for k in range(found):
+        pressed[k] = depth + height_at(profile, end[k])[0]
+    return Patches(start[:found].copy(), end[:found].copy(), pressed, found, depth, reach)
+
+
+def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:
+    """Interpolate by a cubic spline over a logarithm of time that is linear before the first step."""
+    scale = moments[1]
+    curve = CubicSpline(np.log1p(moments / scale), drag)
+    trace: FloatArray = curve(np.log1p(times / scale))
+    trace[times > moments[-1]] = after
+    return trace

@@ -1,0 +1,407 @@
+"""The exact evolution of a fretted or sliding contact of revolution at constant depth or constant force.
+
+Every radius remembers what it has gathered: in partial slip the logarithm of its slip s over the slip s0 of the virgin
+body, int p dN / eta; in gross slip its worn depth, int p ds. Beyond the contact that is exactly zero. The contact
+c < r < a is mapped onto graded panels in r^2, which follow the moving edge; each step is a stiff backward
+differentiation formula along fixed radii, solved by Newton's method for the image g and the edge together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from mdr_dask.physics.dense import solve_in_place
+from mdr_dask.physics.panels import Panels, interpolate
+from mdr_dask.physics.revolution import Profile
+from mdr_dask.physics.transforms import gauss
+
+FloatArray = NDArray[np.float64]
+
+#: Local error of a BDF step of order 1, 2, 3 over its distance from the extrapolated past.
+_ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
+_MOST_STEPS = 20000
+_MOST_ITERATIONS = 10
+#: Newton's method squares its error: what is left after so small a change is round-off.
+_LAST_CHANGE = 1e-7
+
+
+class NotConvergedError(ArithmeticError):
+    """A time step that no smaller step could rescue."""
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """The contact at one time.
+
+    Parameters
+    ----------
+    time : float
+        Cycles N in partial slip, sliding path s in gross slip.
+    unknowns : array, shape (n,)
+        The unknowns of the problem: values of the image at all nodes but the last, the edge a, in some problems more.
+    gathered : array, shape (n,)
+        What the radii of the nodes have gathered; zero at the edge.
+    edge : float
+        a.
+    """
+
+    time: float
+    unknowns: FloatArray
+    gathered: FloatArray
+    edge: float
+
+
+class Problem(Protocol):
+    """One kind of slip, as the equations of one step."""
+
+    @property
+    def panels(self) -> Panels:
+        """Return the panels between the inner border and the edge."""
+
+    @property
+    def inner_radius(self) -> float:
+        """Return the radius of the inner border."""
+
+    def start(self) -> Moment:
+        """Return the virgin contact."""
+
+    def radii(self, edge: float) -> FloatArray:
+        """Return the radii of the nodes."""
+
+    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        """Return gathered - known - theta * rate at every node, and the conditions at the edge."""
+
+    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
+        """Return its derivatives by the nodal unknowns."""
+
+    def gathered(self, unknowns: FloatArray) -> FloatArray:
+        """Return what the radii have gathered."""
+
+    def worn(self, unknowns: FloatArray) -> FloatArray:
+        """Return the quantity in d0 whose step error is controlled."""
+
+
+@dataclass(frozen=True, eq=False)
+class PartialSlip:
+    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and a."""
+
+    profile: Profile
+    inner_radius: float
+    panels: Panels
+    virgin: CubicSpline
+    eta: float
+
+    def radii(self, edge: float) -> FloatArray:
+        """Return the radii of the nodes for an edge."""
+        c = self.inner_radius
+        return np.asarray(np.sqrt(c * c + (edge - c) * (edge + c) * self.panels.nodes))
+
+    def virgin_slip(self, edge: float) -> FloatArray:
+        """Return ln s0 at the nodes."""
+        c = self.inner_radius
+        return np.asarray(self.virgin(np.log((edge - c) * (edge + c) * self.panels.nodes)))
+
+    def start(self) -> Moment:
+        """Return the virgin contact."""
+        y = self.profile.rise(self.radii(1.0), self.inner_radius) / self.eta
+        return Moment(0.0, np.append(y[:-1], 1.0), np.zeros_like(y), 1.0)
+
+    def split(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Return y at all nodes, the factor sqrt(L) / r that turns it into a half-integrand, and L = a^2 - c^2."""
+        a, c = unknowns[-1], self.inner_radius
+        length = (a - c) * (a + c)
+        y = unknowns.copy()
+        y[-1] = 1.0
+        return y, np.sqrt(length) / self.radii(a), length
+
+    def slip(self, unknowns: FloatArray) -> FloatArray:
+        """Return s at the nodes."""
+        y, factor, _ = self.split(unknowns)
+        return np.asarray(self.panels.inner @ (y * factor))
+
+    def pressure(self, unknowns: FloatArray) -> FloatArray:
+        """Return p / eta at the nodes."""
+        y, _, length = self.split(unknowns)
+        return np.asarray(self.panels.outer @ y / np.sqrt(length))
+
+    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
+        slip = self.slip(unknowns)
+        gain = np.log(np.maximum(slip, 1e-300)) - self.virgin_slip(unknowns[-1])
+        rows = gain - known - theta * self.pressure(unknowns)
+        rows[-1] = gain[-1]
+        return np.asarray(rows)
+
+    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
+        """Return the derivatives by y."""
+        _, factor, length = self.split(unknowns)
+        result = self.panels.inner * (factor / self.slip(unknowns)[:, None])
+        result[:-1] -= theta / np.sqrt(length) * self.panels.outer[:-1]
+        return result
+
+    def gathered(self, unknowns: FloatArray) -> FloatArray:
+        """Return ln(s / s0)."""
+        gain = np.log(np.maximum(self.slip(unknowns), 1e-300)) - self.virgin_slip(unknowns[-1])
+        gain[-1] = 0.0
+        return gain
+
+    def worn(self, unknowns: FloatArray) -> FloatArray:
+        """Return the slip times eta: the part of f that changes."""
+        return self.eta * self.slip(unknowns)
+
+    def wear_rate(self, unknowns: FloatArray) -> float:
+        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the dissipation of a cycle over mu."""
+        y, factor, length = self.split(unknowns)
+        return float(self.eta * np.sqrt(length) * self.panels.weights @ (y * (1.0 - y) * factor))
+
+
+def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
+    """Prepare partial slip: tabulate ln s0 over ln(r^2 - c^2) up to the radius `reach`.
+
+    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx, free of cancellation next to c.
+    """
+    c = stick_radius
+    eta = float(profile.rise(np.array(1.0), c))
+    smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
+    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 600)
+    r = np.sqrt(c * c + np.exp(table))
+    abscissa, weight = gauss(40)
+    span = np.arctan2(np.exp(0.5 * table), c)
+    x = np.maximum(r[:, None] * np.cos(span[:, None] * abscissa), c)
+    slip = 2.0 / np.pi * span * (profile.rise(x, c) @ weight) / eta
+    return PartialSlip(profile, c, panels, CubicSpline(table, np.log(slip)), eta)
+
+
+@dataclass(frozen=True, eq=False)
+class GrossSlip:
+    """Slip everywhere; unknowns g at the nodes but the last, a, and the depth d if the force is given."""
+
+    profile: Profile
+    panels: Panels
+    force: float | None = None
+    inner_radius: float = 0.0
+
+    def radii(self, edge: float) -> FloatArray:
+        """Return the radii of the nodes for an edge."""
+        return np.asarray(edge * np.sqrt(self.panels.nodes))
+
+    def start(self) -> Moment:
+        """Return the virgin contact."""
+        g = self.profile.image(self.radii(1.0))
+        tail = [1.0] if self.force is None else [1.0, 1.0]
+        return Moment(0.0, np.append(g[:-1], tail), np.zeros_like(g), 1.0)
+
+    def split(self, unknowns: FloatArray) -> tuple[FloatArray, float, float]:
+        """Return g at all nodes, the edge and the depth."""
+        last = self.panels.nodes.size - 1
+        depth = 1.0 if self.force is None else float(unknowns[-1])
+        return np.append(unknowns[:last], depth), float(unknowns[last]), depth
+
+    def pressure(self, unknowns: FloatArray) -> FloatArray:
+        """Return p at the nodes."""
+        g, a, _ = self.split(unknowns)
+        return self.panels.outer @ g / a
+
+    def worn(self, unknowns: FloatArray) -> FloatArray:
+        """Return f at the nodes."""
+        return self.panels.full @ self.split(unknowns)[0]
+
+    def normal_force(self, unknowns: FloatArray) -> float:
+        """Return F_N = 2 int_0^a (d - g) dx."""
+        g, a, depth = self.split(unknowns)
+        # int_0^1 u dz / sqrt(z) is the last row of the full half-integral of u sqrt(1 - z)
+        return float(np.pi * a * self.panels.full[-1] @ ((depth - g) * np.sqrt(1.0 - self.panels.nodes)))
+
+    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        """Return f - f0 - known - theta p; then continuity at the edge, and the force."""
+        gain = self._gain(unknowns)
+        rows = np.append((gain - known - theta * self.pressure(unknowns))[:-1], gain[-1])
+        return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
+
+    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
+        """Return the derivatives by g."""
+        _, a, _ = self.split(unknowns)
+        size = unknowns.size
+        nodes = self.panels.nodes.size
+        result = np.zeros((size, size))
+        result[:nodes, :nodes] = self.panels.full
+        result[: nodes - 1, :nodes] -= theta / a * self.panels.outer[:-1]
+        if self.force is not None:
+            result[-1, :nodes] = -np.pi * a * self.panels.full[-1] * np.sqrt(1.0 - self.panels.nodes)
+        return result
+
+    def gathered(self, unknowns: FloatArray) -> FloatArray:
+        """Return the worn depth."""
+        gain = self._gain(unknowns)
+        gain[-1] = 0.0
+        return gain
+
+    def _gain(self, unknowns: FloatArray) -> FloatArray:
+        g, a, _ = self.split(unknowns)
+        return np.asarray(self.panels.full @ g - self.profile.height(self.radii(a)))
+
+
+def march(problem: Problem, end: float, tolerance: float) -> list[Moment]:
+    """Advance a contact until the first step that ends at or beyond a time.
+
+    The steps do not depend on that time, so that a longer march repeats the shorter one exactly.
+
+    Parameters
+    ----------
+    problem : Problem
+        The kind of slip.
+    end : float
+        Time to reach.
+    tolerance : float
+        Error of f in d0 allowed in one step.
+
+    Returns
+    -------
+    list of Moment
+        All accepted steps; the first is the virgin contact.
+
+    Raises
+    ------
+    NotConvergedError
+        If a step fails however short it is.
+    """
+    history = [_settled(problem)]
+    step = 0.1 * tolerance
+    while history[-1].time < end:
+        if len(history) > _MOST_STEPS:
+            raise NotConvergedError(f"the wear law needed more than {_MOST_STEPS} steps")
+        moment, error = _try_step(problem, history, step)
+        power = 1.0 / (min(len(history), 3) + 1)
+        if moment is None or error > tolerance:
+            step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
+            if step < 1e-13 * (1.0 + history[-1].time):
+                raise NotConvergedError(f"the wear law could not be advanced beyond {history[-1].time:.6g}")
+            continue
+        history.append(moment)
+        growth = min(1.8, 0.85 * (tolerance / max(error, 1e-300)) ** power)
+        step *= growth if growth > 1.1 or growth < 0.9 else 1.0
+    return history
+
+
+def unknowns_at(history: Sequence[Moment], time: float) -> FloatArray:
+    """Return the unknowns at any time marched through, by the polynomial of the step that passed it."""
+    return _extrapolate(time, neighbours(history, time))
+
+
+def value_at(history: Sequence[Moment], values: FloatArray, time: float) -> float:
+    """Return a number known at all moments at any time marched through, as `unknowns_at` does."""
+    numbers = {id(m): float(v) for m, v in zip(history, values, strict=True)}
+    near = neighbours(history, time)
+    marked = [Moment(m.time, np.array([numbers[id(m)]]), m.gathered, m.edge) for m in near]
+    return float(_extrapolate(time, marked)[0])
+
+
+def neighbours(history: Sequence[Moment], time: float) -> Sequence[Moment]:
+    """Return the moment at or after a time and up to three before it."""
+    last = int(np.searchsorted([m.time for m in history], time))
+    return history[max(last - 3, 0) : last + 1]
+
+
+def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
+    """Integrate a rate over the steps with the formulas of the steps themselves, shape (steps + 1,)."""
+    total = np.zeros(len(history))
+    for number in range(1, len(history)):
+        order = min(number, 3)
+        shares = _backward_shares([m.time for m in history[number - order : number + 1]][::-1])
+        past = total[number - order : number][::-1]
+        total[number] = (rates[number] - shares[1:] @ past) / shares[0]
+    return total
+
+
+def _settled(problem: Problem) -> Moment:
+    """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
+    virgin = problem.start()
+    unknowns = _newton(problem, virgin.unknowns, 0.0, lambda edge: np.zeros(problem.panels.nodes.size))
+    if unknowns is None:
+        return virgin
+    return Moment(0.0, unknowns, problem.gathered(unknowns), float(unknowns[problem.panels.nodes.size - 1]))
+
+
+def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tuple[Moment | None, float]:
+    """Make one step of the highest order that the past allows; return None if Newton's method fails."""
+    time = history[-1].time + length
+    past = list(history[-1:-4:-1])
+    order = len(past)
+    shares = _backward_shares([time, *(m.time for m in past)])
+    theta, shares = 1.0 / shares[0], -shares[1:] / shares[0]
+    guess = _extrapolate(time, history[-1 : -order - 2 : -1])
+
+    def known(edge: float) -> FloatArray:
+        r = problem.radii(edge)
+        return np.asarray(sum(share * gathered_at(problem, m, r) for share, m in zip(shares, past, strict=True)))
+
+    unknowns = _newton(problem, guess, theta, known)
+    if unknowns is None:
+        unknowns = _newton(problem, past[0].unknowns.copy(), theta, known)
+    if unknowns is None:
+        return None, np.inf
+    nodes = problem.panels.nodes.size
+    edge = float(unknowns[nodes - 1])
+    gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)), initial=abs(edge - guess[nodes - 1]))
+    return Moment(time, unknowns, problem.gathered(unknowns), edge), float(gap) * _ERROR_SHARE[order - 1]
+
+
+def gathered_at(problem: Problem, moment: Moment, radius: FloatArray) -> FloatArray:
+    """Return what any radii beyond the stick border had gathered at a moment."""
+    c, a = problem.inner_radius, moment.edge
+    return interpolate(problem.panels, moment.gathered, (radius - c) * (radius + c) / ((a - c) * (a + c)))
+
+
+def _newton(
+    problem: Problem, guess: FloatArray, theta: float, known: Callable[[float], FloatArray]
+) -> FloatArray | None:
+    """Solve one step; columns of the edge and the depth are differences, renewed once."""
+    nodes = problem.panels.nodes.size
+    unknowns = guess.copy()
+    columns = np.empty((unknowns.size, unknowns.size - nodes + 1))
+    for iteration in range(_MOST_ITERATIONS):
+        residual = problem.residual(unknowns, theta, known(unknowns[nodes - 1]))
+        matrix = problem.jacobian(unknowns, theta)
+        for column in range(nodes - 1, unknowns.size):
+            if iteration < 3:
+                moved = unknowns.copy()
+                moved[column] += 1e-7
+                shifted = problem.residual(moved, theta, known(moved[nodes - 1]))
+                columns[:, column - nodes + 1] = (shifted - residual) / 1e-7
+            matrix[:, column] = columns[:, column - nodes + 1]
+        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
+            return None
+        change = -residual
+        if not solve_in_place(matrix, change):
+            return None
+        unknowns += change
+        if not unknowns[nodes - 1] > problem.inner_radius:
+            return None
+        if np.max(np.abs(change)) < _LAST_CHANGE:
+            return unknowns if np.all(np.isfinite(problem.gathered(unknowns))) else None
+    return None
+
+
+def _backward_shares(times: Sequence[float]) -> FloatArray:
+    """Return the weights of the derivative at times[0] of the polynomial through all the times."""
+    t = np.asarray(times, dtype=float) - times[0]
+    powers = np.ascontiguousarray(np.vander(t / t[-1], increasing=True).T)
+    target = np.zeros(t.size)
+    target[1] = 1.0 / t[-1]
+    solve_in_place(powers, target)
+    return target
+
+
+def _extrapolate(time: float, past: Sequence[Moment]) -> FloatArray:
+    """Return the unknowns of the polynomial through the past moments at a time."""
+    result = np.zeros_like(past[0].unknowns)
+    for moment in past:
+        others = [other.time for other in past if other is not moment]
+        result += moment.unknowns * np.prod([(time - t) / (moment.time - t) for t in others])
+    return result

@@ -1,0 +1,86 @@
+"""Fretting wear as it was first simulated: springs, their hysteresis, sub-steps of every cycle, transforms at each one.
+
+The slow, independent reference for the evolution equation (procedure of Dimaki et al., thesis chapter 6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.physics.revolution import Profile
+from mdr_dask.physics.uniform_grid import UniformGrid, uniform_grid
+from mdr_dask.physics.wear import Worn, check_stick_radius, limit_radius, worn_volume
+
+FloatArray = NDArray[np.float64]
+
+
+def literal(
+    profile: Profile,
+    stick_radius: float,
+    cycles: float,
+    *,
+    cells: int = 200,
+    cycles_per_unit: float | None = None,
+    substeps: int = 32,
+) -> Worn:
+    """Return the worn contact by simulating every cycle.
+
+    Parameters
+    ----------
+    profile : Profile
+        The virgin body.
+    stick_radius : float
+        c, between 0 and 1.
+    cycles : float
+        N in units of N0.
+    cells : int
+        Cells of the uniform grid up to a little beyond a(c).
+    cycles_per_unit : float, optional
+        N0, how many cycles make one unit of N; by default the fewest that stay stable, 3 / h.
+    substeps : int
+        Steps of a cycle.
+
+    Returns
+    -------
+    Worn
+        Its error is not estimated (NaN): compare grids.
+    """
+    check_stick_radius(stick_radius)
+    grid = uniform_grid(cells, 1.02 * limit_radius(profile, stick_radius))
+    rate = 3.0 / grid.spacing if cycles_per_unit is None else cycles_per_unit
+    number = max(int(np.ceil(cycles * rate)), 1)
+    virgin = profile.height(grid.nodes)
+    image_0 = profile.image(grid.nodes)
+    eta = 1.0 - float(profile.image(np.array(stick_radius)))
+    worn = np.zeros_like(virgin)
+    springs = np.zeros_like(virgin)
+    phase = 2.0 * np.pi * np.arange(1, substeps + 1) / substeps
+    moves = np.diff(np.append(0.0, np.sin(phase)))
+    share = 0.0 if cycles == 0.0 else cycles / (4.0 * number)
+    for _ in range(number):
+        for move in moves:
+            image = image_0 + grid.forward @ worn
+            limit = np.maximum(1.0 - image, 0.0) / eta
+            moved = np.clip(springs + move, -limit, limit)
+            slip = grid.inverse @ (move - (moved - springs))
+            springs = moved
+            worn += share * grid.pressure(image, 1.0) * np.abs(slip)
+    return _describe(profile, stick_radius, grid, worn)
+
+
+def _describe(profile: Profile, c: float, grid: UniformGrid, worn: FloatArray) -> Worn:
+    """Turn the worn depth at the nodes into a worn contact."""
+    shift = grid.forward @ worn
+    image = profile.image(grid.nodes) + shift
+    a = grid.edge(image, 1.0)
+
+    def change(x: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(x, grid.nodes, shift))
+
+    slopes = np.gradient(shift, grid.spacing)
+
+    def change_slope(x: FloatArray) -> FloatArray:
+        return np.asarray(np.interp(x, grid.nodes, slopes))
+
+    return Worn(profile, c, a, a, worn_volume(change, c, a), grid.force(image, 1.0), np.nan, change, change_slope)

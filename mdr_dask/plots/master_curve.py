@@ -1,0 +1,120 @@
+"""Figures of a master curve: the curves as measured, the merged curve, the shift factors (thesis figures 3.17 to
+3.19).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask.plots.base import Plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BAR = 1.0  # standard errors shown
+
+
+def draw_master_curve(curve: xr.Dataset) -> Figure:
+    """Draw what :func:`mdr_dask.fit.master_curve.master_curve` returns: curves, merged curve and factors side by side.
+
+    Bars and the band are one standard error; the merged curve is dashed beyond the range measured at the reference.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
+    _measured(left, curve)
+    _merged(middle, curve)
+    _factors(right, curve)
+    return figure
+
+
+def _label(name: str, values: xr.DataArray) -> str:
+    unit = values.attrs.get("units", "")
+    return f"{name.replace('_', ' ')} ({unit})" if unit and unit != "1" else name.replace("_", " ")
+
+
+def _colours(curve: xr.Dataset) -> Any:
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](np.linspace(0, 0.95, curve.sizes[str(curve.attrs["group"])]))
+
+
+def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]:
+    """Return each group with its points and factors."""
+    by = str(curve.attrs["group"])
+    return [
+        (
+            float(value),
+            curve[["point_abscissa", "point_ordinate"]].isel(
+                point=np.flatnonzero(curve["point_group"].to_numpy() == value)
+            ),
+            float(curve["shift_factor"][i]),
+            float(curve["vertical_factor"][i]),
+        )
+        for i, value in enumerate(curve[by].to_numpy())
+    ]
+
+
+def _measured(axes: Axes, curve: xr.Dataset) -> None:
+    groups = _by_group(curve)
+    for (value, points, shift, rise), colour in zip(groups, _colours(curve), strict=True):
+        x, y = points["point_abscissa"] / 10**shift, points["point_ordinate"] / 10**rise
+        axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}")
+    axes.set_xlabel(_label(curve.attrs["abscissa"], curve["curve_abscissa"]))
+    axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
+    if len(groups) <= 12:
+        axes.legend(title=_label(curve.attrs["group"], curve[curve.attrs["group"]]), fontsize="small")
+    axes.set_title("as measured")
+
+
+def _merged(axes: Axes, curve: xr.Dataset) -> None:
+    for (_, points, _, _), colour in zip(_by_group(curve), _colours(curve), strict=True):
+        axes.loglog(points["point_abscissa"], points["point_ordinate"], ".", color=colour)
+    x, y = curve["curve_abscissa"].to_numpy(), curve["curve_ordinate"].to_numpy()
+    error = 10 ** (BAR * curve["curve_error"].to_numpy())
+    low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
+    inside = (x >= low) & (x <= high)
+    axes.loglog(x, y, "k--", linewidth=1, label="reached by shifting")
+    axes.loglog(np.where(inside, x, np.nan), np.where(inside, y, np.nan), "k-", label="measured at the reference")
+    axes.fill_between(x, y / error, y * error, color="k", alpha=0.2, label="standard error")
+    axes.set_xlabel("shifted " + _label(curve.attrs["abscissa"], curve["curve_abscissa"]))
+    axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
+    axes.set_title(f"reference {curve.attrs['reference']:.3g}")
+    axes.legend(fontsize="small")
+
+
+def _factors(axes: Axes, curve: xr.Dataset) -> None:
+    by = str(curve.attrs["group"])
+    groups = curve[by].to_numpy()
+    error = BAR * curve["shift_factor_error"]
+    axes.errorbar(groups, curve["shift_factor"], error, fmt="o", color="k", label="factors, standard error")
+    if "power_exponent" in curve:
+        exponent = float(curve["power_exponent"])
+        axes.plot(groups, exponent * np.log10(groups / curve.attrs["reference"]), label=f"slope {exponent:.3g}")
+        axes.set_xscale("log")
+    axes.set_xlabel(_label(by, curve[by]))
+    axes.set_ylabel(f"shift of log10 {str(curve.attrs['abscissa']).replace('_', ' ')} (decades)")
+    axes.set_title("shift factors")
+    axes.legend(fontsize="small")
+
+
+def _of_store(series: Mapping[str, xr.Dataset]) -> Figure:
+    from mdr_dask.fit.master_curve import friction_of_roughness, master_curve
+
+    return draw_master_curve(master_curve(friction_of_roughness(series)))
+
+
+PLOTS = (
+    Plot(
+        "master_curve",
+        ("sliding_friction",),
+        "coefficient of friction over force at each velocity, merged, and shift factors (figures 3.17 to 3.19)",
+        _of_store,
+    ),
+)

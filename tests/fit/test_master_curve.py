@@ -1,0 +1,146 @@
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from mdr_dask.errors import DataError
+from mdr_dask.fit.master_curve import FITS, master_curve, read_table, rereferenced
+
+DATA = Path(__file__).parents[1] / "data" / "dma"
+EXPONENT = -0.15
+
+
+def law(force, velocity):
+    """Thesis eq. 3.43 with mu_low ~ (F v^EXPONENT)^(-2/3)."""
+    low = (force * velocity**EXPONENT) ** (-2 / 3)
+    return (1 + low**-1.5) ** (-1 / 1.5)
+
+
+def store(realisations=3, noise=0.01):
+    random = np.random.default_rng(0)
+    force, velocity = np.geomspace(1, 100, 15), np.geomspace(1e-3, 1, 7)
+    exact = law(force[:, None], velocity)[..., None]
+    values = exact * (1 + noise * random.standard_normal((15, 7, realisations)))
+    values[0, 0, 0] = np.nan
+    return xr.Dataset(
+        {
+            "friction_coefficient": (("normal_force", "velocity", "realisation"), values, {"units": "1"}),
+            "status": (("normal_force", "velocity", "realisation"), np.ones(values.shape, np.int8)),
+        },
+        coords={
+            "normal_force": ("normal_force", force, {"units": "N"}),
+            "velocity": ("velocity", velocity, {"units": "m/s"}),
+            "shear_modulus": 1e6,
+        },
+    )
+
+
+def test_store_gives_the_exponent_it_was_made_with():
+    (fit,) = FITS
+    result = fit.compute({"": store()})
+    assert float(result["power_exponent_low"]) < EXPONENT < float(result["power_exponent_high"])
+    assert float(result["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    assert result["shift_factor"].dims == ("velocity",)
+    assert result["curve_abscissa"].attrs["units"] == "N"
+    assert result.sizes["point"] == 15 * 7
+
+
+def test_friction_of_a_smooth_body_is_taken_off():
+    rough, smooth = store(), store(noise=0.0)
+    bulk = 0.1 * smooth["velocity"] ** 0.3 * xr.ones_like(smooth["friction_coefficient"])
+    rough["friction_coefficient"] = rough["friction_coefficient"] + bulk
+    smooth["friction_coefficient"] = bulk
+    series = {
+        "rough": rough.assign_coords(rms_roughness=1e-5),
+        "smooth": smooth.assign_coords(rms_roughness=0.0),
+    }
+    (fit,) = FITS
+    assert float(fit.compute(series)["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    alone = fit.compute({"rough": series["rough"]})
+    assert abs(float(alone["power_exponent"]) - EXPONENT) > 0.02
+
+
+def test_store_without_the_axes_is_refused():
+    with pytest.raises(DataError, match="roughness that varies normal_force and velocity"):
+        FITS[0].compute({"": store().isel(velocity=0)})
+
+
+def test_frame_of_columns_with_other_names():
+    force, velocity = (a.ravel() for a in np.meshgrid(np.geomspace(1, 100, 12), [1e-3, 1e-2, 1e-1]))
+    frame = pd.DataFrame({"Load": force, "Speed": velocity, "COF": law(force, velocity)})
+    result = master_curve(frame, reference=1e-3)
+    assert result.attrs["ordinate"] == "COF"
+    assert result["shift_factor"].sel(Speed=1e-3) == 0
+    np.testing.assert_allclose(result["shift_factor"], EXPONENT * np.array([0, 1, 2]), atol=0.02)
+
+
+def test_measured_moduli_with_units_row_and_scattering_temperatures():
+    table = read_table(DATA / "freq_user_raw.csv")
+    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "C", "Set": "-"}
+    result = master_curve(table, abscissa="f", ordinate="E_stor", group="T")
+    assert result.sizes["T"] == 21
+    assert np.all(np.diff(result["shift_factor"]) < 0)  # warmer is slower: log10 a_T falls with temperature
+    assert float(result["arrhenius_activation_energy"]) > 0
+    assert float(result["wlf_c1"]) > 0
+    assert master_curve(table)["T"].equals(result["T"])  # columns found by their names
+
+
+def test_time_and_frequency_give_the_same_law():
+    """The relaxation table is the storage modulus over 1/f: same shifts with the other sign, same a_T."""
+    time = master_curve(read_table(DATA / "time_user_raw.csv"), abscissa="t", group="T")
+    frequency = master_curve(read_table(DATA / "freq_user_raw.csv"), abscissa="f", group="T")
+    np.testing.assert_allclose(time["shift_factor"], -frequency["shift_factor"], atol=0.05)
+    energies = [float(c["arrhenius_activation_energy"]) for c in (time, frequency)]
+    assert energies[0] == pytest.approx(energies[1], rel=0.02)
+
+
+def test_saved_curves_can_be_rereferenced(tmp_path):
+    curve = master_curve(store()[["friction_coefficient"]])
+    velocity = float(curve["velocity"][1])
+    again = rereferenced(xr.Dataset.from_dict(curve.to_dict()), velocity)
+    direct = master_curve(store()[["friction_coefficient"]], reference=velocity)
+    for name in ("shift_factor", "shift_factor_error", "curve_abscissa", "power_exponent"):
+        np.testing.assert_allclose(again[name], direct[name], rtol=1e-6, atol=1e-9)
+    assert again["curve_abscissa"].attrs["measured_low"] == pytest.approx(1.0)
+
+
+def test_bootstrap_is_kept():
+    assert master_curve(store()[["friction_coefficient"]], draws=5)["draws"].shape == (5, 7)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected rows of numbers, got none"),
+        ("a,b\n", "expected rows of numbers, got only names"),
+        ("1,2\n3,4\n", "expected names of columns, got numbers"),
+        ("a,b\n1,2\n3,x\n", "table.csv:3: expected 2 numbers"),
+        ("a,b\n1,2\n3\n", "table.csv:3: expected 2 numbers"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path, text, message):
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(DataError, match=message):
+        read_table(tmp_path / "table.csv")
+
+
+def test_comments_semicolons_and_spaces_are_understood(tmp_path):
+    for separator in (";", "\t", " "):
+        (tmp_path / "table.csv").write_text(
+            f"# made up\nforce{separator}mu\n\n1{separator}0.5\n% more\n2{separator}0.25\n"
+        )
+        assert read_table(tmp_path / "table.csv").to_numpy().tolist() == [[1, 0.5], [2, 0.25]]
+
+
+def test_tables_that_are_ambiguous_or_incomplete_are_refused():
+    frame = pd.DataFrame({"force": [1.0, 2, 1, 2], "mu": [1.0, 2, 3, 4], "velocity": [1.0, 1, 2, 2]})
+    with pytest.raises(DataError, match="varies in 'temperature' too"):
+        master_curve(frame.assign(temperature=[1.0, 2, 3, 4]))
+    with pytest.raises(DataError, match="expected columns for 'hardness'"):
+        master_curve(frame, ordinate="hardness")
+    with pytest.raises(DataError, match="must be positive"):
+        master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
+    with pytest.raises(DataError, match="the reference 50 is far"):
+        master_curve(frame, reference=50.0)

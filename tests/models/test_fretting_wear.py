@@ -1,0 +1,201 @@
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.models.base import Block, DataFile, Status
+from mdr_dask.models.fretting_wear import MODEL
+from mdr_dask.models.fretting_wear.parameters import FrettingWear, LoadStep, PowerShape, TableShape
+from mdr_dask.physics import wear
+from mdr_dask.physics.revolution import PowerProfile
+from mdr_dask.physics.wear_exact import exact
+
+STEEL = {
+    "curvature_radius": 0.01,
+    "modulus": 115e9,
+    "shear_modulus": 90e9,
+    "friction": 0.6,
+    "amplitude": 1e-6,
+    "load": 50.0,
+    "hardness": 2e9,
+    "wear_coefficient": 1e-4,
+    "cycles": 1e5,
+}
+SCALARS = ("contact_radius", "wear_volume", "normal_force", "stick_border", "discretisation_error")
+
+
+def run(parameters, columns=None, outputs=SCALARS, realisations=(0,), seed=1):
+    columns = columns or {}
+    cases = len(next(iter(columns.values()))) if columns else 1
+    return MODEL.compute(Block(parameters, columns, cases, realisations, seed, outputs))
+
+
+def test_dimensionless_fast_is_the_physics():
+    result = run(FrettingWear(stick_radius=0.455, cycles=2.0, xi=0.9))
+    worn = wear.fast(PowerProfile(2.0), 0.455, 2.0, 0.9)
+    assert result.values["wear_volume"][0, 0] == pytest.approx(worn.wear_volume, rel=1e-6)
+    assert result.values["contact_radius"][0, 0] == pytest.approx(worn.contact_radius, rel=1e-6)
+    assert result.values["stick_border"][0, 0] == pytest.approx(0.455, rel=1e-14)
+
+
+@pytest.mark.parametrize("method", ["limit", "fast", "exact", "literal"])
+def test_every_method_has_every_output(method):
+    outputs = tuple(output.name for output in MODEL.outputs)
+    result = run(FrettingWear(stick_radius=0.5, cycles=0.5, method=method, cells=40), outputs=outputs)
+    assert result.status[0, 0] == Status.DONE
+    for name, array in result.values.items():
+        shape = (1, 1, 161) if MODEL.output(name).dims else (1, 1)
+        assert array.shape == shape
+        if name != "discretisation_error" or method != "literal":
+            assert np.all(np.isfinite(array[..., 1:])), name
+    r = MODEL.coordinates(FrettingWear(stick_radius=0.5))["radius"].values
+    f, p = result.values["worn_profile"][0, 0], result.values["pressure"][0, 0]
+    assert np.all(f >= r**2 / 2 - 1e-12)
+    assert np.all(p[r > result.values["contact_radius"][0, 0]] == 0)
+    assert result.values["worn_depth"][0, 0] == pytest.approx(np.max(f - r**2 / 2), abs=0.01)
+
+
+def test_exact_cases_that_share_n_and_c_are_solved_once():
+    cycles, friction = np.meshgrid([1e4, 1e5, 1e6], [0.5, 0.7], indexing="ij")
+    columns = {"cycles": cycles.ravel(), "friction": friction.ravel()}
+    parameters = FrettingWear(**STEEL, method="exact")
+    result = run(parameters, columns)
+    assert result.solves == 2
+    assert np.all(result.status == Status.DONE)
+
+
+def test_dimensional_case_is_the_dimensionless_one_in_its_units():
+    result = run(FrettingWear(**STEEL, method="exact"))
+    R, E, F = 0.01, 115e9, 50.0
+    a0 = (3 * F * R / (4 * E)) ** (1 / 3)
+    d0 = a0**2 / R
+    c = np.sqrt(1 - 90e9 * 1e-6 / (0.6 * E * d0))
+    N = 1e5 * 4 * 1e-6 * 1e-4 * E / (a0 * 2e9)
+    worn = exact(PowerProfile(2.0), c, [N], 1e-3)[0]
+    assert result.values["wear_volume"][0, 0] == pytest.approx(worn.wear_volume * a0**2 * d0, rel=1e-8)
+    assert result.values["normal_force"][0, 0] == pytest.approx(worn.normal_force * E * a0 * d0, rel=1e-8)
+    assert result.values["stick_border"][0, 0] == pytest.approx(c * a0, rel=1e-10)
+
+
+def test_virgin_force_is_the_load_for_every_shape():
+    for shape, size in (("parabola", {}), ("cone", {"angle": 0.1}), (PowerShape(exponent=3.0), {})):
+        settings = {**STEEL, **size, "cycles": 0.0, "amplitude": 1e-8}
+        result = run(FrettingWear(shape=shape, **settings))
+        assert result.values["normal_force"][0, 0] == pytest.approx(50.0, rel=1e-6)
+        assert result.values["wear_volume"][0, 0] == 0.0
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+def test_bitwise_independent_of_the_block(method):
+    columns = {"stick_radius": np.array([0.3, 0.3, 0.6, 0.6]), "cycles": np.array([0.7, 3.0, 0.7, 5.0])}
+    parameters = FrettingWear(stick_radius=0.3, method=method, amplitude_scatter=0.05)
+    block = Block(parameters, columns, 4, (0, 5), 7, SCALARS)
+    whole = MODEL.compute(block)
+    for case in range(4):
+        for position, realisation in enumerate((0, 5)):
+            part = MODEL.compute(block.part(case, realisation))
+            for name in SCALARS:
+                assert part.values[name][0, 0] == whole.values[name][case, position], (name, case)
+
+
+def test_scatter_has_the_asked_width_and_leaves_the_mean():
+    parameters = FrettingWear(stick_radius=0.455, cycles=0.01, wear_coefficient_scatter=0.3)
+    volume = run(parameters, realisations=tuple(range(4000))).values["wear_volume"][0]
+    # few cycles: volume is linear in the coefficient; 5 standard errors of 4000 samples
+    assert np.std(volume) / np.mean(volume) == pytest.approx(0.3, abs=0.03)
+    plain = run(FrettingWear(stick_radius=0.455, cycles=0.01)).values["wear_volume"][0, 0]
+    assert np.mean(volume) == pytest.approx(plain, rel=5 * 0.3 / np.sqrt(4000))
+
+
+def test_gross_slip_is_a_message_and_nothing_else_fails():
+    result = run(FrettingWear(**STEEL), {"amplitude": np.array([1e-6, 1e-4])})
+    assert result.status.ravel().tolist() == [Status.DONE, Status.FAILED]
+    assert "gross slip" in result.messages[1, 0]
+    assert np.isnan(result.values["wear_volume"][1, 0])
+    assert np.isfinite(result.values["wear_volume"][0, 0])
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+def test_constant_force(method):
+    result = run(FrettingWear(stick_radius=0.5, cycles=0.3, method=method, hold="force", cells=60))
+    if method == "fast":
+        assert result.status[0, 0] == Status.FAILED
+        assert "constant depth only" in result.messages[0, 0]
+    else:
+        assert result.values["normal_force"][0, 0] == pytest.approx(4 / 3, rel=1e-4)
+
+
+def test_history_of_amplitudes():
+    steps = (LoadStep(cycles=0.5), LoadStep(cycles=0.5, amplitude_factor=1.2))
+    result = run(FrettingWear(stick_radius=0.5, method="exact", history=steps, cells=60))
+    one = run(FrettingWear(stick_radius=0.5, method="exact", history=steps[:1], cells=60))
+    assert result.values["wear_volume"][0, 0] > one.values["wear_volume"][0, 0]
+    assert result.values["stick_border"][0, 0] < one.values["stick_border"][0, 0]
+
+
+def table(tmp_path, rows):
+    from hashlib import sha256
+
+    path = tmp_path / "profile.csv"
+    path.write_text("radius,height\n" + "\n".join(f"{r!r},{f!r}" for r, f in rows))
+    return TableShape(table=DataFile(name=path.name, path=str(path), sha256=sha256(path.read_bytes()).hexdigest()))
+
+
+def table_case(shape, **changes):
+    settings = {k: v for k, v in STEEL.items() if k not in {"curvature_radius", "load"}}
+    return run(FrettingWear(shape=shape, **{**settings, "depth": 4.7e-6, **changes}))
+
+
+def test_table_of_a_ball(tmp_path):
+    r = np.linspace(0, 1e-3, 201).tolist()
+    shape = table(tmp_path, [(x, x**2 / 0.02) for x in r])
+    measured = table_case(shape)
+    smooth = run(FrettingWear(**{**STEEL, "load": None, "depth": 4.7e-6}))
+    for name in ("wear_volume", "contact_radius", "normal_force"):
+        assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ([(0.0, 0.0), (1e-4, 2e-6), (2e-4, 1e-6), (1e-3, 1e-3)], "must rise"),
+        ([(0.0, 0.0), (1e-6, 1e-10), (2e-6, 4e-10), (3e-6, 9e-10)], "beyond the table"),
+        ([(0.0, 0.0), (1e-4, float("nan")), (2e-4, 1e-6), (1e-3, 1e-3)], "must be finite"),
+    ],
+)
+def test_bad_tables(tmp_path, rows, message):
+    result = table_case(table(tmp_path, rows))
+    assert result.status[0, 0] == Status.FAILED
+    assert message in result.messages[0, 0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"wear_coefficient": -1e-4}, "greater than or equal to 0"),
+        ({"stick_radius": 0.5}, "leave one kind out"),
+        ({"depth": 1e-6}, "either load or depth"),
+        ({"friction": None}, "also friction"),
+        ({"shape": "cone"}, "also angle"),
+        ({"cycles": -1.0}, "greater than or equal to 0"),
+    ],
+)
+def test_bad_parameters(changes, message):
+    with pytest.raises(ValidationError, match=message):
+        FrettingWear(**{**STEEL, **changes})
+
+
+@pytest.mark.parametrize("c", [1e-3, 0.999])
+@pytest.mark.parametrize("exponent", [0.5, 2.0, 20.0])
+@pytest.mark.parametrize("cycles", [1e-9, 1e4])
+def test_extremes_of_the_fast_rule(exponent, c, cycles):
+    result = run(FrettingWear(shape=PowerShape(exponent=exponent), stick_radius=c, cycles=cycles))
+    assert result.status[0, 0] == Status.DONE
+    assert 0 <= result.values["wear_volume"][0, 0] < 10
+    assert result.values["contact_radius"][0, 0] >= 1
+
+
+def test_distinct_and_seconds_are_cheap_estimates():
+    block = Block(FrettingWear(stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS)
+    assert MODEL.distinct is not None
+    assert MODEL.distinct(block) == 3
+    assert MODEL.seconds(block) > 0

@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.errors import DataError
+from mdr_dask.models.material import Material, solid_of
+from mdr_dask.physics.rheology import complex_modulus
+
+TABLE = "tests/data/dma/freq_user_raw.csv"
+
+
+def material(**kind):
+    return Material.model_validate(kind)
+
+
+def test_every_kind_is_the_solid_it_names():
+    kelvin = solid_of(material(kelvin={"shear_modulus": 1e6, "relaxation_time": 1e-3}))
+    assert (kelvin.static_modulus, kelvin.viscosity) == (1e6, 1e3)
+    standard = solid_of(material(standard_solid={"static_modulus": 1e6, "glass_modulus": 1e7, "relaxation_time": 0.1}))
+    assert standard.glass_modulus == 1e7
+    prony = solid_of(
+        material(prony={"static_modulus": 1.0, "moduli": [1.0, 2.0], "times": [0.1, 1.0], "viscosity": 0.5})
+    )
+    assert prony.moduli.tolist() == [1, 2]
+    power = material(
+        power_law={
+            "static_modulus": 1e6,
+            "loss_modulus": 1e5,
+            "frequency": 1e3,
+            "exponent": 0.2,
+            "lowest": 1.0,
+            "highest": 1e6,
+        }
+    )
+    assert complex_modulus(solid_of(power), 1e3).imag == pytest.approx(1e5, rel=0.01)
+
+
+def test_one_kind_and_one_law_only():
+    kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
+    solid = {"static_modulus": 1e6, "glass_modulus": 1e7, "relaxation_time": 0.1}
+    with pytest.raises(ValidationError, match=r"expected one of kelvin, standard_solid, .* got none"):
+        material()
+    with pytest.raises(ValidationError, match="got kelvin, standard_solid"):
+        material(kelvin=kelvin, standard_solid=solid)
+    with pytest.raises(ValidationError, match="a temperature needs wlf or arrhenius"):
+        material(kelvin=kelvin, temperature=300.0)
+    laws = {
+        "wlf": {"c1": 17.4, "c2": 51.6, "reference": 300.0},
+        "arrhenius": {"activation_energy": 1e5, "reference": 300.0},
+    }
+    with pytest.raises(ValidationError, match="expected wlf or arrhenius, got both"):
+        material(kelvin=kelvin, temperature=300.0, **laws)
+
+
+@pytest.mark.parametrize(
+    ("law", "factor"),
+    [
+        ({"wlf": {"c1": 17.4, "c2": 51.6, "reference": 300.0}}, 10 ** (-17.4 * 10 / 61.6)),
+        (
+            {"arrhenius": {"activation_energy": 1e5, "reference": 300.0}},
+            np.exp(1e5 / 8.31446261815324 * (1 / 310 - 1 / 300)),
+        ),
+    ],
+)
+def test_temperature_moves_relaxation_times(law, factor):
+    kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
+    assert solid_of(material(kelvin=kelvin, temperature=310.0, **law)).viscosity == pytest.approx(1e3 * factor)
+
+
+def test_table_of_one_temperature_is_fitted():
+    chosen = {"file": TABLE, "table_temperature": 353.0 + 4.8, "poisson_ratio": 0.35, "arms_per_decade": 2.0}
+    solid = solid_of(material(dma_table=chosen))
+    # at 1 Hz and 84.9 C, from the file, tension to shear
+    modulus = complex_modulus(solid, 2 * np.pi)
+    assert modulus.real == pytest.approx(555e6 / 2.7, rel=0.5)
+    assert solid.static_modulus > 0
+
+
+def test_table_of_many_temperatures_is_superposed():
+    solid = solid_of(material(dma_table={"file": TABLE, "reference": 323.0, "poisson_ratio": 0.5}))
+    assert solid.times[-1] / solid.times[0] > 1e20
+    assert solid.times.size > 10
+
+
+def test_table_needs_a_temperature_or_a_reference():
+    with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, or a reference"):
+        solid_of(material(dma_table={"file": TABLE}))
+    with pytest.raises(DataError, match="got no rows at 500 K"):
+        solid_of(material(dma_table={"file": TABLE, "table_temperature": 500.0}))
+
+
+def test_missing_file_is_named():
+    with pytest.raises(ValidationError, match=r"no such file: .*nowhere.csv"):
+        material(dma_table={"file": "nowhere.csv"})

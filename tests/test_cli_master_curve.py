@@ -1,0 +1,49 @@
+"""The command master-curve on a measured table, kept and re-referenced."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdr_dask.cli import main
+
+TABLE = Path(__file__).parent / "data/dma/time_user_raw.csv"
+
+
+def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
+    kept, figure = tmp_path / "kept.json", tmp_path / "master.png"
+    options = ["--reference", "20", "--keep", str(kept), "--plot", str(figure), "--json"]
+    assert main(["master-curve", str(TABLE), *options]) == 0
+    first = json.loads(capsys.readouterr().out)
+    factors = np.array(first["data_vars"]["shift_factor"]["data"])
+    groups = np.array(first["coords"]["T"]["data"])
+    assert factors[np.argmin(abs(groups - 20))] == 0.0
+    assert (np.diff(factors) > 0).all()
+    assert figure.stat().st_size > 10_000
+    assert main(["master-curve", str(kept), "--reference", "60", "--json"]) == 0
+    second = json.loads(capsys.readouterr().out)
+    moved = np.array(second["data_vars"]["shift_factor"]["data"])
+    np.testing.assert_allclose(np.diff(moved), np.diff(factors), atol=1e-10)
+    assert np.interp(60.0, groups, moved) == pytest.approx(0.0, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("normal_force,velocity\n1,2\n", "expected columns for"),
+        ("normal_force,velocity,mu\n1,2,high\n", ":2: expected 3 numbers"),
+    ],
+)
+def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, content, message):
+    path = tmp_path / "table.csv"
+    path.write_text(content)
+    assert main(["master-curve", str(path)]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
+    path = tmp_path / "other.json"
+    path.write_text("{}")
+    assert main(["master-curve", str(path)]) == 2
+    assert "not a master curve kept by --keep" in capsys.readouterr().err
