@@ -187,7 +187,7 @@ def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, 
 
 
 @njit(nogil=True, cache=True)
-def sweep(  # noqa: C901
+def sweep(
     cells: Cells, barriers: FloatArray, block_barriers: FloatArray, reach: float, depth: float, sums: FloatArray
 ) -> None:
     """Follow an element once along the profile.
