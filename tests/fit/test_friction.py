@@ -16,7 +16,7 @@ def forces():
 
 
 def test_zone_one_is_that_of_the_statics(forces):
-    found = FIT["friction-zone-one"]({"": forces})
+    found = FIT["zone_one"]({"": forces})
     assert found["alpha"].dims == ("hurst",)
     # 12 short lines: H / (1 + H) within the interval and 0.1 for the shortness of the line and the window
     for hurst in (0.3, 0.7):
@@ -32,24 +32,24 @@ def test_laws_are_found_again_in_data_made_by_them(forces):
     velocity = laws.velocity_number(forces.velocity, forces.relaxation_time, slope, forces.rms_roughness)
     exact = np.sqrt(2) * slope * laws.interpolation(force, velocity, 0.35, 1.5)
     made = forces.assign(friction_coefficient=exact.broadcast_like(forces.friction_coefficient))
-    found = FIT["friction-law"]({"": made})
+    found = FIT["interpolation"]({"": made})
     assert found["alpha"].values == pytest.approx(0.35, abs=1e-6)
     assert found["beta"].values == pytest.approx(1.5, rel=1e-6)
     assert found["rms_error"].values == pytest.approx(0, abs=1e-6)
-    zone = FIT["friction-zone-one"]({"": made})
+    zone = FIT["zone_one"]({"": made})
     # the law is not yet its own limit at a force number of 0.3: the second term of eq. 3.18 bends it
     assert zone["alpha"].values == pytest.approx(0.35, abs=0.1)
 
 
 def test_the_law_holds_as_stated(forces):
-    found = FIT["friction-law"]({"": forces})
+    found = FIT["interpolation"]({"": forces})
     assert np.all(found["rms_error"] <= found["rms_error_stated"] + 1e-9)
     # physics note section 3: 8 % rms of the plateau; 12 short lines scatter by as much again
     assert np.all(found["rms_error_stated"] < 0.16)
 
 
 def test_plateau_lies_near_root_two(forces):
-    found = FIT["friction-plateau"]({"": forces})
+    found = FIT["plateau"]({"": forces})
     assert found["plateau"].dims == ("hurst", "normal_force")
     high = found.isel(normal_force=slice(10, 13))
     assert np.all(high["bracketed"] == 1)
@@ -58,8 +58,8 @@ def test_plateau_lies_near_root_two(forces):
 
 def test_series_are_fitted_one_by_one(forces):
     two = {"force": forces, "spacing": forces.isel(normal_force=0, drop=False)}
-    assert "series" not in FIT["friction-zone-one"](two).dims
-    both = FIT["friction-zone-one"]({"a": forces, "b": forces})
+    assert "series" not in FIT["zone_one"](two).dims
+    both = FIT["zone_one"]({"a": forces, "b": forces})
     assert both["series"].values.tolist() == ["a", "b"]
 
 
@@ -78,7 +78,7 @@ def test_indenters_follow_their_law(shape):
         indenter=shape,
     )
     assert np.all(data.status == 1)
-    found = FIT["friction-indenter"]({"": data})
+    found = FIT["indenter"]({"": data})
     # physics note section 4: within -5..+4 % of the law with 1.5 over these xi
     assert found["rms_error_stated"] < 0.06
     assert found["exponent_low"] < found["exponent"] < found["exponent_high"]
@@ -87,11 +87,11 @@ def test_indenters_follow_their_law(shape):
 
 def test_what_cannot_be_fitted_says_why(forces):
     with pytest.raises(FitError, match="expected three loads with F_N"):
-        FIT["friction-zone-one"]({"": forces.isel(velocity=slice(-3, None))})
+        FIT["zone_one"]({"": forces.isel(velocity=slice(-3, None))})
     with pytest.raises(FitError, match="expected a store with an indenter"):
-        FIT["friction-indenter"]({"": forces})
+        FIT["indenter"]({"": forces})
     with pytest.raises(FitError, match="expected three velocities"):
-        FIT["friction-plateau"]({"": forces.isel(velocity=slice(2))})
+        FIT["plateau"]({"": forces.isel(velocity=slice(2))})
 
 
 def test_zone_one_has_the_known_constants():
@@ -99,7 +99,7 @@ def test_zone_one_has_the_known_constants():
     known = {0.0: (0.149, 1.68), 0.3: (0.275, 1.57), 0.7: (0.410, 1.66), 1.0: (0.430, 1.65)}
     axes = {"hurst": list(known), "normal_force": np.geomspace(0.01, 0.3, 8) * 0.1}
     data = store(axes, realisations=60, velocity=1e-9, points=2000)
-    found = FIT["friction-zone-one"]({"": data})
+    found = FIT["zone_one"]({"": data})
     for hurst, constants in known.items():
         here = found.sel(hurst=hurst)
         for name, value in zip(("alpha", "beta"), constants, strict=True):

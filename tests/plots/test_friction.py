@@ -6,7 +6,7 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots.friction import PLOTS
 
 DRAW = {plot.name: plot.draw for plot in PLOTS}
-PLANE = ("friction-regions", "friction-velocity", "friction-force", "friction-zone-one", "friction-plateau")
+PLANE = ("regions", "velocity", "force", "zone_one", "plateau")
 
 
 @pytest.fixture(scope="module")
@@ -41,11 +41,11 @@ def test_a_figure_is_labelled_and_drawn(name, forces, tmp_path):
 
 
 def test_the_figure_of_indenters_is_labelled_and_drawn(cone, tmp_path):
-    check(DRAW["friction-indenter"]({"cone": cone}), tmp_path)
+    check(DRAW["indenter"]({"cone": cone}), tmp_path)
 
 
 def test_curves_hold_the_mean_over_realisations(forces):
-    axes = DRAW["friction-force"]({"": forces}).axes[0]
+    axes = DRAW["force"]({"": forces}).axes[0]
     expected = (forces.friction_coefficient / forces.rms_slope).mean("realisation").isel(hurst=1)
     drawn = np.array([line.get_ydata() for line in axes.get_lines()])
     assert drawn == pytest.approx(expected.values)
@@ -53,8 +53,8 @@ def test_curves_hold_the_mean_over_realisations(forces):
 
 def test_a_store_that_does_not_fit_the_figure_is_refused(forces):
     with pytest.raises(DataError, match="expected a series whose axes include velocity"):
-        DRAW["friction-velocity"]({"": forces.isel(velocity=0)})
+        DRAW["velocity"]({"": forces.isel(velocity=0)})
     with pytest.raises(DataError, match="expected a store with an axis hurst"):
-        DRAW["friction-plateau"]({"": forces.isel(hurst=0)})
+        DRAW["plateau"]({"": forces.isel(hurst=0)})
     with pytest.raises(FitError, match="expected a store with an indenter"):
-        DRAW["friction-indenter"]({"": forces})
+        DRAW["indenter"]({"": forces})
