@@ -52,6 +52,4 @@ if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 500
     for target in (0.05, 0.01, 0.002):
         share, over = honesty(number, target)
-        print(
-            f"{number} cases at {target:g}: {share:.1%} below their estimate, {over:.1f} times too large in the median"
-        )
+        print(f"{number} cases at {target:g}: {share:.1%} below the estimate, {over:.1f} times too large (median)")

@@ -188,7 +188,7 @@ def templates(
         if math.prod(sizes.values()) > MOST_CASES:
             problems.append(_too_many(campaign, series, sizes))
             continue
-        outputs = tuple(model.output(name) for name in campaign.outputs)
+        outputs = _outputs(campaign, series, model)
         empty = Template(campaign, series, sizes, {}, outputs, model.coordinates(series.parameters))
         chunks = known.get(series.name) or _choose_chunks(empty, model)
         template = Template(campaign, series, sizes, chunks, outputs, empty.extra)
@@ -197,6 +197,12 @@ def templates(
     if problems:
         raise CampaignError(*problems)
     return tuple(laid_out)
+
+
+def _outputs(campaign: Campaign, series: Series, model: Model[Any]) -> tuple[Output, ...]:
+    units = model.units(series.parameters)
+    wanted = [model.output(name) for name in campaign.outputs]
+    return tuple(replace(output, unit=units.get(output.name, output.unit)) for output in wanted)
 
 
 def _too_many(campaign: Campaign, series: Series, sizes: Mapping[str, int]) -> str:

@@ -41,8 +41,15 @@ def _flat(series: Mapping[str, xr.Dataset], needed: tuple[str, ...]) -> xr.Datas
             raise FitError(f"expected the outputs {', '.join(needed)} in the store, got none of {', '.join(missing)}")
         cases = data["friction_coefficient_before"].isel(realisation=0, drop=True)
         dims = list(cases.dims)
-        data = data[[*needed]].assign_coords(
-            {key: data[key] for key in ("velocity", "hurst", "points", "length", "relaxation_time", "velocity_change")}
+        data = (
+            data[[*needed]]
+            .assign_coords(realisation=np.arange(data.sizes["realisation"]))
+            .assign_coords(
+                {
+                    key: data[key]
+                    for key in ("velocity", "hurst", "points", "length", "relaxation_time", "velocity_change")
+                }
+            )
         )
         for key in ("velocity", "hurst", "points", "length", "relaxation_time", "velocity_change"):
             data = data.assign({f"_{key}": data[key].broadcast_like(cases)})

@@ -329,7 +329,9 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    return master_curve(friction_of_roughness(series))
+    """Return the factors and the constants of their law; the merged curve is what ``mdr-dask master-curve`` is for."""
+    curve = master_curve(friction_of_roughness(series))
+    return curve[[name for name, values in curve.data_vars.items() if set(values.dims) <= {curve.attrs["group"]}]]
 
 
 FITS = (

@@ -41,7 +41,7 @@ def widths(time: np.ndarray) -> np.ndarray:
 
 
 def exponential(time: np.ndarray, trace: np.ndarray, weights: np.ndarray) -> tuple[float, float, float]:
-    """Fit one exponential by weighted least squares; the amplitude is eliminated, the rate found by search.
+    """Fit one exponential by weighted least squares, the rate on a grid and a parabola, the amplitude eliminated.
 
     Returns
     -------
@@ -128,6 +128,8 @@ def relaxation_of(
     dict
         The entries of `RATE_FIELDS`.
     """
+    if not np.all(np.any(others[:, time <= time[min(8, time.size - 1)]] != 0, axis=1)):
+        return dict.fromkeys(RATE_FIELDS, np.nan)
     inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])
     t, y, weights = time[inside], trace[inside], widths(time[inside])
     rate, amplitude, left = exponential(t, y, weights)

@@ -255,6 +255,8 @@ class Model(Generic[P]):
         Coordinates of the dimensions that outputs have beyond case and realisation.
     distinct : callable, Block -> int, optional
         Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
+    units : callable, Parameters -> dict of str to str
+        Units of outputs that differ from the declared ones, as in a campaign of dimensionless numbers.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, beyond its outputs.
     """
@@ -270,6 +272,7 @@ class Model(Generic[P]):
     coordinates: Callable[[P], dict[str, Coordinate]] = lambda _: {}
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
+    units: Callable[[P], dict[str, str]] = lambda _: {}
 
     def output(self, name: str) -> Output:
         """Return the declared output of that name; KeyError if there is none."""

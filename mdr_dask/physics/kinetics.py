@@ -37,10 +37,10 @@ MESSAGES = {
 }
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
-NEGLIGIBLE = 1e-6  # of the mean displacement: changes of depth that need no finer steps
-MOMENTS = 20000
+NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
+MOMENTS = 3000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
-WIDENINGS = 6
+WIDENINGS = 3
 
 
 class Jump(NamedTuple):
@@ -293,7 +293,7 @@ def _relax(
     failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
     floor = np.zeros(profile.height.size)
     low, high = float(depths.min()), float(depths.max())
-    margin = 0.25 * (high - low) + 1e-9 * abs(high)
+    margin = 0.25 * (high - low) + NEGLIGIBLE * load
     for _ in range(WIDENINGS):
         floor[:] = 0.0
         everywhere = _reachable(profile, floor, high + margin)

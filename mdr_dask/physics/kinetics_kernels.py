@@ -26,7 +26,7 @@ BLOCK = 16
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 TRIALS = 80
-CLOSE, ENOUGH = 1e-7, 1e-5  # of the load: where a last secant step follows, and where a depth counts as found
+CLOSE, EXACT = 1e-7, 1e-11  # of the load: where a last secant step follows, and where none is needed
 ROOT_STEPS = 60
 GUARD_CELLS = 200.0
 LOAD, DRAG, LENGTH, STIFFNESS = range(4)
@@ -628,7 +628,7 @@ def _balance(
             return 2, 0.0, gain
         off = sums[LOAD] / load - 1
         drag = sums[DRAG]
-        if abs(off) <= CLOSE:
+        if abs(off) <= (CLOSE if trial > 0 else EXACT):
             if trial > 0 and off != before_off:
                 share = off / (before_off - off)
                 guess += share * (guess - before)
@@ -717,7 +717,7 @@ def march(
         )
         miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
         if miss > 2 * pace.miss or status != 0:
-            if step < 1e-3 * pace.first:
+            if step < 1e-3 * pace.first or (status == 2 and step < 1e-2 * time[now - 1]):
                 return now, max(status, 1)
             step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
             continue

@@ -62,12 +62,12 @@ class Cells(NamedTuple):
     periodic: bool
 
 
-@njit(nogil=True, cache=True)
-def cubic(cells: Cells, i: int) -> tuple[float, float, float, float]:
+@njit(nogil=True, cache=True, inline="always")
+def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i, by rising power."""
-    rise = cells.height[i + 1] - cells.height[i]
-    enter, leave = cells.enter[i], cells.leave[i]
-    return cells.height[i], enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
+    first, last = enter[i], leave[i]
+    rise = height[i + 1] - height[i]
+    return height[i], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
 @njit(nogil=True, cache=True)
@@ -83,9 +83,10 @@ def summit(a: float, b: float, c: float) -> float:
 @njit(nogil=True, cache=True)
 def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: FloatArray) -> None:
     """Write the depth that keeps each whole cell pressed, w + reach w' > 0, and its maximum over blocks."""
+    height, enter, leave = cells.height, cells.enter, cells.leave
     for i in range(barriers.size):
-        first = -(cells.height[i] + reach * cells.enter[i])
-        last = -(cells.height[i + 1] + reach * cells.leave[i])
+        first = -(height[i] + reach * enter[i])
+        last = -(height[i + 1] + reach * leave[i])
         barriers[i] = first if first > last else last
     for j in range(block_barriers.size):
         highest = barriers[j * BLOCK]
@@ -174,6 +175,18 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 
 @njit(nogil=True, cache=True)
+def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, float, float, float]:
+    """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
+
+    Over a flight from u the integral of u is reach times what u loses, and the drag is half of what u^2 loses; the
+    derivative of the drag has a part from the point of touching, where the profile has that slope.
+    """
+    lost = _lost(flown / reach) if u > 0 else 1.0
+    memory = reach * lost
+    return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / reach + slope)
+
+
+@njit(nogil=True, cache=True)
 def sweep(
     cells: Cells, barriers: FloatArray, block_barriers: FloatArray, reach: float, depth: float, sums: FloatArray
 ) -> None:
@@ -194,106 +207,114 @@ def sweep(
         depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a profile
         that is not periodic.
     """
-    n = cells.mean.size - 1
-    decay = np.exp(-1 / reach)
-    block_decay = np.exp(-BLOCK / reach)
-    area = rate = stretch = flights = flights_rate = length = 0.0
-    i, x, contact = 0, cells.start, cells.periodic
-    u, a, flown = 0.0, 1.0, 0.0  # displacement at leaving, what is left of it, length flown
-    sums[OUTSIDE] = 0.0 if cells.periodic or depth + cells.height[0] <= 0 else 1.0
+    # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
+    height, enter, leave, peak, mean, stretches = (
+        cells.height,
+        cells.enter,
+        cells.leave,
+        cells.peak,
+        cells.mean,
+        cells.stretch,
+    )
+    block_peak, block_mean, block_stretch = cells.block_peak, cells.block_mean, cells.block_stretch
+    n, blocks, start = mean.size - 1, block_peak.size, cells.start
+    decay, block_decay = np.exp(-1 / reach), np.exp(-BLOCK / reach)
+    area = rate = drag = drag_rate = length = stretch = 0.0
+    i, x, contact = 0, start, cells.periodic
+    u, free, left = (
+        0.0,
+        0.0,
+        0.0,
+    )  # displacement where the contact was left, at the start of this cell; place of leaving
     while i < n:
-        if contact:
-            if x == 0:
-                if i % BLOCK == 0 and i + BLOCK <= n and block_barriers[i // BLOCK] < depth:
-                    area += cells.block_mean[i // BLOCK] + BLOCK * depth
-                    stretch += cells.block_stretch[i // BLOCK]
+        if contact and x == 0:
+            while i < n and barriers[i] < depth:
+                if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
+                    area += block_mean[i // BLOCK] + BLOCK * depth
+                    stretch += block_stretch[i // BLOCK]
                     length += BLOCK
                     i += BLOCK
-                    continue
-                if barriers[i] < depth:
-                    area += cells.mean[i] + depth
-                    stretch += cells.stretch[i]
+                else:
+                    area += mean[i] + depth
+                    stretch += stretches[i]
                     length += 1
                     i += 1
-                    continue
-            h0, c1, c2, c3 = cubic(cells, i)
-            w0 = depth + h0
-            left = _leaving(w0, c1, c2, c3, reach, x)
-            end = min(left, 1.0)
-            if left <= 1:
-                u = w0 + left * (c1 + left * (c2 + left * c3))
-                flown = 1 - left
-                a = 1 - _lost(flown / reach)
-                contact = depth + cells.height[i + 1] > u * a
-                end = 1.0 if contact else left
-            part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
+        elif not contact:
+            while i < n and peak[i] + depth <= free * decay:
+                if (
+                    i & (BLOCK - 1) == 0
+                    and i // BLOCK < blocks
+                    and block_peak[i // BLOCK] + depth <= free * block_decay
+                ):
+                    free *= block_decay
+                    i += BLOCK
+                else:
+                    free *= decay
+                    i += 1
+                # numbers below the normal ones cost a hundred times as much
+                free = free if free > TINY else 0.0
+        if i >= n:
+            break
+        h0, c1, c2, c3 = cubic(height, enter, leave, i)
+        w0 = depth + h0
+        if contact:
+            place, u, free = _leave(w0, c1, c2, c3, reach, x)
+            part, part_stretch = _pressed(w0, c1, c2, c3, x, min(place, 1.0))
             area += part
             stretch += part_stretch
-            length += end - x
-            i += 1
+            length += min(place, 1.0) - x
+            contact = place > 1
+            left = i + place
             x = 0.0
+            i += 1
             continue
-        if i % BLOCK == 0 and i + BLOCK <= n and cells.block_peak[i // BLOCK] + depth <= u * a * block_decay:
-            a *= block_decay
-            flown += BLOCK
-            i += BLOCK
-            continue
-        if cells.peak[i] + depth > u * a * decay:
-            h0, c1, c2, c3 = cubic(cells, i)
-            w0 = depth + h0
-            end = _reached(w0, c1, c2, c3, reach, u * a, decay)
-            if end <= 1:
-                x = _touching(w0, c1, c2, c3, reach, u * a, end)
-                flown += x
-                lost = _lost(flown / reach)
-                memory = reach * lost
-                slope = c1 + x * (2 * c2 + x * 3 * c3)
-                if u > 0:
-                    area += u * memory
-                    rate += memory
-                    flights += 0.5 * u * u * lost * (2 - lost)
-                    flights_rate += memory * (u / reach + slope)
-                else:
-                    flights_rate += reach * slope
-                contact = True
-                continue
-        a *= decay
-        if a < TINY:
-            a = 0.0
-        flown += 1
-        i += 1
-    # the last stretch, up to the highest point again or out to infinity
-    if cells.periodic and contact:
-        h0, c1, c2, c3 = cubic(cells, n)
-        part, part_stretch = _pressed(depth + h0, c1, c2, c3, 0.0, cells.start)
+        x = _touch(w0, c1, c2, c3, reach, free, decay)
+        contact = x <= 1
+        if contact:
+            flight = _landed(u, i + x - left, reach, c1 + x * (2 * c2 + x * 3 * c3))
+            area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
+        else:
+            free *= decay
+            x = 0.0
+            i += 1
+    # the last part of the turn, up to the highest point again; or the last flight, which does not end
+    h0, c1, c2, c3 = cubic(height, enter, leave, n)
+    w0 = depth + h0
+    x = 0.0
+    if not contact:
+        x = _touching(w0, c1, c2, c3, reach, free, start) if cells.periodic and start > 0 else 0.0
+        flown = n + x - left if cells.periodic else np.inf
+        slope = c1 + x * (2 * c2 + x * 3 * c3) if cells.periodic else 0.0
+        flight = _landed(u, flown, reach, slope)
+        area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
+    if cells.periodic:
+        part, part_stretch = _pressed(w0, c1, c2, c3, x, start)
         area += part
         stretch += part_stretch
-        length += cells.start
-    elif cells.periodic:
-        h0, c1, c2, c3 = cubic(cells, n)
-        w0 = depth + h0
-        x = _touching(w0, c1, c2, c3, reach, u * a, cells.start) if cells.start > 0 else 0.0
-        flown += x
-        lost = _lost(flown / reach)
-        memory = reach * lost
-        area += u * memory
-        rate += memory
-        flights += 0.5 * u * u * lost * (2 - lost)
-        flights_rate += memory * (u / reach + c1 + x * (2 * c2 + x * 3 * c3))
-        part, part_stretch = _pressed(w0, c1, c2, c3, x, cells.start)
-        area += part
-        stretch += part_stretch
-        length += cells.start - x
-    elif contact:
-        sums[OUTSIDE] = 1.0
-    else:
-        area += u * reach
-        rate += reach
-        flights += 0.5 * u * u
-        flights_rate += u
+        length += start - x
     sums[DISPLACEMENT] = area
     sums[STIFFNESS] = rate + length
-    sums[DRAG] = reach * stretch + flights
-    sums[DRAG_RATE] = flights_rate
+    sums[DRAG] = drag + reach * stretch
+    sums[DRAG_RATE] = drag_rate
     sums[LENGTH] = length
     sums[STRETCH] = stretch
+    sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
+
+
+@njit(nogil=True, cache=True)
+def _touch(w0: float, a: float, b: float, c: float, reach: float, free: float, decay: float) -> float:
+    """Return where in a cell a free element touches, or `NONE`."""
+    end = _reached(w0, a, b, c, reach, free, decay)
+    return _touching(w0, a, b, c, reach, free, end) if end <= 1 else NONE
+
+
+@njit(nogil=True, cache=True)
+def _leave(w0: float, a: float, b: float, c: float, reach: float, x: float) -> tuple[float, float, float]:
+    """Return where in a cell the contact is left after x, or `NONE`, with u there and at the end of the cell."""
+    place = _leaving(w0, a, b, c, reach, x)
+    if place > 1:
+        return NONE, 0.0, 0.0
+    u = w0 + place * (a + place * (b + place * c))
+    free = u - u * _lost((1 - place) / reach)
+    # a dip within one cell is passed over
+    return (place if w0 + a + b + c <= free else NONE), u, free

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics.rheology import LinearSolid, Recovery, recovery
 from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED, OUTSIDE_LINE
-from mdr_dask.physics.viscoelastic_sweep import solve_sliding, static_depth
+from mdr_dask.physics.viscoelastic_newton import solve_sliding, static_depth
 
 FloatArray = NDArray[np.float64]
 
@@ -17,11 +17,19 @@ TOLERANCE = 1e-11
 """Last step of Newton's method, relative to the depth: far below any discretisation error, above rounding."""
 
 SHORTEST_REACH = 1e-9
-"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it: an error of that
-size."""
+"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it.
 
-BALANCE = 1e-7
-"""Largest relative difference between the load carried and the load wanted in a converged state."""
+The error is of that relative size.
+"""
+
+BALANCE = 1e-3
+"""Largest relative difference between the load carried and the load wanted, which counts as error.
+
+It is rounding but for contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
+"""
+
+RESOLVED = 0.5
+"""Largest relative change of a number between two grids that is extrapolated."""
 
 GRIDS = (1, 2, 4)
 """Every point, every second and every fourth: extrapolation and its error estimate."""
@@ -98,7 +106,7 @@ def steady_viscoelastic_sliding(
     -----
     The line is straight between points and swept exactly; the result is extrapolated from the same line with every
     second
-    point. The answer depends on nothing but the arguments: each solve starts from the statics.
+    point. The answer depends on nothing but the arguments: the coarsest grid starts from the statics.
     """
     heights = np.asarray(height, dtype=np.float64)
     _check(heights, spacing, velocity, normal_force, periodic)
@@ -109,9 +117,12 @@ def steady_viscoelastic_sliding(
     for step in reversed(GRIDS):
         start = solutions[-1].start if solutions else None
         load = _Load(solid, velocity, normal_force, spacing, SHORTEST_REACH * spacing / velocity)
-        solutions.append(_solve(below[::step], step, load, periodic, start))
+        found = _solve(below[::step], step, load, periodic, start)
+        if found.status == NOT_CONVERGED and start is not None:
+            found = _solve(below[::step], step, load, periodic, None)
+        solutions.append(found)
     mean = float(heights.mean()) if periodic else 0.0
-    return _extrapolated(solutions, mean - heights[top])
+    return _extrapolated(solutions, mean - float(heights[top]))
 
 
 @dataclass(frozen=True)
@@ -139,6 +150,7 @@ class _Load:
 class _Solution:
     values: FloatArray
     start: FloatArray
+    imbalance: float
     status: int
     sweeps: int
 
@@ -155,11 +167,11 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     unknown, totals = start.copy(), np.empty(6)
     arrays = moduli, reach, modes.times, modes.stretch, modes.amplitude, modes.memory
     converged, sweeps, inside = solve_sliding(profile, strain_area, periodic, *arrays, TOLERANCE, unknown, totals)
-    balanced = converged and abs(totals[1] / strain_area - 1) < BALANCE
-    status = OUTSIDE_LINE if not inside else CONVERGED if balanced else NOT_CONVERGED
+    imbalance = abs(float(totals[1]) / strain_area - 1)
+    status = OUTSIDE_LINE if not inside else CONVERGED if converged and imbalance < BALANCE else NOT_CONVERGED
     slope = np.sqrt(totals[4] / totals[3]) / cell if totals[3] > 0 else 0.0
     values = np.array([totals[2] / strain_area / cell, unknown[-1], totals[3] / (profile.size - 1), slope])
-    return _Solution(values, unknown, status, sweeps)
+    return _Solution(values, unknown, imbalance, status, sweeps)
 
 
 def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady:
@@ -168,14 +180,17 @@ def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady
     if any(solution.status != CONVERGED for solution in solutions):
         status = fine.status if fine.status != CONVERGED else NOT_CONVERGED
         return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, status, fine.sweeps)
+    correction = (fine.values - coarse.values) / 3
     before = coarse.values + (coarse.values - coarsest.values) / 3
-    values = fine.values + (fine.values - coarse.values) / 3
+    resolved = 3 * np.abs(correction) <= RESOLVED * np.abs(fine.values)
+    values = np.where(resolved, fine.values + correction, fine.values)
+    change = 3 * float(abs(correction[0]))
+    if resolved[0]:
+        change = max(float(abs(values[0] - before[0])), FIRST_ORDER_SHARE * change)
     friction, depth, fraction, slope = (float(value) for value in values)
-    change = max(abs(friction - before[0]), FIRST_ORDER_SHARE * abs(fine.values[0] - coarse.values[0]))
-    error = float(change / abs(friction)) if friction else float(change)
-    return ViscoelasticSteady(
-        friction, depth + mean, min(max(fraction, 0.0), 1.0), slope, error, fine.status, fine.sweeps
-    )
+    error = change / abs(friction) if friction else change
+    fraction = min(max(fraction, 0.0), 1.0)
+    return ViscoelasticSteady(friction, depth + mean, fraction, slope, error + fine.imbalance, fine.status, fine.sweeps)
 
 
 def _check(heights: FloatArray, spacing: float, velocity: float, normal_force: float, periodic: bool) -> None:

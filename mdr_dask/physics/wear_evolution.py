@@ -348,7 +348,7 @@ def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tup
         return None, np.inf
     nodes = problem.panels.nodes.size
     edge = float(unknowns[nodes - 1])
-    gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)), initial=abs(edge - guess[nodes - 1]))
+    gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
     return Moment(time, unknowns, problem.gathered(unknowns), edge), float(gap) * _ERROR_SHARE[order - 1]
 
 

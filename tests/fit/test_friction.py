@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
+from friction_store import store
 
 from mdr_dask.errors import FitError
 from mdr_dask.fit.friction import FITS
 from mdr_dask.physics import laws
-from tests.friction_store import store
 
 FIT = {fit.name: fit.compute for fit in FITS}
 

@@ -6,7 +6,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fit.master_curve import FITS, master_curve, read_table, rereferenced
+from mdr_dask.fit.master_curve import FITS, friction_of_roughness, master_curve, read_table, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
 EXPONENT = -0.15
@@ -43,8 +43,10 @@ def test_store_gives_the_exponent_it_was_made_with():
     assert float(result["power_exponent_low"]) < EXPONENT < float(result["power_exponent_high"])
     assert float(result["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
     assert result["shift_factor"].dims == ("velocity",)
-    assert result["curve_abscissa"].attrs["units"] == "N"
-    assert result.sizes["point"] == 15 * 7
+    assert set(result.dims) == {"velocity"}  # one row for every velocity
+    whole = master_curve(friction_of_roughness({"": store()}))
+    assert whole["curve_abscissa"].attrs["units"] == "N"
+    assert whole.sizes["point"] == 15 * 7
 
 
 def test_friction_of_a_smooth_body_is_taken_off():

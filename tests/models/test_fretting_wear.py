@@ -132,6 +132,14 @@ def test_history_of_amplitudes():
     assert result.values["stick_border"][0, 0] < one.values["stick_border"][0, 0]
 
 
+def test_a_history_may_slip_everywhere():
+    history = (LoadStep(cycles=1e4),)
+    result = run(FrettingWear(**{**STEEL, "amplitude": 1e-4}, method="exact", history=history, cells=60))
+    assert result.status[0, 0] == Status.DONE
+    assert result.values["stick_border"][0, 0] == 0.0
+    assert result.values["wear_volume"][0, 0] > 0
+
+
 def table(tmp_path, rows):
     from hashlib import sha256
 

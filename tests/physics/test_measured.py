@@ -90,6 +90,7 @@ def test_lines_that_cannot_be_used_are_refused(x, z, message):
         measured.measured_line(list(x), list(z))
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:SurfaceTopography")  # its own names
 def test_figures_agree_with_surface_topography():
     topography = pytest.importorskip("SurfaceTopography")
     height, _ = self_affine()

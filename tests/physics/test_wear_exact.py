@@ -19,13 +19,11 @@ def checked():
 def test_checked_figures(checked):
     """Figures on which independent solvers agree: 5e-6 in f, 1e-6 in a, 4e-6 in V."""
     first, second, last = checked
-    np.testing.assert_allclose(first.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=5e-6)
-    assert first.contact_radius == pytest.approx(
-        1.133353, abs=2e-5
-    )  # the edge is the least determined quantity; 2e-6 at tolerance 2e-6
+    np.testing.assert_allclose(first.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=2e-6)
+    assert first.contact_radius == pytest.approx(1.133353, abs=5e-6)  # the edge is the least determined quantity
     assert first.wear_volume == pytest.approx(0.310754, abs=4e-6)
     assert second.contact_radius == pytest.approx(1.240150, abs=2e-6)
-    assert second.wear_volume == pytest.approx(0.872404, abs=7e-6)
+    assert second.wear_volume == pytest.approx(0.872404, abs=4e-6)
     limit = wear.limit(PARABOLA, 0.455)
     assert np.max(np.abs(last.height(RADII) - limit.height(RADII))) < 1.5e-4
 
@@ -41,7 +39,8 @@ def test_energy_is_volume_and_force_falls(checked):
 def test_error_estimate_covers_the_error(checked):
     coarse = exact(PARABOLA, 0.455, [2.0, 8.0], tolerance=1e-3)
     for rough, fine in zip(coarse, checked, strict=False):
-        assert np.max(np.abs(rough.height(RADII) - fine.height(RADII))) < 1.5 * rough.error
+        everywhere = np.linspace(0.3, 1.3, 300)
+        assert np.max(np.abs(rough.height(everywhere) - fine.height(everywhere))) < rough.error
         assert rough.error < 1e-3
 
 
@@ -94,7 +93,7 @@ def test_extremes_reach_the_limit(exponent, c):
     limit = wear.limit(profile, c)
     assert worn.contact_radius == pytest.approx(limit.contact_radius, abs=1e-3)
     assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
-    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=5e-3)
+    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1e-2)
 
 
 def test_table_of_a_parabola():

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from friction_store import store
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots.friction import PLOTS
-from tests.friction_store import store
 
 DRAW = {plot.name: plot.draw for plot in PLOTS}
 PLANE = ("regions", "velocity", "force", "zone_one", "plateau")

@@ -56,7 +56,7 @@ class FrettingWear(Parameters):
         "1", "wear coefficient k of the law V = k F u / hardness", ge=0, default=None
     )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
-    tolerance: float = quantity("1", "error of the exact profile wanted, in eta d0", ge=1e-6, le=1e-2, default=1e-3)
+    tolerance: float = quantity("1", "error of the exact profile wanted, in eta d0", ge=1e-5, le=1e-1, default=1e-3)
     cells: int = quantity(
         "1", "cells of the grid of method literal, of hold force and of histories", ge=20, le=2000, default=200
     )

@@ -1,0 +1,19 @@
+"""Run times of a jump and of its steady ends."""
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics import roughness
+from mdr_dask.physics.kinetics import CONVERGED, velocity_jump
+
+POINTS = 1000
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+@pytest.mark.parametrize("reach", [0.002, 0.02])
+def test_bench_jump(benchmark, hurst, reach):
+    amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(1, 0, POINTS // 2)
+    height, slope = (roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1))
+    times = np.geomspace(1e-4, 20, 40)
+    found = benchmark(velocity_jump, height, slope, 0.3, (reach, 1.2 * reach), times, np.pi * POINTS, 12)
+    assert found.status == CONVERGED

@@ -1,0 +1,107 @@
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute, coordinates, distinct, seconds
+
+EVERY = tuple(output.name for output in MODEL.outputs)
+BASE = {
+    "length": 0.002,
+    "points": 400,
+    "rms_roughness": 2e-6,
+    "shear_modulus": 1e7,
+    "relaxation_time": 1e-3,
+    "normal_force": 0.1,
+    "velocity": 0.05,
+    "relaxation_times": (0.01, 0.1, 1.0, 10.0),
+}
+
+
+def parameters(**changes: object) -> VelocityJump:
+    return VelocityJump.model_validate(BASE | changes)
+
+
+def block(
+    columns: dict[str, np.ndarray], realisations: tuple[int, ...] = (0, 3), **changes: object
+) -> Block[VelocityJump]:
+    cases = next(iter(columns.values())).size if columns else 1
+    return Block(parameters(**changes), columns, cases, realisations, 5, EVERY)
+
+
+def test_value_depends_on_the_case_alone() -> None:
+    whole = block({"velocity": np.array([0.001, 0.05, 2.0]), "hurst": np.array([0.3, 0.7, 0.7])})
+    together = compute(whole)
+    for j in range(whole.cases):
+        for r, realisation in enumerate(whole.realisations):
+            alone = compute(whole.part(j, realisation))
+            for name in EVERY:
+                assert np.array_equal(alone.values[name][0, 0], together.values[name][j, r], equal_nan=True)
+
+
+def test_same_dimensionless_numbers_are_one_case() -> None:
+    same = block({"velocity": np.array([0.05, 0.1]), "relaxation_time": np.array([1e-3, 5e-4])})
+    result = compute(same)
+    assert distinct(same) == len(same.realisations) == result.solves
+    for name in EVERY:
+        assert np.array_equal(result.values[name][0], result.values[name][1])
+
+
+def test_jump_follows_the_slope_in_region_one() -> None:
+    """d_mu_0 = mu_1 dv / v_1 where friction is proportional to velocity (eq. 4.9); no relaxation is left."""
+    result = compute(block({}, velocity=1e-6)).values
+    before, jump = result["friction_coefficient_before"], result["friction_coefficient_jump"]
+    assert np.allclose(jump / before, 0.2, rtol=2e-3)
+    after = result["friction_coefficient_after"]
+    assert np.allclose(before + jump, after, rtol=2e-3)
+
+
+def test_plateau_of_the_jump() -> None:
+    """d_mu_0 v_1 / dv is 0.4 of the slope on the plateau (eq. 4.10), within the scatter of short lines."""
+    result = compute(block({}, tuple(range(8)), velocity=0.3)).values
+    ratio = result["friction_coefficient_jump"] / 0.2 / result["rms_slope"]
+    error = ratio.std(ddof=1) / np.sqrt(ratio.size)
+    assert abs(ratio.mean() - 0.41) < 0.05 + 3 * error
+
+
+def test_error_estimate_covers_the_error() -> None:
+    coarse = compute(block({}, tuple(range(6))))
+    fine = compute(block({}, tuple(range(6)), oversampling=32, steps_per_decade=96))
+    relaxing = [
+        result.values["friction_coefficient"] - result.values["friction_coefficient_after"][..., None]
+        for result in (coarse, fine)
+    ]
+    error = np.max(np.abs(relaxing[0] - relaxing[1]), axis=-1) / fine.values["friction_coefficient_after"]
+    assert np.mean(error <= coarse.values["discretisation_error"]) > 0.8
+
+
+def test_bad_line_is_a_status() -> None:
+    result = compute(block({}, longest_wavelength=1e-6))
+    assert np.all(result.status == Status.FAILED)
+    assert all("cut-off" in message for message in result.messages.values())
+    assert np.all(np.isnan(result.values["friction_coefficient"]))
+
+
+def test_only_what_is_asked_for() -> None:
+    plain = Block(parameters(), {}, 1, (0,), 5, ("rms_slope",))
+    result = compute(plain)
+    assert set(result.values) == {"rms_slope"}
+    assert result.solves == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"velocity_change": 0.0}, "other than 0"),
+        ({"relaxation_times": (1.0, 0.5)}, "increasing times"),
+        ({"velocity_change": -1.0}, "greater than -1"),
+    ],
+)
+def test_impossible_parameters_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        parameters(**change)
+
+
+def test_coordinates_and_estimate() -> None:
+    assert np.array_equal(coordinates(parameters())["relaxation_times"].values, BASE["relaxation_times"])
+    assert seconds(block({})) > 0
