@@ -76,11 +76,14 @@ def master_curve(
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
-    from mdr_dask.fit.master_curve import read_table
+    from mdr_dask.fit.master_curve import friction_of_roughness, read_table
 
     if Path(source).is_file():
         return read_table(source)
-    return selection.select(selection.group(store.datasets(source), series), selections)
+    groups = store.datasets(source)
+    if series is None and len(groups) > 1:
+        return selection.select(friction_of_roughness(groups), selections)
+    return selection.select(selection.group(groups, series), selections)
 
 
 def _read(path: Path) -> xr.Dataset:

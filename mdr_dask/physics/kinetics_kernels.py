@@ -325,6 +325,29 @@ def _spread(spreads: FloatArray, window: float, distance: float) -> float:
 
 
 @njit(nogil=True, cache=True)
+def _worth_keeping(
+    profile: Profile,
+    course: Course,
+    t: float,
+    reach: float,
+    x: float,
+    pressed: float,
+    spreads: FloatArray,
+    window: float,
+    places: FloatArray,
+    count: int,
+) -> int:
+    """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
+    kept = 0
+    for k in range(count):
+        u = _left_from(profile, course, t, reach, x, places[k])[0]
+        if u + 2 * _spread(spreads, window, 2 * (x - places[k]) + window) >= pressed:
+            places[kept] = places[k]
+            kept += 1
+    return kept
+
+
+@njit(nogil=True, cache=True)
 def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
     """Write the least p + reach p' over the nodes that end the cells of each block of `BLOCK` cells."""
     for m in range(least.size):
@@ -440,10 +463,8 @@ def touch(
                 add_patch(profile, begin, until, lift, reach, sums)
                 start[found], end[found] = begin, until
                 found += 1
-                w_begin, w = depth + height_at(profile, begin)[0], depth + height_at(profile, until)[0]
-                spread = _spread(spreads, window, 2 * (until - places[0]) + window) if known > 0 else spreads[0]
-                if w_begin * np.exp(-(until - begin) / reach) + 2 * spread < w:
-                    known = 0
+                w = depth + height_at(profile, until)[0]
+                known = _worth_keeping(profile, course, t, reach, until, w, spreads, window, places, known)
                 least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                 oldest, last_start = last_start, begin
                 if not lost:
@@ -485,8 +506,7 @@ def touch(
                     start[found], end[found] = begin, probe
                     found += 1
                     oldest, last_start = last_start, begin
-                    if 2 * spread < gap:
-                        known = 0
+                known = _worth_keeping(profile, course, t, reach, probe, depth + h1, spreads, window, places, known)
                 known = min(known, CANDIDATES - 1)
                 places[known] = probe
                 known += 1
