@@ -26,8 +26,11 @@ BLOCK = 16
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 TRIALS = 80
+SECANT = 0.03  # of the miss of a step: where a last secant step follows
 CLOSE, EXACT = 1e-7, 1e-11  # of the load: where a last secant step follows, and where none is needed
 ROOT_STEPS = 60
+NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
+MET = 3e-4  # of a cell: a last Newton step that is not checked
 GUARD_CELLS = 200.0
 LOAD, DRAG, LENGTH, STIFFNESS = range(4)
 
@@ -133,7 +136,9 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     last = course.count - 1
     if last <= 0 or t >= course.time[last]:
         return course.depth[last], course.rate[last], 0.0
-    low, high = 0, last
+    low, high, back = last - 1, last, 1
+    while course.time[low] > t and low > 0:
+        high, low, back = low, max(low - back, 0), 2 * back
     while high - low > 1:
         middle = (low + high) // 2
         if course.time[middle] <= t:
@@ -170,13 +175,14 @@ def _left_from(
         d, rate, change = _moment(course, then)
         h, slope, curvature = height_at(profile, s)
         fade = np.exp(-(x - s) / reach)
-        u = (d + h) * fade
-        if u > best:
-            best, best_slope, best_fade = u, -(d + h + rate) * fade / reach, fade
         force = d + h + rate + reach * slope
         falls = (rate + change) / reach + slope + reach * curvature
         step = -force / falls if falls < 0 else 0.0
-        if abs(step) < 1e-4 * profile.cell:
+        near = abs(step) < NEAR * profile.cell
+        u = (d + h + (0.5 * force * step / reach if near else 0.0)) * fade
+        if u > best:
+            best, best_slope, best_fade = u, -(d + h + rate) * fade / reach, fade
+        if near:
             break
         s = min(max(s + min(max(step, -2 * profile.cell), 2 * profile.cell), 0.0), x)
     return best, best_slope, best_fade
@@ -280,7 +286,7 @@ def _meeting(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2 * profile.cell
-        if abs(step) < 1e-6 * profile.cell or high - low < 1e-9 * profile.cell:
+        if abs(step) < MET * profile.cell or high - low < 1e-9 * profile.cell:
             return min(max(x + step, low), high), slope, fade
         x += step
     return x, slope, fade
@@ -624,6 +630,7 @@ def _balance(
     weights: tuple[float, float],
     limits: tuple[float, float],
     gain: float,
+    close: float,
     room: tuple[FloatArray, FloatArray],
 ) -> tuple[int, float, float]:
     """Find the depth that carries the load at the last moment of the course, by secants.
@@ -648,14 +655,14 @@ def _balance(
             return 2, 0.0, gain
         off = sums[LOAD] / load - 1
         drag = sums[DRAG]
-        if abs(off) <= (CLOSE if trial > 0 else EXACT):
+        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
+        if abs(off) <= (max(CLOSE, close * stiffness) if trial > 0 else EXACT):
             if trial > 0 and off != before_off:
                 share = off / (before_off - off)
                 guess += share * (guess - before)
                 drag += share * (drag - before_drag)
             course.depth[now], course.rate[now] = guess, a * guess + b
             return 0, drag, gain
-        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
         if trial > 0 and (off - before_off) * (guess - before) > 0:
             gain = min(max((off - before_off) / (guess - before) / stiffness, 0.02), 2.0)
         if off < 0:
@@ -733,7 +740,7 @@ def march(
             foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
         depth[now] = min(max(foretold, limits[0]), limits[1])
         status, drag[now], gain = _balance(
-            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, room
+            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, SECANT * pace.miss, room
         )
         miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
         if miss > 2 * pace.miss or status != 0:
