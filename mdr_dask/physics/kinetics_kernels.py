@@ -81,7 +81,7 @@ class Course(NamedTuple):
     count: int  # type: ignore[assignment]
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i over 0..1."""
     h = profile.height[i]
@@ -90,7 +90,7 @@ def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     return h, enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
     y = x / profile.cell
@@ -104,7 +104,7 @@ def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return the height at x, its integral up to x and that of its slope squared."""
     y = x / profile.cell
@@ -120,7 +120,7 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
     h0, area0, square0 = integrals_at(profile, start)
@@ -130,7 +130,7 @@ def add_patch(profile: Profile, start: float, end: float, lift: float, reach: fl
     sums[LENGTH] += end - start
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _moment(course: Course, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = course.count - 1
@@ -157,7 +157,7 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _left_from(
     profile: Profile, course: Course, t: float, reach: float, x: float, place: float
 ) -> tuple[float, float, float]:
@@ -188,7 +188,7 @@ def _left_from(
     return best, best_slope, best_fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
     s = x - reach * t
@@ -211,7 +211,7 @@ def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) 
     return u, -u / first.reach
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _wake(
     profile: Profile,
     first: Patches,
@@ -236,7 +236,7 @@ def _wake(
     return u, slope, fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _unloading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' falls through zero between low and high."""
     x = 0.5 * (low + high)
@@ -257,7 +257,7 @@ def _unloading(profile: Profile, lift: float, reach: float, low: float, high: fl
     return x
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _meeting(
     profile: Profile,
     first: Patches,
@@ -292,7 +292,7 @@ def _meeting(
     return x, slope, fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12 * profile.cell:
@@ -306,7 +306,7 @@ def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: flo
     return high
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
     now = course.count - 1
@@ -320,7 +320,7 @@ def _spreads(course: Course, t: float, reach: float, window: float, spreads: Flo
         spreads[k] = highest - lowest
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     """Return the range of the depth while the profile went a distance."""
     k = 0
@@ -330,7 +330,7 @@ def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     return float(spreads[k])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _worth_keeping(
     profile: Profile,
     course: Course,
@@ -353,7 +353,7 @@ def _worth_keeping(
     return kept
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
     """Write the least p + reach p' over the nodes that end the cells of each block of `BLOCK` cells."""
     for m in range(least.size):
@@ -363,7 +363,7 @@ def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
         least[m] = value
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
     s = x - reach * t
@@ -530,7 +530,7 @@ def touch(
     return found
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def released(profile: Profile, first: Patches, reach: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 
@@ -567,7 +567,7 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
     sums[STIFFNESS] = sums[LENGTH]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _loading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' rises through zero between low and high, by bisection."""
     for _ in range(ROOT_STEPS):
@@ -580,7 +580,7 @@ def _loading(profile: Profile, lift: float, reach: float, low: float, high: floa
     return high
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _rate_weights(course: Course, now: int, order: int) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now`, from the polynomial through the last depths (BDF)."""
     t = course.time[now]
