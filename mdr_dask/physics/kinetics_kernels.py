@@ -384,7 +384,7 @@ def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: floa
     return float(until + turns + reach * t)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def touch(
     profile: Profile,
     runs: IntArray,
@@ -397,6 +397,8 @@ def touch(
     start: FloatArray,
     end: FloatArray,
     sums: FloatArray,
+    places: FloatArray,
+    spreads: FloatArray,
 ) -> int:
     """Find the patches in contact at time t, at the last depth and rate of the course, and add up their forces.
 
@@ -419,6 +421,8 @@ def touch(
         Written: the patches.
     sums : array, shape (4,)
         Written: load and drag over 4 G L, length in contact, derivative of the load by the depth at constant rate.
+    places, spreads : array, shape (CANDIDATES,), (WINDOWS,)
+        Room.
 
     Returns
     -------
@@ -428,13 +432,13 @@ def touch(
     depth = course.depth[course.count - 1]
     lift = depth + course.rate[course.count - 1]
     height, slope, cell = profile.height, profile.slope, profile.cell
-    places, known, found, edges = np.empty(CANDIDATES), 0, 0, 0.0
+    known, found, edges = 0, 0, 0.0
     oldest, last_start = -np.inf, -np.inf
     contact, begin, free_from = profile.periodic, profile.origin, 0.0
     finish = 1.0 + profile.origin if profile.periodic else np.inf
     guard = first.count > 0 and reach * t < GUARD_CELLS * cell
     next_free = _next_free(profile, first, t, reach, begin) if guard and contact else np.inf
-    window, spreads = WINDOW_CELLS * cell, np.empty(WINDOWS)
+    window = WINDOW_CELLS * cell
     _spreads(course, t, reach, window, spreads)
     fade_of_cell = np.exp(-cell / (min(reach, first.reach) if first.count > 0 else reach))
     least_free, known_at = 0.0, 0.0
@@ -617,7 +621,7 @@ class Pace(NamedTuple):
     until: float
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _balance(
     profile: Profile,
     runs: IntArray,
@@ -631,7 +635,7 @@ def _balance(
     limits: tuple[float, float],
     gain: float,
     close: float,
-    room: tuple[FloatArray, FloatArray],
+    room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> tuple[int, float, float]:
     """Find the depth that carries the load at the last moment of the course, by secants.
 
@@ -645,12 +649,14 @@ def _balance(
     """
     now = course.count - 1
     guess, (a, b) = course.depth[now], weights
-    sums = np.empty(4)
+    start, end, sums, places, spreads = room
     low, high = limits
     off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
     for trial in range(TRIALS):
         course.depth[now], course.rate[now] = guess, a * guess + b
-        found = touch(profile, runs, floor, least, first, course, course.time[now], reach, room[0], room[1], sums)
+        found = touch(
+            profile, runs, floor, least, first, course, course.time[now], reach, start, end, sums, places, spreads
+        )
         if found < 0:
             return 2, 0.0, gain
         off = sums[LOAD] / load - 1
@@ -719,7 +725,8 @@ def march(
     status : int
         0 done, 1 depth not found, 2 limits exceeded.
     """
-    room = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
+    most = 4 * first.count + 4096
+    room = np.empty(most), np.empty(most), np.empty(4), np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(profile.height.size // BLOCK)
     block_least(profile, reach, least)
     near, gain, step, now = 0, 1.0, pace.first, 1
