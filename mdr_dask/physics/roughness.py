@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
 FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 
 def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 0.0) -> FloatArray:
@@ -68,6 +71,19 @@ def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     return phase
 
 
+def turns(seed: int, realisation: int, modes: int) -> ComplexArray:
+    """Return exp(i phi_k) of the phases of a realisation, shape (modes,), kept for the next line of it."""
+    # rounded up, so that lines of many cut-offs share them
+    return _turns(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
+
+
+@lru_cache(maxsize=4)
+def _turns(seed: int, realisation: int, modes: int) -> ComplexArray:
+    turned: ComplexArray = np.exp(1j * phases(seed, realisation, modes))
+    turned.flags.writeable = False
+    return turned
+
+
 def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
     """Return h(x) = sum A_k cos(2 pi k x + phi_k) or a derivative of it at x = 0, 1/nodes, ..., by FFT.
 
@@ -85,14 +101,19 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     ValueError
         If the grid does not resolve the shortest wavelength.
     """
+    return turned_line(amplitude, np.exp(1j * phase), nodes, derivative)
+
+
+def turned_line(amplitude: FloatArray, turned: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
+    """Return the line of :func:`line` from exp(i phi_k), as :func:`turns` gives them."""
     modes = int(amplitude.size)
     if nodes < 2 * modes:
         raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
     spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
-    spectrum[1 : modes + 1] = amplitude * np.exp(1j * phase) * (0.5 * nodes)
+    np.multiply(0.5 * amplitude, turned, out=spectrum[1 : modes + 1])
     if derivative:
         spectrum[1 : modes + 1] *= (2j * np.pi * np.arange(1, modes + 1)) ** derivative
     if nodes == 2 * modes:
         spectrum[-1] = 2 * spectrum[-1].real
-    heights: FloatArray = fft.irfft(spectrum, nodes)
+    heights: FloatArray = fft.irfft(spectrum, nodes, norm="forward", overwrite_x=True)
     return heights
