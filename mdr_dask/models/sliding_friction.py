@@ -28,7 +28,7 @@ SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md f
 CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
 SEARCH = 1e-7  # error of the search for the depth in 99 % of cases
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
-NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 1.3e-8  # seconds for every node of a line and of a solution
+NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
