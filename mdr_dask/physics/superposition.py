@@ -212,7 +212,7 @@ class _Problem:
             largest = float(np.abs(step).max())
             if largest < CONVERGED or longest < CONVERGED:
                 break
-            proposal = _System.at(self, shifts + step * min(1.0, longest / largest))
+            proposal = _System.at(self, shifts + step * min(1.0, longest / largest), smoothing)
             if proposal.misfit(smoothing) <= system.misfit(smoothing) * (1 + 1e-6):
                 shifts, system = shifts + step * min(1.0, longest / largest), proposal
             else:
@@ -220,7 +220,7 @@ class _Problem:
         return shifts, float(smoothing if smoothing is not None else 1.0)
 
     def result(self, shifts: FloatArray, weight: float, values: FloatArray) -> Superposition:
-        system = _System.at(self, shifts)
+        system = _System.at(self, shifts, weight)
         solution, covariance, noise = system.posterior(weight)
         horizontal, vertical = self.split(shifts)
         full = np.zeros((2 * self.curves, 2 * self.curves))
@@ -280,7 +280,7 @@ class _System:
     penalty: FloatArray
 
     @classmethod
-    def at(cls, problem: _Problem, shifts: FloatArray) -> _System:
+    def at(cls, problem: _Problem, shifts: FloatArray, weight: float = FIRST_WEIGHT) -> _System:
         horizontal, vertical = problem.split(shifts)
         x, target = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
         knots = problem.knots(x)
@@ -289,7 +289,7 @@ class _System:
         gram = (basis.T @ basis).toarray()
         penalty = _curvature(splines) * np.trace(gram) / splines
         smooth = cho_solve(
-            cho_factor(gram + FIRST_WEIGHT * penalty + 1e-9 * np.eye(splines)), np.asarray(basis.T @ target)
+            cho_factor(gram + weight * penalty + 1e-9 * np.eye(splines)), np.asarray(basis.T @ target)
         )
         slope = BSpline(knots, smooth, DEGREE).derivative()(x)
         moved = csr_array((problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64))
