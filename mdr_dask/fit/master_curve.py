@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
@@ -29,7 +30,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
 ABSOLUTE_ZERO = -273.15
-NORMAL_95 = 1.959963984540054
+SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
@@ -83,7 +84,7 @@ def master_curve(
     Dataset
         ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
         group, with
-        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
+        ``_error`` (68 %), ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
         ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
         decades), with the range measured at the reference in its attrs; constants of the laws that apply.
@@ -204,16 +205,18 @@ def _dataset(
             "group": by,
             "reference": result.reference,
             "noise": result.noise,
+            "freedom": result.freedom,
         },
     )
+    narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
     factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
     factors["vertical_factor"] = (result.vertical, result.vertical_error)
     for name, (factor, error) in factors.items():
         meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
         dataset[name] = (by, factor, {"units": "1", "long_name": meaning})
-        dataset[f"{name}_error"] = (by, error, {"units": "1", "long_name": "standard error"})
-        dataset[f"{name}_low"] = (by, factor - NORMAL_95 * error, {"units": "1"})
-        dataset[f"{name}_high"] = (by, factor + NORMAL_95 * error, {"units": "1"})
+        dataset[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
+        dataset[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
+        dataset[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
     dataset["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
     dataset["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
     dataset["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
@@ -279,6 +282,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         covariance=covariance,
         reference=float(curve.attrs["reference"]),
         noise=float(curve.attrs["noise"]),
+        freedom=float(curve.attrs["freedom"]),
         x=np.log10(curve["point_abscissa"].to_numpy()),
         y=np.log10(curve["point_ordinate"].to_numpy()),
         member=np.searchsorted(groups, curve["point_group"].to_numpy()),

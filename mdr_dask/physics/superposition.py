@@ -35,6 +35,12 @@ DRAW_ITERATIONS = 3
 WEIGHED = (0, 1, 2, 4, 8)
 """Iterations that choose the smoothing anew."""
 
+EXPECTED_SHIFT = 1.0
+"""Standard deviation, in widths of a curve, that shifts between neighbours are expected to have about the usual one.
+
+It decides only where the curves do not: on a plateau, or along a straight line with vertical factors.
+"""
+
 LEAST_SHARE = 1e-3
 """Likelihood of a smoothing, relative to all, below which it is left out."""
 
@@ -136,14 +142,16 @@ def superpose(
     """
     values, sorted_curves = _sorted(groups, curves)
     problem = _Problem.of(values, sorted_curves)
-    shifts, weight = problem.fit(problem.first_guess(sorted_curves), None)
+    guess = problem.first_guess(sorted_curves)
+    problem = replace(problem, usual=float(np.median(np.diff(guess, prepend=0.0))))
+    shifts, settled = problem.fit(guess, None)
     if vertical:
         problem = replace(problem, vertical=True)
-        shifts, weight = problem.fit(np.append(shifts, np.zeros(values.size - 1)), None)
-    result = problem.result(shifts, weight, values)
+        shifts, settled = problem.fit(np.append(shifts, np.zeros(values.size - 1)), None)
+    result = problem.result(shifts, settled, values)
     _require_overlap(result)
     if draws:
-        result = replace(result, draws=problem.bootstrap(shifts, weight, draws, seed))
+        result = replace(result, draws=problem.bootstrap(shifts, settled, draws, seed))
     return rereference(result, values[values.size // 2] if reference is None else reference)
 
 
@@ -173,6 +181,7 @@ class _Problem:
     curves: int
     vertical: bool
     width: float
+    usual: float = 0.0
 
     @classmethod
     def of(cls, values: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> _Problem:
@@ -203,28 +212,37 @@ class _Problem:
         cells = int(np.clip(np.ceil(CELLS_PER_CURVE * np.ptp(x) / self.width), 2 * DEGREE, MOST_CELLS))
         return float(x.min()), float(np.ptp(x)) / cells, cells
 
-    def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
-        """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
-        smoothing, longest = weight, 0.3 * self.width
-        system, step = _System.at(self, shifts, weight or FIRST_WEIGHT), np.zeros(self.free)
+    def fit(
+        self, shifts: FloatArray, settled: _Settled | None, iterations: int = ITERATIONS
+    ) -> tuple[FloatArray, _Settled]:
+        """Return shifts by damped Gauss-Newton steps, and smoothing and scatter, found unless given."""
+        choice, longest = settled or _Settled(FIRST_WEIGHT, 0.0), 0.3 * self.width
+        system = _System.at(self, shifts, choice)
         for iteration in range(iterations):
-            if weight is None and iteration in WEIGHED:
-                smoothing = system.likeliest_weight()
-            assert smoothing is not None
-            step = system.solve(smoothing)[system.splines :]
+            if settled is None and iteration in WEIGHED:
+                choice = system.likeliest()
+                system = _System.at(self, shifts, choice)
+            step = system.solve(choice.weight)[system.splines :]
             largest = float(np.abs(step).max())
             if largest < CONVERGED or longest < CONVERGED:
                 break
-            proposal = _System.at(self, shifts + step * min(1.0, longest / largest), smoothing)
-            if proposal.misfit(smoothing) <= system.misfit(smoothing) * (1 + 1e-6):
+            proposal = _System.at(self, shifts + step * min(1.0, longest / largest), choice)
+            if proposal.misfit(choice.weight) <= system.misfit(choice.weight) * (1 + 1e-6):
                 shifts, system = shifts + step * min(1.0, longest / largest), proposal
             else:
                 longest = 0.3 * min(longest, largest)
-        return shifts, float(smoothing if smoothing is not None else 1.0)
+        return shifts, choice
 
-    def result(self, shifts: FloatArray, weight: float, values: FloatArray) -> Superposition:
-        system = _System.at(self, shifts, weight)
-        solution, covariance, noise, freedom = system.posterior(weight)
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Return rows and targets of what is expected of the shifts: neighbours lie `usual` apart, within a width."""
+        rows = np.zeros((self.curves - 1, self.free))
+        rows[:, : self.curves - 1] = np.eye(self.curves - 1) - np.eye(self.curves - 1, k=-1)
+        scale = EXPECTED_SHIFT * self.width
+        return rows / scale, np.full(self.curves - 1, self.usual / scale)
+
+    def result(self, shifts: FloatArray, settled: _Settled, values: FloatArray) -> Superposition:
+        system = _System.at(self, shifts, settled)
+        solution, covariance, noise, freedom = system.posterior(settled.weight)
         horizontal, vertical = self.split(shifts)
         full = np.zeros((2 * self.curves, 2 * self.curves))
         places = np.r_[1 : self.curves, self.curves + 1 : 2 * self.curves][: self.free]
@@ -254,19 +272,27 @@ class _Problem:
             np.empty((0, 2 * self.curves)),
         )
 
-    def bootstrap(self, shifts: FloatArray, weight: float, draws: int, seed: int) -> FloatArray:
+    def bootstrap(self, shifts: FloatArray, settled: _Settled, draws: int, seed: int) -> FloatArray:
         """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves)."""
         generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-        system = _System.at(self, shifts, weight)
-        fitted, scatter = system.residuals(weight)
+        system = _System.at(self, shifts, settled)
+        fitted, scatter = system.residuals(settled.weight)
         vertical = self.split(shifts)[1][self.member]
         places = [np.flatnonzero(self.member == curve) for curve in range(self.curves)]
         samples = np.empty((draws, 2 * self.curves))
         for row in samples:
             drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
             again = replace(self, y=fitted + drawn - vertical)
-            row[:] = np.concatenate(self.split(again.fit(shifts, weight, DRAW_ITERATIONS)[0]))
+            row[:] = np.concatenate(self.split(again.fit(shifts, settled, DRAW_ITERATIONS)[0]))
         return samples
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """Weight of the curvature, and variance of the scatter by which the expected overlap is weighed."""
+
+    weight: float
+    variance: float
 
 
 @dataclass(frozen=True)
@@ -285,10 +311,11 @@ class _System:
     target: FloatArray
     normal: FloatArray
     right: FloatArray
+    total: float
     penalty: FloatArray
 
     @classmethod
-    def at(cls, problem: _Problem, shifts: FloatArray, weight: float) -> _System:
+    def at(cls, problem: _Problem, shifts: FloatArray, settled: _Settled) -> _System:
         """Linearise about the curve of a smoothing: a rougher one has steeper slopes, and promises too much."""
         horizontal, vertical = problem.split(shifts)
         x, target = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
@@ -302,14 +329,19 @@ class _System:
         spline_system.normal_equations(first, value, np.zeros(x.size), problem.member, *shape)
         gram = normal[:splines, :splines].copy()
         curvature = _curvature(splines) * np.trace(gram) / splines
-        smooth = gram + weight * curvature
+        smooth = gram + settled.weight * curvature
         spline_system.factorise(smooth)
         curve = spline_system.solve(smooth, right[:splines].copy())
         steepness = np.einsum("ij,ij->i", slope, curve[first[:, None] + np.arange(DEGREE + 1)])
         spline_system.normal_equations(first, value, steepness, problem.member, *shape)
         penalty = np.zeros((size, size))
         penalty[:splines, :splines] = curvature
-        return cls(splines, low, step, first, value, steepness, problem.member, target, normal, right, penalty)
+        rows, wanted = problem.expected()
+        missing = wanted - rows @ shifts
+        normal[splines:, splines:] += settled.variance * (rows.T @ rows)
+        right[splines:] += settled.variance * (rows.T @ missing)
+        total = float(target @ target + settled.variance * (missing @ missing))
+        return cls(splines, low, step, first, value, steepness, problem.member, target, normal, right, total, penalty)
 
     def _factor(self, weight: float) -> FloatArray:
         matrix: FloatArray = self.normal + weight * self.penalty
@@ -326,17 +358,17 @@ class _System:
         matrix = self.normal[inner, inner] + weight * self.penalty[inner, inner]
         spline_system.factorise(matrix)
         right = self.right[inner].copy()
-        return float(self.target @ self.target) - float(right @ spline_system.solve(matrix, right))
+        return self.total - float(right @ spline_system.solve(matrix, right))
 
     def _scores(self) -> FloatArray:
-        total, points = float(self.target @ self.target), self.target.size
-        numbers = self.right, total, points, self.splines - 2, SMOOTHING
+        numbers = self.right, self.total, self.target.size, self.splines - 2, SMOOTHING
         scores: FloatArray = spline_system.likelihoods(self.normal, self.penalty, *numbers)
         return scores
 
-    def likeliest_weight(self) -> float:
-        """Return the smoothing weight of largest restricted likelihood."""
-        return float(SMOOTHING[int(np.argmin(self._scores()))])
+    def likeliest(self) -> _Settled:
+        """Return the smoothing weight of largest restricted likelihood, and the scatter with it."""
+        weight = float(SMOOTHING[int(np.argmin(self._scores()))])
+        return _Settled(weight, max(self.misfit(weight), 0.0) / max(self.target.size - self.right.size, 1))
 
     def _given(self, weight: float) -> tuple[FloatArray, FloatArray, float, float]:
         """Return the solution, its covariance, the variance of the scatter and its degrees of freedom."""
