@@ -16,6 +16,7 @@ from mdr_dask.physics.kinetics_kernels import (
     LENGTH,
     LOAD,
     STIFFNESS,
+    SUMS,
     WINDOWS,
     Course,
     Pace,
@@ -40,6 +41,8 @@ MESSAGES = {
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
+NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
+EQUILIBRIUM = 1.5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
@@ -140,7 +143,7 @@ def _settle(
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums, places, spreads)
+        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1, 0.0), np.inf, reach, start, end, sums, places, spreads)
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
@@ -224,7 +227,8 @@ def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, 
     """
     finer = STEPS_PER_DECADE / per_decade
     first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
-    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * max(abs(change), NEGLIGIBLE * load), last)
+    scale = max(abs(change), NEGLIGIBLE * load)
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, NEWTON * scale, last)
 
 
 def velocity_jump(
@@ -278,7 +282,8 @@ def velocity_jump(
     pace = pace_after(
         float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
     )
-    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, resolution)
+    equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
+    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, (resolution, equilibrium))
     return jump._replace(depth=jump.depth - top)
 
 
@@ -289,10 +294,10 @@ def _relax(
     depths: FloatArray,
     times: FloatArray,
     pace: Pace,
-    resolution: float,
+    ends: tuple[float, float],
 ) -> Jump:
     """Solve both steady states on one profile and march between them."""
-    sums = np.empty(4)
+    sums = np.empty(SUMS)
     failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
     floor = np.zeros(profile.height.size)
     low, high = float(depths.min()), float(depths.max())
@@ -317,6 +322,8 @@ def _relax(
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed
+        resolution, equilibrium = ends
+        settled = min(max(equilibrium, resolution / max(abs(sums[DRAG] - after), 1e-300)), 1.0)
         course = np.empty((4, MOMENTS))
         course[:, 0] = 0.0, first.depth, rate, sums[DRAG]
         count, status = march(
@@ -328,7 +335,7 @@ def _relax(
             load,
             pace,
             (low - margin, high + margin),
-            (last.depth, after, resolution),
+            (last.depth, after, settled * abs(last.depth - first.depth), settled),
             *course,
         )
         if status == 1:
@@ -345,11 +352,11 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
     """Return the steady state at a depth."""
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
-    start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(4)
+    start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(SUMS)
     places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
-    course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1)
+    course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1, 0.0)
     found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums, places, spreads), 0)
     pressed = np.empty(found)
     for k in range(found):
