@@ -28,6 +28,7 @@ from mdr_dask.physics.kinetics_kernels import (
     released,
     touch,
 )
+from mdr_dask.physics.sliding import INVALID as STEADY_INVALID
 from mdr_dask.physics.sliding import steady_sliding
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +43,7 @@ STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
 NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
-EQUILIBRIUM = 1.5e-5  # of depth and drag, at 24 steps a decade
+EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
@@ -269,22 +270,48 @@ def velocity_jump(
     Jump
         With ``mu = drag / load`` times height over length.
     """
-    empty = np.full(times.size, np.nan)
-    failed = Jump(np.nan, np.nan, np.nan, empty, np.full(2, np.nan), 0, INVALID)
-    both = np.array(reaches)
-    good = np.all(np.isfinite(height)) and np.all(both > 0) and np.all(np.isfinite(both)) and 0 < load < np.inf
-    if not good:
-        return failed
-    steady = steady_sliding(height, slope, both, np.full(2, load))
-    if steady.status.any():
-        return failed._replace(status=NOT_CONVERGED)
+    cases = np.array([load]), np.array([reaches])
+    return velocity_jumps(height, slope, *cases, times, wavenumber, per_decade, np.array([resolution]))[0]
+
+
+def velocity_jumps(
+    height: FloatArray,
+    slope: FloatArray,
+    loads: FloatArray,
+    reaches: FloatArray,
+    times: FloatArray,
+    wavenumber: float,
+    per_decade: float,
+    resolutions: FloatArray,
+) -> list[Jump]:
+    """Return the jumps of many cases on one line, whose steady states are found together; see :func:`velocity_jump`.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+    loads, resolutions : array, shape (cases,)
+    reaches : array, shape (cases, 2)
+    times, wavenumber, per_decade
+        As of one case, which does not depend on the others.
+    """
+    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, INVALID)
+    if not np.all(np.isfinite(height)):
+        return [failed] * loads.size
+    steady = steady_sliding(height, slope, reaches.ravel(), np.repeat(loads, 2), contact=False)
+    depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
     profile, top = cubic_profile(height, slope)
-    pace = pace_after(
-        float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
-    )
     equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
-    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, (resolution, equilibrium))
-    return jump._replace(depth=jump.depth - top)
+    jumps = []
+    for k in range(loads.size):
+        if states[k].any():
+            jumps.append(failed._replace(status=INVALID if STEADY_INVALID in states[k] else NOT_CONVERGED))
+            continue
+        change = float(depths[k, 1] - depths[k, 0])
+        pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
+        ends = float(resolutions[k]), equilibrium
+        jump = _relax(profile, float(loads[k]), tuple(reaches[k]), depths[k] + top, times, pace, ends)
+        jumps.append(jump._replace(depth=jump.depth - top))
+    return jumps
 
 
 def _relax(
@@ -335,7 +362,7 @@ def _relax(
             load,
             pace,
             (low - margin, high + margin),
-            (last.depth, after, settled * abs(last.depth - first.depth), settled),
+            (last.depth, after, max(10 * equilibrium, settled) * abs(last.depth - first.depth), settled),
             *course,
         )
         if status == 1:

@@ -28,7 +28,7 @@ WINDOWS = 12
 TRIALS = 80
 EXACT = 1e-11  # of the load
 ROOT_STEPS = 60
-SETTLED = 3  # moments near the end after which a march ends
+SETTLED = 2.5  # times the time since when a march has been near its end: where it ends
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 MET = 3e-4  # of a cell: a last Newton step that is not checked
 GUARD_CELLS = 200.0
@@ -579,7 +579,9 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
         pressed = lift + h + reach * slope > 0
         while x0 < first.end[k]:
             x1 = min((i + 1) * cell, first.end[k])
-            h, slope, _ = height_at(profile, x1)
+            h, slope = profile.height[i + 1], profile.slope[i + 1]
+            if x1 == first.end[k]:
+                h, slope, _ = height_at(profile, x1)
             now = lift + h + reach * slope > 0
             if pressed and not now:
                 add_patch(profile, begin, _unloading(profile, lift, reach, x0, x1), lift, reach, sums)
@@ -742,7 +744,7 @@ def march(
     room = np.empty(most), np.empty(most), np.empty(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(profile.height.size // BLOCK)
     block_least(profile, reach, least)
-    near, step, now, farthest = 0, pace.first, 1, abs(drag[0] - aim[1])
+    near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - aim[1])
     while time[now - 1] < pace.until:
         if now == time.size:
             return now, 1
@@ -771,8 +773,8 @@ def march(
         step = taken * min(pace.growth, 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3))
         farthest = max(farthest, abs(drag[now] - aim[1]))
         settled = abs(drag[now] - aim[1]) <= aim[3] * farthest and abs(depth[now] - aim[0]) <= aim[2]
-        near = near + 1 if settled else 0
+        near = near if settled else time[now]
         now += 1
-        if near == SETTLED:
+        if settled and time[now - 1] > SETTLED * near:
             break
     return now, 0
