@@ -43,7 +43,9 @@ def check_table(radius: FloatArray, height: FloatArray) -> None:
         )
     if not (np.all(np.isfinite(radius)) and np.all(np.isfinite(height))):
         bad = int(np.argmin(np.isfinite(radius) & np.isfinite(height)))
-        raise ValueError(f"a profile must be finite, got {float(radius[bad])!r}, {float(height[bad])!r} in row {bad + 1}")
+        raise ValueError(
+            f"a profile must be finite, got {float(radius[bad])!r}, {float(height[bad])!r} in row {bad + 1}"
+        )
     if radius[0] != 0.0 or np.any(np.diff(radius) <= 0.0):
         raise ValueError(f"the radii of a profile must start at 0 and increase, got {float(radius[0])!r} first")
     if np.any(np.diff(height) <= 0.0):

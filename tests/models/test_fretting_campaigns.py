@@ -101,7 +101,9 @@ def test_sliding_from_a_campaign(write):
     force = data.sel(hold="force")
     virgin = force.normal_force.isel(path=0, drop=True)
     np.testing.assert_allclose(force.normal_force / virgin, 1.0, rtol=1e-4)
-    np.testing.assert_allclose(force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12)
+    np.testing.assert_allclose(
+        force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12
+    )
     assert np.all(np.diff(force.block_depth.isel(block=0).transpose("shape", "path")) > 0)
     assert np.all(data.stick_border == 0)
     assert np.all(data.discretisation_error < 4e-3)
@@ -174,7 +176,10 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        (STEEL.replace("1 um", "100 um"), "the amplitude is in gross slip: it must stay below mu E* d0 / G*, got 59.32"),
+        (
+            STEEL.replace("1 um", "100 um"),
+            "the amplitude is in gross slip: it must stay below mu E* d0 / G*, got 59.32",
+        ),
         (TABLE, "the contact reaches beyond the table"),
     ],
 )

@@ -55,11 +55,11 @@ def test_exact_evolution(exponent, c, cycles):
         assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=3e-3)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=3, deadline=None)
 @given(st.floats(0.7, 6.0), st.floats(0.05, 0.95), st.floats(0.1, 30.0))
 def test_tables_wear_as_their_formula(exponent, c, cycles):
-    """A table of 400 rows gives the power law back to the interpolation's error."""
-    r = 3.0 * np.linspace(0.0, 1.0, 401) ** 1.5
+    """A table of 150 rows gives the power law back to the interpolation's error."""
+    r = 3.0 * np.linspace(0.0, 1.0, 151) ** 1.5
     profile = PowerProfile(exponent)
     table = from_table(r, profile.height(r), 1.0)
     for method in (wear.limit, lambda body, stick: wear.fast(body, stick, cycles)):
