@@ -141,6 +141,24 @@ def interpolate(panels: Panels, values: FloatArray, places: FloatArray) -> Float
     return result
 
 
+def interpolate_weighted(panels: Panels, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
+    """Return the sum of shares[k] times the polynomial through rows[k] at all the nodes times stretch[k]."""
+    result, row, places = np.zeros((3, panels.nodes.size))
+    _weighted(panels.edges, panels.nodes, panels.barycentric, panels.order, rows, shares, stretch, places, row, result)
+    return result
+
+
+@njit(nogil=True, cache=True)
+def _weighted(edges, nodes, barycentric, order, rows, shares, stretch, places, row, result):  # type: ignore[no-untyped-def]
+    for k in range(shares.size):
+        for node in range(nodes.size):
+            places[node] = nodes[node] * stretch[k]
+            row[node] = 0.0
+        _interpolate(edges, nodes, barycentric, order, rows[k], places, row)
+        for node in range(nodes.size):
+            result[node] += shares[k] * row[node]
+
+
 @njit(nogil=True, cache=True)
 def _interpolate(
     edges: FloatArray,

@@ -11,6 +11,7 @@ from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
+from mdr_dask.physics.profile_table import check_table
 from mdr_dask.physics.transforms import forward_transform, gauss, power_factor
 
 FloatArray = NDArray[np.float64]
@@ -183,25 +184,6 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
         height_unit=depth,
         breaks=(),
     )
-
-
-def check_table(radius: FloatArray, height: FloatArray) -> None:
-    """Raise ValueError unless a table of a profile starts at the axis, is finite and rises."""
-    if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
-        raise ValueError(
-            f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
-        )
-    if not (np.all(np.isfinite(radius)) and np.all(np.isfinite(height))):
-        bad = int(np.argmin(np.isfinite(radius) & np.isfinite(height)))
-        raise ValueError(f"a profile must be finite, got {radius[bad]!r}, {height[bad]!r} in row {bad + 1}")
-    if radius[0] != 0.0 or np.any(np.diff(radius) <= 0.0):
-        raise ValueError(f"the radii of a profile must start at 0 and increase, got {radius[0]!r} first")
-    if np.any(np.diff(height) <= 0.0):
-        bad = int(np.argmax(np.diff(height) <= 0.0))
-        raise ValueError(
-            f"the profile must rise with the radius, got {height[bad + 1]!r} after {height[bad]!r} "
-            f"at r = {radius[bad + 1]!r}"
-        )
 
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:

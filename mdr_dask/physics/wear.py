@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from mdr_dask.physics.revolution import Profile, bisect
 from mdr_dask.physics.transforms import gauss, pressure
@@ -188,7 +189,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
                 f"extend it, got stick radius {stick_radius!r}"
             )
         high = min(2.0 * high, profile.largest_radius)
-    return bisect(excess, 1.0, high)
+    return float(brentq(excess, 1.0, high, xtol=1e-15, rtol=4.0 * np.finfo(float).eps))
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:

@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mdr_dask.physics.dense import solve_in_place
-from mdr_dask.physics.panels import Panels, interpolate
+from mdr_dask.physics.panels import Panels, interpolate_weighted
 from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.transforms import gauss
 
@@ -89,23 +90,23 @@ class Problem(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PartialSlip:
-    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and a."""
+    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and a.
+
+    `virgin` are the coefficients of a cubic spline of ln s0 over ln(r^2 - c^2) from `first` on, `step` apart.
+    """
 
     profile: Profile
     inner_radius: float
     panels: Panels
-    virgin: CubicSpline
+    first: float
+    step: float
+    virgin: FloatArray
     eta: float
 
     def radii(self, edge: float) -> FloatArray:
         """Return the radii of the nodes for an edge."""
         c = self.inner_radius
         return np.asarray(np.sqrt(c * c + (edge - c) * (edge + c) * self.panels.nodes))
-
-    def virgin_slip(self, edge: float) -> FloatArray:
-        """Return ln s0 at the nodes."""
-        c = self.inner_radius
-        return np.asarray(self.virgin(np.log((edge - c) * (edge + c) * self.panels.nodes)))
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -125,29 +126,26 @@ class PartialSlip:
         y, factor, _ = self.split(unknowns)
         return np.asarray(self.panels.inner @ (y * factor))
 
-    def pressure(self, unknowns: FloatArray) -> FloatArray:
-        """Return p / eta at the nodes."""
-        y, _, length = self.split(unknowns)
-        return np.asarray(self.panels.outer @ y / np.sqrt(length))
-
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
-        slip = self.slip(unknowns)
-        gain = np.log(np.maximum(slip, 1e-300)) - self.virgin_slip(unknowns[-1])
-        rows = gain - known - theta * self.pressure(unknowns)
-        rows[-1] = gain[-1]
-        return np.asarray(rows)
+        return np.asarray(self._rows(unknowns, theta, known)[0])
+
+    def _rows(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        rows, panels, table = np.empty((4, unknowns.size)), self.panels, (self.first, self.step, self.virgin)
+        _slip_rows(unknowns, self.inner_radius, panels.nodes, panels.inner, panels.outer, *table, theta, known, rows)
+        return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives by y."""
-        _, factor, length = self.split(unknowns)
-        result = self.panels.inner * (factor / self.slip(unknowns)[:, None])
-        result[:-1] -= theta / np.sqrt(length) * self.panels.outer[:-1]
+        result, size = np.empty((unknowns.size, unknowns.size)), unknowns.size
+        _, _, factor, slip = self._rows(unknowns, theta, np.zeros(size))
+        length = (unknowns[-1] - self.inner_radius) * (unknowns[-1] + self.inner_radius)
+        _slip_jacobian(self.panels.inner, self.panels.outer, factor, slip, theta / np.sqrt(length), result)
         return result
 
     def gathered(self, unknowns: FloatArray) -> FloatArray:
         """Return ln(s / s0)."""
-        gain = np.log(np.maximum(self.slip(unknowns), 1e-300)) - self.virgin_slip(unknowns[-1])
+        gain = np.asarray(self._rows(unknowns, 0.0, np.zeros_like(unknowns))[0])
         gain[-1] = 0.0
         return gain
 
@@ -159,6 +157,42 @@ class PartialSlip:
         """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the dissipation of a cycle over mu."""
         y, factor, length = self.split(unknowns)
         return float(self.eta * np.sqrt(length) * self.panels.weights @ (y * (1.0 - y) * factor))
+
+
+@njit(nogil=True, cache=True)
+def _slip_rows(unknowns, c, nodes, inner, outer, first, step, coefficients, theta, known, rows):  # type: ignore[no-untyped-def]
+    """Put the residual of `PartialSlip`, y, the factor of `split` and the slip into the rows."""
+    size = nodes.size
+    residual, y, factor, slips = rows[0], rows[1], rows[2], rows[3]
+    a = unknowns[size - 1]
+    length = (a - c) * (a + c)
+    root = np.sqrt(length)
+    for i in range(size):
+        y[i] = unknowns[i] if i < size - 1 else 1.0
+        factor[i] = root / np.sqrt(c * c + length * nodes[i])
+    for i in range(size):
+        slip, pressure = 0.0, 0.0
+        for j in range(size):
+            slip += inner[i, j] * factor[j] * y[j]
+            pressure += outer[i, j] * y[j]
+        slips[i] = slip
+        place = np.log(length * nodes[i]) - first
+        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
+        virgin = coefficients[0, cell]
+        for power in range(1, 4):
+            virgin = virgin * (place - cell * step) + coefficients[power, cell]
+        gain = np.log(max(slip, 1e-300)) - virgin
+        residual[i] = gain - known[i] - theta * pressure / root if i < size - 1 else gain
+
+
+@njit(nogil=True, cache=True)
+def _slip_jacobian(inner, outer, factor, slip, share, result):  # type: ignore[no-untyped-def]
+    """Put the derivatives of `PartialSlip.residual` by y into `result`."""
+    size = factor.size
+    for i in range(size):
+        rate = share if i < size - 1 else 0.0
+        for j in range(size):
+            result[i, j] = inner[i, j] * factor[j] / slip[i] - rate * outer[i, j]
 
 
 def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
@@ -175,7 +209,8 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
     span = np.arctan2(np.exp(0.5 * table), c)
     x = np.maximum(r[:, None] * np.cos(span[:, None] * abscissa), c)
     slip = 2.0 / np.pi * span * (profile.rise(x, c) @ weight) / eta
-    return PartialSlip(profile, c, panels, CubicSpline(table, np.log(slip)), eta)
+    coefficients = np.ascontiguousarray(CubicSpline(table, np.log(slip)).c)
+    return PartialSlip(profile, c, panels, table[0], table[1] - table[0], coefficients, eta)
 
 
 @dataclass(frozen=True, eq=False)
@@ -337,9 +372,12 @@ def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tup
     theta, shares = 1.0 / shares[0], -shares[1:] / shares[0]
     guess = _extrapolate(time, history[-1 : -order - 2 : -1])
 
+    memories = np.array([moment.gathered for moment in past])
+    squares = np.array([moment.edge for moment in past]) ** 2 - problem.inner_radius**2
+
     def known(edge: float) -> FloatArray:
-        r = problem.radii(edge)
-        return np.asarray(sum(share * gathered_at(problem, m, r) for share, m in zip(shares, past, strict=True)))
+        lengths = (edge**2 - problem.inner_radius**2) / squares
+        return interpolate_weighted(problem.panels, memories, shares, lengths)
 
     unknowns = _newton(problem, guess, theta, known)
     if unknowns is None:
@@ -350,12 +388,6 @@ def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tup
     edge = float(unknowns[nodes - 1])
     gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
     return Moment(time, unknowns, problem.gathered(unknowns), edge), float(gap) * _ERROR_SHARE[order - 1]
-
-
-def gathered_at(problem: Problem, moment: Moment, radius: FloatArray) -> FloatArray:
-    """Return what any radii beyond the stick border had gathered at a moment."""
-    c, a = problem.inner_radius, moment.edge
-    return interpolate(problem.panels, moment.gathered, (radius - c) * (radius + c) / ((a - c) * (a + c)))
 
 
 def _newton(

@@ -77,6 +77,18 @@ class FrettingWear(Parameters):
     extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 
+    @field_validator("shape")
+    @classmethod
+    def _is_profile(cls, shape: object) -> object:
+        if isinstance(shape, TableShape):
+            from mdr_dask.physics.profile_table import read_table
+
+            try:
+                read_table(shape.table.read_text())
+            except ValueError as problem:
+                raise ValueError(f"{shape.table.name}: {problem}") from None
+        return shape
+
     @field_validator("history", mode="before")
     @classmethod
     def _as_tuple(cls, value: object) -> object:

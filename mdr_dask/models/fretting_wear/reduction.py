@@ -135,14 +135,10 @@ def table_profile(shape: object, depth: float) -> TableProfile:
 
 @lru_cache(maxsize=64)
 def _pressed_table(text: str, depth: float) -> TableProfile:
+    from mdr_dask.physics.profile_table import read_table
     from mdr_dask.physics.revolution import from_table
 
-    rows = [line.split(",") for line in text.splitlines()[1:] if line.strip()]
-    try:
-        data = np.array([[float(row[0]), float(row[1])] for row in rows])
-    except (ValueError, IndexError) as problem:
-        raise ValueError(f"a table of a profile needs two columns of numbers below its header: {problem}") from None
-    return from_table(data[:, 0], data[:, 1], depth)
+    return from_table(*read_table(text), depth)
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:

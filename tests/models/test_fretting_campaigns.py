@@ -1,0 +1,192 @@
+"""Fretting wear through the command line: units in the store, sharing of solutions, sliding, histories, bad input."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask.cli import main
+
+STEEL = """\
+  curvature_radius: 10 mm
+  modulus: 115 GPa
+  shear_modulus: 90 GPa
+  friction: 0.6
+  amplitude: 1 um
+  load: 50 N
+  hardness: 2 GPa
+  wear_coefficient: 1e-4
+"""
+TABLE = """\
+  shape: {table: profile.csv}
+  modulus: 115 GPa
+  shear_modulus: 90 GPa
+  friction: 0.6
+  amplitude: 1 um
+  depth: 4.7 um
+  hardness: 2 GPa
+  wear_coefficient: 1e-4
+"""
+
+
+@pytest.fixture
+def write(tmp_path, monkeypatch):
+    """Write a campaign and return its path."""
+    monkeypatch.chdir(tmp_path)
+
+    def campaign(parameters: str, rest: str = "") -> Path:
+        path = tmp_path / "wear.yaml"
+        path.write_text(
+            f"name: wear\nmodel: fretting_wear\nparameters:\n{parameters}store: {{path: wear.zarr}}\n{rest}"
+        )
+        return path
+
+    return campaign
+
+
+def filled(path: Path) -> xr.Dataset:
+    assert main(["run", str(path), "--quiet"]) == 0
+    return xr.open_zarr("wear.zarr").load()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "units"),
+    [
+        ("  stick_radius: 0.5\n", ("1", "1", "1", "1", "1")),
+        ("  path: 2\n  method: exact\n", ("1", "1", "1", "1", "1")),
+        (STEEL + "  method: exact\n", ("m", "m^3", "N", "m", "Pa")),
+    ],
+)
+def test_units_in_the_store(write, parameters, units):
+    names = ("contact_radius", "wear_volume", "normal_force", "worn_profile", "pressure")
+    data = filled(write(parameters, f"outputs: [{', '.join(names)}]\n"))
+    assert tuple(data[name].attrs["units"] for name in names) == units
+    assert data.radius.attrs["units"] == "1"
+
+
+def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
+    """Two frictions make two c; wear coefficient, hardness and cycles are only other moments of the same evolution."""
+    varied = STEEL.replace("friction: 0.6", "friction: [0.6, 0.7]").replace("1e-4", "[1e-5, 1e-4, 1e-3]")
+    varied = varied.replace("hardness: 2 GPa", "hardness: [1 GPa, 2 GPa]")
+    path = write(varied + "  cycles: [1e3, 1e4, 1e5, 1e6]\n  method: exact\n")
+    assert main(["run", str(path), "--dry-run"]) == 0
+    assert "2 solves remain after sharing" in capsys.readouterr().out
+    assert main(["run", str(path)]) == 0
+    streams = capsys.readouterr()
+    assert streams.out == "wear.zarr: 48 done, 0 failed\n"
+    assert " 2 solves in 2 blocks" in streams.err
+
+
+def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsys):
+    """With the depth given, c depends on G*/(mu E*) alone."""
+    varied = STEEL.replace("load: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa]")
+    varied = varied.replace("90 GPa", "[80 GPa, 160 GPa]").replace("hardness: 2 GPa", "hardness: [2 GPa, 4 GPa]")
+    path = write(varied + "  method: limit\n")
+    assert main(["run", str(path)]) == 0
+    assert " 3 solves in 1 blocks" in capsys.readouterr().err  # G*/E* = 0.4, 0.8, 1.6
+
+
+def test_sliding_from_a_campaign(write):
+    path = write(
+        "  shape: [parabola, cone]\n  method: exact\n  hold: [depth, force]\n  path: [0, 1, 40]\n  tolerance: 1e-4\n",
+        "outputs: [contact_radius, wear_volume, normal_force, worn_profile, worn_image, pressure, worn_depth, "
+        "block_depth, discretisation_error, stick_border]\n",
+    )
+    data = filled(path).isel(realisation=0)
+    assert np.all(data.status == 1)
+    depth = data.sel(hold="depth", path=40.0)
+    np.testing.assert_allclose(depth.contact_radius, [np.sqrt(2), np.pi / 2], atol=1e-5)
+    np.testing.assert_allclose(depth.wear_volume, [np.pi, np.pi**3 / 12], atol=1e-4)
+    force = data.sel(hold="force")
+    virgin = force.normal_force.isel(path=0, drop=True)
+    np.testing.assert_allclose(force.normal_force / virgin, 1.0, rtol=1e-4)
+    np.testing.assert_allclose(
+        force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12
+    )
+    assert np.all(np.diff(force.block_depth.isel(block=0).transpose("shape", "path")) > 0)
+    assert np.all(data.stick_border == 0)
+    assert np.all(data.discretisation_error < 4e-3)
+
+
+def test_sliding_in_physical_units_obeys_the_wear_law(write):
+    kept = [line for line in STEEL.splitlines() if line.split(":")[0].strip() not in {"shear_modulus", "friction"}]
+    kept = [line for line in kept if "amplitude" not in line]
+    data = filled(write("\n".join(kept) + "\n  method: exact\n  hold: force\n  path: [1 m, 10 m]\n"))
+    np.testing.assert_allclose(data.wear_volume.values.ravel(), 1e-4 * 50 * np.array([1, 10]) / 2e9, rtol=1e-3)
+
+
+def test_every_block_of_a_history_is_kept(write):
+    history = (
+        "  history:\n    - {cycles: 0.5}\n    - {cycles: 0.5, amplitude_factor: 1.2}\n"
+        "    - {cycles: 0.5, amplitude_factor: 0.2, load_factor: 1.2}\n"
+    )
+    names = "wear_volume, block_wear_volume, block_stick_border, block_depth, block_worn_profile"
+    path = write(f"  method: exact\n  stick_radius: 0.5\n  cells: 60\n{history}", f"outputs: [{names}]\n")
+    data = filled(path).isel(realisation=0)
+    assert data.block.values.tolist() == [1, 2, 3]
+    assert np.all(np.diff(data.block_wear_volume) > 0)
+    assert data.block_wear_volume[-1] == data.wear_volume
+    np.testing.assert_allclose(data.block_depth, [1.0, 1.0, 1.2])
+    assert data.block_stick_border[1] < data.block_stick_border[0] < data.block_stick_border[2]
+    assert np.all(data.block_worn_profile.diff("block") >= 0)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "place", "message"),
+    [
+        (STEEL.replace("1e-4", "-1e-4"), "11:21", "expected a number of at least 0, got -0.0001"),
+        ("  stick_radius: 1.2\n", "4:17", "expected a number below 1, got 1.2"),
+        ("  stick_radius: .nan\n", "4:17", "expected a finite number, got nan"),
+        ("  stick_radius: 0.5\n  friction: 0.3\n", "3:1", "leave one kind out"),
+        ("  stick_radius: 0.5\n  path: 2\n  method: exact\n", "3:1", "stick_radius of an oscillation as well"),
+        ("  path: 2\n", "3:1", "method exact only, got 'fast'"),
+        ("  shape: {exponent: -1}\n  stick_radius: 0.5\n", "4:21", "above 0.1, got -1"),
+    ],
+)
+def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, place, message):
+    path = write(parameters)
+    assert main(["check", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert f"wear.yaml:{place}: " in error
+    assert message in error
+    assert all("wear.yaml:" in line for line in error.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "the profile must rise with the radius, got 1e-06 after 2e-06"),
+        ("0,0\n1e-4,nan\n2e-4,1e-6\n1e-3,1e-3\n", "a profile must be finite, got 0.0001, nan in row 2"),
+        ("0,0\n1e-4,inf\n2e-4,1e-6\n1e-3,1e-3\n", "a profile must be finite, got 0.0001, inf in row 2"),
+        ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0 and increase"),
+        ("0,0\n1e-4,high\n", "needs two columns of numbers"),
+    ],
+)
+def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
+    path = write(TABLE)
+    Path("profile.csv").write_text("radius,height\n" + rows)
+    assert main(["check", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert "wear.yaml:4:10: parameters.shape: profile.csv: " in error
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (
+            STEEL.replace("1 um", "100 um"),
+            "the amplitude is in gross slip: it must stay below mu E* d0 / G*, got 59.32",
+        ),
+        (TABLE, "the contact reaches beyond the table"),
+    ],
+)
+def test_impossible_contacts_are_failed_cases_with_a_sentence(write, capsys, parameters, message):
+    path = write(parameters)
+    Path("profile.csv").write_text("radius,height\n0,0\n1e-6,1e-10\n2e-6,4e-10\n3e-6,9e-10\n")
+    assert main(["run", str(path), "--quiet"]) == 1
+    assert "0 done, 1 failed" in capsys.readouterr().out
+    main(["status", "wear.zarr", "--failures"])
+    assert message in capsys.readouterr().out
