@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Status
-from mdr_dask.models.mixed_lubrication.lines import Source, problem_of
+from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 from mdr_dask.models.mixed_lubrication.turn import POSITIONS, Turn, creeping, profiles, rolling, trace, turn_values
@@ -63,7 +63,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
     groups: dict[Source, list[tuple[int, Operation]]] = {}
     for index in range(block.cases):
         case = block.case(index)
-        problem = problem_of(case)
+        problem = case.problem()
         if problem:
             _refuse(result, index, Status.FAILED, problem)
             continue
