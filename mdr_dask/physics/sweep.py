@@ -85,9 +85,18 @@ def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: Fl
     """Write the depth that keeps each whole cell pressed, w + reach w' > 0, and its maximum over blocks."""
     height, enter, leave = cells.height, cells.enter, cells.leave
     for i in range(barriers.size):
-        first = -(height[i] + reach * enter[i])
+        h0, a, b, c = cubic(height, enter, leave, i)
+        first = -(h0 + reach * a)
         last = -(height[i + 1] + reach * leave[i])
-        barriers[i] = first if first > last else last
+        highest = first if first > last else last
+        # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
+        q, r = a + 2 * reach * b, b + 3 * reach * c
+        if q < 0 and q + 2 * r + 3 * c > 0:
+            root = math.sqrt(r * r - 3 * c * q)
+            x = -q / (r + root) if r > 0 else (root - r) / (3 * c)
+            inside = first - x * (q + x * (r + x * c))
+            highest = inside if inside > highest else highest
+        barriers[i] = highest
     for j in range(block_barriers.size):
         highest = barriers[j * BLOCK]
         for i in range(j * BLOCK + 1, (j + 1) * BLOCK):
@@ -105,36 +114,52 @@ def _lost(x: float) -> float:
 
 @njit(nogil=True, cache=True)
 def _leaving(w0: float, a: float, b: float, c: float, reach: float, start: float) -> float:
-    """Return where w + reach w' falls to 0 between start and 1, or `NONE`."""
-    if w0 + a + b + c + reach * (a + 2 * b + 3 * c) > 0:
-        return NONE
-    # the force is a cubic itself
+    """Return where w + reach w' falls through 0 first between start and 1, or `NONE`."""
+    # the force is a cubic itself, cut into its monotone pieces
     p, q, r = w0 + reach * a, a + 2 * reach * b, b + 3 * reach * c
-    low, high, x = start, 1.0, start
+    low, force = start, p + start * (q + start * (r + start * c))
+    discriminant = r * r - 3 * c * q
+    root = math.sqrt(discriminant) if discriminant > 0 else 0.0
+    lead = -(r + root) if r > 0 else root - r
+    one, other = (lead / (3 * c) if c != 0 else NONE), (q / lead if lead != 0 else NONE)
+    one, other = (one, other) if one < other else (other, one)
+    for piece in range(3):
+        high = 1.0 if piece == 2 else (one if piece == 0 else other)
+        if not low < high <= 1:
+            continue
+        end = p + high * (q + high * (r + high * c))
+        if force > 0 and end <= 0:
+            return _falling(p, q, r, c, low, high)
+        low, force = high, end
+    return NONE
+
+
+@njit(nogil=True, cache=True)
+def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
+    """Return the root of a cubic that falls monotonously from low to high."""
+    x = low + (high - low) * 0.5
     for _ in range(ITERATIONS):
         force = p + x * (q + x * (r + x * c))
         if force > 0:
             low = x
         else:
-            if x == start:
-                return start
             high = x
         slope = q + x * (2 * r + x * 3 * c)
         step = x - force / slope if slope < 0 else high
         if abs(step - x) < CLOSE:
-            return min(max(step, start), 1.0)
+            return min(max(step, low), high)
         x = step if low < step < high else 0.5 * (low + high)
     return x
 
 
 @njit(nogil=True, cache=True)
-def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, end: float) -> float:
-    """Return where w rises to u exp(-x / reach) between 0 and end, where it is known to be above."""
-    if w0 >= u:
-        return 0.0
-    low, high, x = 0.0, end, end
+def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, end: float) -> float:
+    """Return where w rises to u exp(-(x - start) / reach) between start and end, where it is known to be above."""
+    if w0 + start * (a + start * (b + start * c)) >= u:
+        return start
+    low, high, x = start, end, end
     for _ in range(ITERATIONS):
-        free = u - u * _lost(x / reach)
+        free = u - u * _lost((x - start) / reach)
         gap = w0 + x * (a + x * (b + x * c)) - free
         if gap > 0:
             high = x
@@ -143,19 +168,25 @@ def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, e
         slope = a + x * (2 * b + x * 3 * c) + free / reach
         step = x - gap / slope if slope > 0 else low
         if abs(step - x) < CLOSE:
-            return min(max(step, 0.0), end)
+            return min(max(step, start), end)
         x = step if low < step < high else 0.5 * (low + high)
     return x
 
 
 @njit(nogil=True, cache=True)
-def _reached(w0: float, a: float, b: float, c: float, reach: float, u: float, decay: float) -> float:
-    """Return the end of the stretch of a cell where a free element touches, or `NONE`."""
-    if w0 + a + b + c > u * decay:
-        return 1.0
-    x = summit(a, b, c)
-    if x < 1 and w0 + x * (a + x * (b + x * c)) > u - u * _lost(x / reach):
-        return x
+def _touch(w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float) -> float:
+    """Return where behind `low` an element that is free from start on, with u there, touches first, or `NONE`.
+
+    The lead of the profile, (w - u_free) exp(x / reach), is highest where the force w + reach w' falls through 0, or at
+    the end of the cell.
+    """
+    for _ in range(3):
+        high = min(_leaving(w0, a, b, c, reach, low), 1.0)
+        if w0 + high * (a + high * (b + high * c)) > u - u * _lost((high - start) / reach):
+            return _touching(w0, a, b, c, reach, u, start, high)
+        if high >= 1:
+            return NONE
+        low = high + CLOSE
     return NONE
 
 
@@ -257,32 +288,38 @@ def sweep(
             break
         h0, c1, c2, c3 = cubic(height, enter, leave, i)
         w0 = depth + h0
-        if contact:
-            place, u, free = _leave(w0, c1, c2, c3, reach, x)
-            part, part_stretch = _pressed(w0, c1, c2, c3, x, min(place, 1.0))
-            area += part
-            stretch += part_stretch
-            length += min(place, 1.0) - x
-            contact = place > 1
-            left = i + place
-            x = 0.0
-            i += 1
-            continue
-        x = _touch(w0, c1, c2, c3, reach, free, decay)
-        contact = x <= 1
-        if contact:
-            flight = _landed(u, i + x - left, reach, c1 + x * (2 * c2 + x * 3 * c3))
+        visits = 0
+        while True:
+            if contact:
+                pressed = w0 + x * (c1 + x * (c2 + x * c3)) + reach * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
+                place = _leaving(w0, c1, c2, c3, reach, x) if pressed else x
+                end = min(place, 1.0)
+                part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
+                area += part
+                stretch += part_stretch
+                length += end - x
+                visits += 1
+                if place > 1:
+                    break
+                contact, left, x = False, i + place, place
+                free = u = w0 + place * (c1 + place * (c2 + place * c3))
+            # a force that is a cubic falls through 0 twice at most
+            low = x + CLOSE if visits > 0 else x
+            touch = _touch(w0, c1, c2, c3, reach, free, x, low) if visits < 2 and low < 1 else NONE
+            if touch > 1:
+                free -= free * _lost((1 - x) / reach)
+                break
+            flight = _landed(u, i + touch - left, reach, c1 + touch * (2 * c2 + touch * 3 * c3))
             area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
-        else:
-            free *= decay
-            x = 0.0
-            i += 1
+            contact, x = True, touch
+        x = 0.0
+        i += 1
     # the last part of the turn, up to the highest point again; or the last flight, which does not end
     h0, c1, c2, c3 = cubic(height, enter, leave, n)
     w0 = depth + h0
     x = 0.0
     if not contact:
-        x = _touching(w0, c1, c2, c3, reach, free, start) if cells.periodic and start > 0 else 0.0
+        x = _touching(w0, c1, c2, c3, reach, free, 0.0, start) if cells.periodic and start > 0 else 0.0
         flown = n + x - left if cells.periodic else np.inf
         slope = c1 + x * (2 * c2 + x * 3 * c3) if cells.periodic else 0.0
         flight = _landed(u, flown, reach, slope)
@@ -299,22 +336,3 @@ def sweep(
     sums[LENGTH] = length
     sums[STRETCH] = stretch
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
-
-
-@njit(nogil=True, cache=True)
-def _touch(w0: float, a: float, b: float, c: float, reach: float, free: float, decay: float) -> float:
-    """Return where in a cell a free element touches, or `NONE`."""
-    end = _reached(w0, a, b, c, reach, free, decay)
-    return _touching(w0, a, b, c, reach, free, end) if end <= 1 else NONE
-
-
-@njit(nogil=True, cache=True)
-def _leave(w0: float, a: float, b: float, c: float, reach: float, x: float) -> tuple[float, float, float]:
-    """Return where in a cell the contact is left after x, or `NONE`, with u there and at the end of the cell."""
-    place = _leaving(w0, a, b, c, reach, x)
-    if place > 1:
-        return NONE, 0.0, 0.0
-    u = w0 + place * (a + place * (b + place * c))
-    free = u - u * _lost((1 - place) / reach)
-    # a dip within one cell is passed over
-    return (place if w0 + a + b + c <= free else NONE), u, free
