@@ -99,7 +99,7 @@ def test_friction_falls_with_velocity_without_a_floor():
 def test_energy_lost_is_the_work_of_friction():
     """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight.
 
-    Here on the straight line between points with e = u - a exact in every cell, its square integrated by Simpson's rule;
+    Here on the straight line between points with e = u - a exact in every cell, its square by Simpson's rule;
     only the cells in which contact begins or ends are left to second order.
     """
     solid, velocity = standard_solid(1e7, 4e7, 1e-2), 0.05
@@ -151,7 +151,7 @@ def test_arms_slower_than_anything_share_one_limit():
 
 
 def test_error_estimate_covers_the_true_error():
-    """200 random cases on coarse grids, none of those it was tuned on: 95 % within the estimate, not 10 times too large.
+    """200 random cases on coarse grids, none that it was tuned on: 95 % within, not 10 times too large.
 
     The standard error of the part is 1.5 %, hence 92 %; 97 % were measured of 7047.
     """
