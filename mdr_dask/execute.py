@@ -325,6 +325,7 @@ def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], thre
 def _client(resources: Resources) -> Iterator[Client]:
     from distributed import Client
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks end up in our errors, in one sentence
     if resources.scheduler is not None:
         with _connected(resources.scheduler) as client:
             yield client

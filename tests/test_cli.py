@@ -140,13 +140,16 @@ def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path)
     """SIGKILL at random moments, again and again, until a run gets through: no byte differs, no block is done twice."""
     long = CAMPAIGN.replace("realisations: 8", "realisations: 96").replace("points: 500", "points: 20000")
     campaign.write_text(long + "store: {path: killed.zarr, blocks: {realisation: 2}}\n")
+    random = np.random.default_rng(1)
     kills = 0
-    for moment in np.random.default_rng(1).uniform(0.8, 2.5, 40):
+    there = 0
+    while there < 48:
+        enough = there + random.integers(1, 16)
         with subprocess.Popen(command("run", str(campaign), "--quiet"), stdout=subprocess.DEVNULL) as process:
-            try:
-                process.wait(moment)
-                break
-            except subprocess.TimeoutExpired:
+            while process.poll() is None and there < enough:
+                time.sleep(random.uniform(0.0, 0.05))
+                there = len(list(Path("killed.zarr").glob("status/c/*/*/*")))
+            if process.poll() is None and there < 48:
                 process.send_signal(signal.SIGKILL)
                 kills += 1
     assert process.returncode == 0

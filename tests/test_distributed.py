@@ -90,7 +90,7 @@ def test_a_worker_of_another_version_is_refused(toy, url, workers, monkeypatch):
 def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
     monkeypatch.setattr(task, "versions", lambda _: ("0.0", 7))
-    with pytest.raises(ClusterError, match="has mdr_dask 0.0 with toy 7"):
+    with pytest.raises(ClusterError, match=r"has mdr_dask 0\.0 with toy 7"):
         run(campaign, url)
     assert not digests(url).keys() & {"height/c/0/0", "status/c/0/0"}
 

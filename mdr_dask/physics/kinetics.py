@@ -11,10 +11,12 @@ from scipy.interpolate import CubicSpline
 
 from mdr_dask.physics.kinetics_kernels import (
     BLOCK,
+    CANDIDATES,
     DRAG,
     LENGTH,
     LOAD,
     STIFFNESS,
+    WINDOWS,
     Course,
     Pace,
     Patches,
@@ -132,12 +134,13 @@ def _settle(
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
     start, end = np.empty(floor.size), np.empty(floor.size)
+    places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums)
+        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums, places, spreads)
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
@@ -343,10 +346,11 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
     start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(4)
+    places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
     course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1)
-    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums), 0)
+    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums, places, spreads), 0)
     pressed = np.empty(found)
     for k in range(found):
         pressed[k] = depth + height_at(profile, end[k])[0]

@@ -26,8 +26,11 @@ BLOCK = 16
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 TRIALS = 80
+SECANT = 0.03  # of the miss of a step: where a last secant step follows
 CLOSE, EXACT = 1e-7, 1e-11  # of the load: where a last secant step follows, and where none is needed
 ROOT_STEPS = 60
+NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
+MET = 3e-4  # of a cell: a last Newton step that is not checked
 GUARD_CELLS = 200.0
 LOAD, DRAG, LENGTH, STIFFNESS = range(4)
 
@@ -78,7 +81,7 @@ class Course(NamedTuple):
     count: int  # type: ignore[assignment]
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i over 0..1."""
     h = profile.height[i]
@@ -87,7 +90,7 @@ def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     return h, enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
     y = x / profile.cell
@@ -101,7 +104,7 @@ def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return the height at x, its integral up to x and that of its slope squared."""
     y = x / profile.cell
@@ -117,7 +120,7 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
     h0, area0, square0 = integrals_at(profile, start)
@@ -127,13 +130,15 @@ def add_patch(profile: Profile, start: float, end: float, lift: float, reach: fl
     sums[LENGTH] += end - start
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _moment(course: Course, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = course.count - 1
     if last <= 0 or t >= course.time[last]:
         return course.depth[last], course.rate[last], 0.0
-    low, high = 0, last
+    low, high, back = last - 1, last, 1
+    while course.time[low] > t and low > 0:
+        high, low, back = low, max(low - back, 0), 2 * back
     while high - low > 1:
         middle = (low + high) // 2
         if course.time[middle] <= t:
@@ -152,7 +157,7 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _left_from(
     profile: Profile, course: Course, t: float, reach: float, x: float, place: float
 ) -> tuple[float, float, float]:
@@ -170,19 +175,20 @@ def _left_from(
         d, rate, change = _moment(course, then)
         h, slope, curvature = height_at(profile, s)
         fade = np.exp(-(x - s) / reach)
-        u = (d + h) * fade
-        if u > best:
-            best, best_slope, best_fade = u, -(d + h + rate) * fade / reach, fade
         force = d + h + rate + reach * slope
         falls = (rate + change) / reach + slope + reach * curvature
         step = -force / falls if falls < 0 else 0.0
-        if abs(step) < 1e-4 * profile.cell:
+        near = abs(step) < NEAR * profile.cell
+        u = (d + h + (0.5 * force * step / reach if near else 0.0)) * fade
+        if u > best:
+            best, best_slope, best_fade = u, -(d + h + rate) * fade / reach, fade
+        if near:
             break
         s = min(max(s + min(max(step, -2 * profile.cell), 2 * profile.cell), 0.0), x)
     return best, best_slope, best_fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
     s = x - reach * t
@@ -205,7 +211,7 @@ def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) 
     return u, -u / first.reach
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _wake(
     profile: Profile,
     first: Patches,
@@ -230,7 +236,7 @@ def _wake(
     return u, slope, fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _unloading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' falls through zero between low and high."""
     x = 0.5 * (low + high)
@@ -251,7 +257,7 @@ def _unloading(profile: Profile, lift: float, reach: float, low: float, high: fl
     return x
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _meeting(
     profile: Profile,
     first: Patches,
@@ -280,13 +286,13 @@ def _meeting(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2 * profile.cell
-        if abs(step) < 1e-6 * profile.cell or high - low < 1e-9 * profile.cell:
+        if abs(step) < MET * profile.cell or high - low < 1e-9 * profile.cell:
             return min(max(x + step, low), high), slope, fade
         x += step
     return x, slope, fade
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12 * profile.cell:
@@ -300,7 +306,7 @@ def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: flo
     return high
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
     now = course.count - 1
@@ -314,7 +320,7 @@ def _spreads(course: Course, t: float, reach: float, window: float, spreads: Flo
         spreads[k] = highest - lowest
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     """Return the range of the depth while the profile went a distance."""
     k = 0
@@ -324,7 +330,30 @@ def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     return float(spreads[k])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
+def _worth_keeping(
+    profile: Profile,
+    course: Course,
+    t: float,
+    reach: float,
+    x: float,
+    pressed: float,
+    spreads: FloatArray,
+    window: float,
+    places: FloatArray,
+    count: int,
+) -> int:
+    """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
+    kept = 0
+    for k in range(count):
+        u = _left_from(profile, course, t, reach, x, places[k])[0]
+        if u + 2 * _spread(spreads, window, 2 * (x - places[k]) + window) >= pressed:
+            places[kept] = places[k]
+            kept += 1
+    return kept
+
+
+@njit(nogil=True, cache=True, _nrt=False)
 def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
     """Write the least p + reach p' over the nodes that end the cells of each block of `BLOCK` cells."""
     for m in range(least.size):
@@ -334,7 +363,7 @@ def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
         least[m] = value
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
     s = x - reach * t
@@ -355,7 +384,7 @@ def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: floa
     return float(until + turns + reach * t)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def touch(
     profile: Profile,
     runs: IntArray,
@@ -368,6 +397,8 @@ def touch(
     start: FloatArray,
     end: FloatArray,
     sums: FloatArray,
+    places: FloatArray,
+    spreads: FloatArray,
 ) -> int:
     """Find the patches in contact at time t, at the last depth and rate of the course, and add up their forces.
 
@@ -390,6 +421,8 @@ def touch(
         Written: the patches.
     sums : array, shape (4,)
         Written: load and drag over 4 G L, length in contact, derivative of the load by the depth at constant rate.
+    places, spreads : array, shape (CANDIDATES,), (WINDOWS,)
+        Room.
 
     Returns
     -------
@@ -399,13 +432,13 @@ def touch(
     depth = course.depth[course.count - 1]
     lift = depth + course.rate[course.count - 1]
     height, slope, cell = profile.height, profile.slope, profile.cell
-    places, known, found, edges = np.empty(CANDIDATES), 0, 0, 0.0
+    known, found, edges = 0, 0, 0.0
     oldest, last_start = -np.inf, -np.inf
     contact, begin, free_from = profile.periodic, profile.origin, 0.0
     finish = 1.0 + profile.origin if profile.periodic else np.inf
     guard = first.count > 0 and reach * t < GUARD_CELLS * cell
     next_free = _next_free(profile, first, t, reach, begin) if guard and contact else np.inf
-    window, spreads = WINDOW_CELLS * cell, np.empty(WINDOWS)
+    window = WINDOW_CELLS * cell
     _spreads(course, t, reach, window, spreads)
     fade_of_cell = np.exp(-cell / (min(reach, first.reach) if first.count > 0 else reach))
     least_free, known_at = 0.0, 0.0
@@ -440,10 +473,8 @@ def touch(
                 add_patch(profile, begin, until, lift, reach, sums)
                 start[found], end[found] = begin, until
                 found += 1
-                w_begin, w = depth + height_at(profile, begin)[0], depth + height_at(profile, until)[0]
-                spread = _spread(spreads, window, 2 * (until - places[0]) + window) if known > 0 else spreads[0]
-                if w_begin * np.exp(-(until - begin) / reach) + 2 * spread < w:
-                    known = 0
+                w = depth + height_at(profile, until)[0]
+                known = _worth_keeping(profile, course, t, reach, until, w, spreads, window, places, known)
                 least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                 oldest, last_start = last_start, begin
                 if not lost:
@@ -485,8 +516,7 @@ def touch(
                     start[found], end[found] = begin, probe
                     found += 1
                     oldest, last_start = last_start, begin
-                    if 2 * spread < gap:
-                        known = 0
+                known = _worth_keeping(profile, course, t, reach, probe, depth + h1, spreads, window, places, known)
                 known = min(known, CANDIDATES - 1)
                 places[known] = probe
                 known += 1
@@ -504,7 +534,7 @@ def touch(
     return found
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def released(profile: Profile, first: Patches, reach: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 
@@ -541,7 +571,7 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
     sums[STIFFNESS] = sums[LENGTH]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _loading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' rises through zero between low and high, by bisection."""
     for _ in range(ROOT_STEPS):
@@ -554,7 +584,7 @@ def _loading(profile: Profile, lift: float, reach: float, low: float, high: floa
     return high
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _rate_weights(course: Course, now: int, order: int) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now`, from the polynomial through the last depths (BDF)."""
     t = course.time[now]
@@ -591,7 +621,7 @@ class Pace(NamedTuple):
     until: float
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _balance(
     profile: Profile,
     runs: IntArray,
@@ -604,7 +634,8 @@ def _balance(
     weights: tuple[float, float],
     limits: tuple[float, float],
     gain: float,
-    room: tuple[FloatArray, FloatArray],
+    close: float,
+    room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
 ) -> tuple[int, float, float]:
     """Find the depth that carries the load at the last moment of the course, by secants.
 
@@ -618,24 +649,26 @@ def _balance(
     """
     now = course.count - 1
     guess, (a, b) = course.depth[now], weights
-    sums = np.empty(4)
+    start, end, sums, places, spreads = room
     low, high = limits
     off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
     for trial in range(TRIALS):
         course.depth[now], course.rate[now] = guess, a * guess + b
-        found = touch(profile, runs, floor, least, first, course, course.time[now], reach, room[0], room[1], sums)
+        found = touch(
+            profile, runs, floor, least, first, course, course.time[now], reach, start, end, sums, places, spreads
+        )
         if found < 0:
             return 2, 0.0, gain
         off = sums[LOAD] / load - 1
         drag = sums[DRAG]
-        if abs(off) <= (CLOSE if trial > 0 else EXACT):
+        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
+        if abs(off) <= (max(CLOSE, close * stiffness) if trial > 0 else EXACT):
             if trial > 0 and off != before_off:
                 share = off / (before_off - off)
                 guess += share * (guess - before)
                 drag += share * (drag - before_drag)
             course.depth[now], course.rate[now] = guess, a * guess + b
             return 0, drag, gain
-        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
         if trial > 0 and (off - before_off) * (guess - before) > 0:
             gain = min(max((off - before_off) / (guess - before) / stiffness, 0.02), 2.0)
         if off < 0:
@@ -692,7 +725,8 @@ def march(
     status : int
         0 done, 1 depth not found, 2 limits exceeded.
     """
-    room = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
+    most = 4 * first.count + 4096
+    room = np.empty(most), np.empty(most), np.empty(4), np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(profile.height.size // BLOCK)
     block_least(profile, reach, least)
     near, gain, step, now = 0, 1.0, pace.first, 1
@@ -713,7 +747,7 @@ def march(
             foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
         depth[now] = min(max(foretold, limits[0]), limits[1])
         status, drag[now], gain = _balance(
-            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, room
+            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, SECANT * pace.miss, room
         )
         miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
         if miss > 2 * pace.miss or status != 0:

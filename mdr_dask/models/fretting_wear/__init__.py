@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Status
 from mdr_dask.models.fretting_wear.parameters import FrettingWear, TableShape
 from mdr_dask.models.fretting_wear.reduction import Numbers, reduce_block, refuse_gross_slip, shapes
-from mdr_dask.models.fretting_wear.solutions import axes, solve_each
+from mdr_dask.models.fretting_wear.solutions import BLOCK_OUTPUTS, axes, on_grid, solve_each, solves_of, tasks
 
 FloatArray = NDArray[np.float64]
 
-_OVER = {"worn_profile": "radius", "worn_image": "position", "pressure": "radius"}
+#: Outputs that are computed for many cases at once.
+_CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border", "discretisation_error")
 #: Numerical error of the closed forms, in d0 (tests/physics/test_wear.py).
 _CLOSED_FORM_ERROR = 2e-6
 
@@ -22,9 +23,7 @@ def compute(block: Block[FrettingWear]) -> Result:
     numbers, messages = reduce_block(block)
     status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
     wanted = [name for name in block.outputs if name != "status"]
-    values = {
-        name: np.full(status.shape + ((block.parameters.points,) if name in _OVER else ()), np.nan) for name in wanted
-    }
+    values = {name: np.full(status.shape + _sizes(block.parameters, name), np.nan) for name in wanted}
     refuse_gross_slip(block, numbers, messages)
     for position in messages:
         status[position] = Status.FAILED
@@ -36,11 +35,18 @@ def compute(block: Block[FrettingWear]) -> Result:
     return Result(values, status, messages, solves)
 
 
+def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
+    """Return the lengths of the dimensions that an output has of its own."""
+    lengths = {"block": max(len(parameters.history), 1)}
+    return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
+
+
 def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
     """Give the outputs of dimensional cases their units; dimensionless cases have units of one."""
     units = {
         "contact_radius": numbers.length,
         "stick_border": numbers.length,
+        "depth": numbers.height,
         "wear_volume": numbers.length**2 * numbers.height,
         "normal_force": numbers.force,
         "worn_profile": numbers.height,
@@ -49,8 +55,9 @@ def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
         "pressure": numbers.force / numbers.length**2,
     }
     for name, array in values.items():
-        if name in units:
-            array *= units[name].reshape(units[name].shape + (1,) * (array.ndim - 2))
+        unit = units.get(BLOCK_OUTPUTS.get(name, name))
+        if unit is not None:
+            array *= unit.reshape(unit.shape + (1,) * (array.ndim - 2))
 
 
 def _is_plain(block: Block[FrettingWear]) -> bool:
@@ -60,7 +67,7 @@ def _is_plain(block: Block[FrettingWear]) -> bool:
     tables = any(isinstance(shape, TableShape) for shape in set(shapes(block)))
     plain_load = holds == {"depth"} and not block.parameters.history and "history" not in block.columns
     return (
-        methods <= {"limit", "fast"} and plain_load and not tables and not set(block.outputs) & {*_OVER, "worn_depth"}
+        methods <= {"limit", "fast"} and plain_load and not tables and set(block.outputs) <= {*_CLOSED_FORMS, "status"}
     )
 
 
@@ -81,8 +88,7 @@ def _solve_plain(
     stick = rows[1] ** (1.0 / rows[0])
     results[:, finite] = fast_cases(n, level ** (1.0 / n), cycles, xi, results[0, finite])
     error = np.full(stick.size, _CLOSED_FORM_ERROR)
-    names = ("contact_radius", "wear_volume", "normal_force", "stick_border", "discretisation_error")
-    for name, result in zip(names, (*results, stick, error), strict=True):
+    for name, result in zip(_CLOSED_FORMS, (*results, stick, error), strict=True):
         if name in values:
             values[name][good] = result[back]
     return int(rows.shape[1])
@@ -105,16 +111,29 @@ def _coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
     return {
         "radius": Coordinate(axis, "1", "radius over the first contact radius a0"),
         "position": Coordinate(axis, "1", "position over the first contact radius a0"),
+        "block": Coordinate(np.arange(1.0, max(len(parameters.history), 1) + 1.0), "1", "block of the load history"),
     }
 
 
+def _units(parameters: FrettingWear) -> dict[str, str]:
+    """Return the units of a dimensionless campaign: every output is a pure number."""
+    return {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
+
+
 def _distinct_solutions(block: Block[FrettingWear]) -> int:
-    """Count the different tasks, or for the closed forms the different cases."""
-    numbers, _ = reduce_block(block)
-    parts = [np.nan_to_num(numbers.exponent), numbers.level]
+    """Count the different solutions among the cases of a block, those of `compute`."""
+    numbers, messages = reduce_block(block)
     if _is_plain(block):
-        parts += [numbers.cycles, numbers.xi]
-    return int(_distinct(np.stack([part.ravel() for part in parts]))[0].shape[1])
+        return _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
+    status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
+    refuse_gross_slip(block, numbers, messages)
+    for position in messages:
+        status[position] = Status.FAILED
+    return sum(solves_of(task, wanted) for task, wanted in tasks(block, numbers, status).items())
+
+
+def _count(*parts: FloatArray) -> int:
+    return int(_distinct(np.stack([np.nan_to_num(part).ravel() for part in parts]))[0].shape[1])
 
 
 def _seconds(block: Block[FrettingWear]) -> float:
@@ -123,12 +142,13 @@ def _seconds(block: Block[FrettingWear]) -> float:
     if _is_plain(block):
         return 0.01 + 3e-5 * size
     method, tolerance = block.parameters.method, block.parameters.tolerance
-    loaded = block.parameters.hold == "force" or bool(block.parameters.history)
     cells = block.parameters.cells
-    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * (1e-3 / tolerance) ** 0.6, "literal": 3e-7 * cells**3}[method]
-    sharing = {len(column) for name, column in block.columns.items() if name == "cycles"}
-    solves = max(size // max(sharing, default=1), 1) if method == "exact" else size
-    return 0.01 + (1e-7 * cells**3 * size if loaded else each * solves) + 2e-3 * size
+    if on_grid(block.parameters):
+        return 0.01 + (3e-7 if method == "literal" else 1e-7) * cells**3 * size
+    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * (1e-3 / tolerance) ** 0.6}[method]
+    numbers, _ = reduce_block(block)
+    solves = size if method == "fast" else _count(numbers.exponent, numbers.level)
+    return float(0.01 + each * solves + 2e-3 * size)
 
 
 OUTPUTS = (
@@ -147,6 +167,12 @@ OUTPUTS = (
         default=False,
     ),
     Output("discretisation_error", "1", "error expected of the profile, over d0"),
+    Output("block_contact_radius", "m", "contact radius after every block of load", ("block",), default=False),
+    Output("block_stick_border", "m", "stick radius at the end of every block of load", ("block",), default=False),
+    Output("block_depth", "m", "depth at the end of every block of load", ("block",), default=False),
+    Output("block_normal_force", "N", "normal force at the end of every block of load", ("block",), default=False),
+    Output("block_wear_volume", "m^3", "worn volume after every block of load", ("block",), default=False),
+    Output("block_worn_profile", "m", "worn profile after every block of load", ("block", "radius"), default=False),
 )
 
 MODEL = Model(
@@ -157,7 +183,8 @@ MODEL = Model(
     outputs=OUTPUTS,
     compute=compute,
     seconds=_seconds,
-    whole=("cycles",),
+    whole=("cycles", "path", "wear_coefficient", "hardness"),
     coordinates=_coordinates,
     distinct=_distinct_solutions,
+    units=_units,
 )

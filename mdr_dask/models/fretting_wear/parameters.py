@@ -32,12 +32,19 @@ class LoadStep(Parameters):
 
 
 class FrettingWear(Parameters):
-    """Parameters of fretting wear, dimensionless (`stick_radius`) or dimensional (`amplitude` and the rest)."""
+    """Parameters of fretting wear, dimensionless (no modulus) or dimensional; sliding if a `path` is given."""
 
     shape: Literal["parabola", "cone"] | PowerShape | TableShape = Field("parabola", description="virgin profile")
     method: Literal["limit", "fast", "exact", "literal"] = Field("fast", description="way to the worn profile")
     hold: Literal["depth", "force"] = Field("depth", description="what stays constant while the body wears")
     cycles: float = quantity("1", "number of cycles; N = cycles / N0 in a dimensionless campaign", ge=0, default=1.0)
+    path: float | None = quantity(
+        "m",
+        "sliding path, in place of cycles and amplitude: gross slip in one direction "
+        "(k E* l / (sigma0 a0) in a dimensionless campaign)",
+        ge=0,
+        default=None,
+    )
     stick_radius: float | None = quantity(
         "1", "stick radius c over the first contact radius a0", gt=0, lt=1, default=None
     )
@@ -75,24 +82,46 @@ class FrettingWear(Parameters):
     def _as_tuple(cls, value: object) -> object:
         return tuple(value) if isinstance(value, list) else value
 
+    @property
+    def dimensionless(self) -> bool:
+        """Tell whether lengths are over a0, heights over d0 and so on."""
+        return self.stick_radius is not None or (self.path is not None and self.modulus is None)
+
     @model_validator(mode="after")
     def _one_kind(self) -> FrettingWear:
-        missing = [name for name in self._dimensional() if getattr(self, name) is None]
         given = [name for name in (*self._dimensional(), "load", "depth") if getattr(self, name) is not None]
         if self.stick_radius is not None and given:
             raise ValueError(
                 f"a dimensionless campaign has stick_radius only, got {', '.join(given)} as well; leave one kind out"
             )
-        if self.stick_radius is None and missing:
-            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
-        if self.stick_radius is None and (self.load is None) == (self.depth is None):
-            raise ValueError(f"give either load or depth, got load {self.load!r} and depth {self.depth!r}")
+        if not self.dimensionless:
+            self._check_dimensional()
         if isinstance(self.shape, TableShape) and self.depth is None:
             raise ValueError("a table of a profile needs a dimensional campaign with its depth")
         return self
+
+    @model_validator(mode="after")
+    def _sliding(self) -> FrettingWear:
+        if self.path is None:
+            return self
+        oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
+        given = [name for name in oscillating if getattr(self, name)]
+        if given:
+            raise ValueError(f"a path is sliding in one direction, got {', '.join(given)} of an oscillation as well")
+        if self.method != "exact":
+            raise ValueError(f"sliding along a path has method exact only, got {self.method!r}")
+        return self
+
+    def _check_dimensional(self) -> None:
+        missing = [name for name in self._dimensional() if getattr(self, name) is None]
+        if missing:
+            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
+        if (self.load is None) == (self.depth is None):
+            raise ValueError(f"give either load or depth, got load {self.load!r} and depth {self.depth!r}")
 
     def _dimensional(self) -> tuple[str, ...]:
         size: tuple[str, ...] = ("angle",) if self.shape == "cone" else ("curvature_radius",)
         if isinstance(self.shape, TableShape):
             size = ()
-        return (*size, "modulus", "shear_modulus", "friction", "amplitude", "hardness", "wear_coefficient")
+        oscillating = ("shear_modulus", "friction", "amplitude") if self.path is None else ()
+        return (*size, "modulus", *oscillating, "hardness", "wear_coefficient")

@@ -72,26 +72,32 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
-    """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0."""
+    """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0; sliding has g_c = 0, and s for N."""
     n, normal = _exponents(block), _scatter(block)
+    sliding = block.parameters.path is not None
     amplitude = _factor(block, "amplitude_scatter", normal[:, 1])
     widening = amplitude / _factor(block, "friction_scatter", normal[:, 0])
     advance = amplitude * _factor(block, "wear_coefficient_scatter", normal[:, 2])
+    level = np.zeros_like(advance)
     messages: dict[tuple[int, int], str] = {}
-    if block.parameters.stick_radius is not None or "stick_radius" in block.columns:
-        level = (1.0 - widening) + widening * (_column(block, "stick_radius") ** n)[:, None]
+    if block.parameters.dimensionless:
         length = height = force = np.ones(block.cases)
+        if not sliding:
+            level = (1.0 - widening) + widening * (_column(block, "stick_radius") ** n)[:, None]
     else:
         modulus = _column(block, "modulus")
         length, height = _first_contact(block, n, modulus, messages)
         force = modulus * height * length
-        share = _column(block, "shear_modulus") * _column(block, "amplitude")
-        level = 1.0 - widening * (share / (_column(block, "friction") * modulus * height))[:, None]
-        rate = 4.0 * _column(block, "amplitude") * _column(block, "wear_coefficient") * modulus
+        if not sliding:
+            share = _column(block, "shear_modulus") * _column(block, "amplitude")
+            level = 1.0 - widening * (share / (_column(block, "friction") * modulus * height))[:, None]
+        swept = 1.0 if sliding else 4.0 * _column(block, "amplitude")
+        rate = swept * _column(block, "wear_coefficient") * modulus
         advance = advance * (rate / (length * _column(block, "hardness")))[:, None]
-    columns = (n, _column(block, "cycles"), _column(block, "xi"), length, height, force)
-    n, cycles, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
-    return Numbers(n, level, advance, cycles * advance, xi, length, height, force), messages
+    amount = _column(block, "path" if sliding else "cycles")
+    columns = (n, amount, _column(block, "xi"), length, height, force)
+    n, amount, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
+    return Numbers(n, level, advance, amount * advance, xi, length, height, force), messages
 
 
 def _first_contact(
@@ -141,7 +147,7 @@ def _pressed_table(text: str, depth: float) -> TableProfile:
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:
     """Note every case in which nothing sticks, unless its blocks of load are allowed to slip."""
-    if block.parameters.history or "history" in block.columns:
+    if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):
         eta = 1.0 - numbers.level[case, realisation]

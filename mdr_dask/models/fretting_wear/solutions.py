@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +16,33 @@ from mdr_dask.models.fretting_wear.reduction import Numbers, table_profile
 if TYPE_CHECKING:
     from mdr_dask.physics.revolution import Profile
     from mdr_dask.physics.wear import Worn
+    from mdr_dask.physics.wear_exact import Slid
     from mdr_dask.physics.wear_history import Record
 
+Contact: TypeAlias = "Worn | Slid | Loaded"
 FloatArray = NDArray[np.float64]
 
 
+#: Outputs with a value for every block of a history, and what they are of one contact.
+BLOCK_OUTPUTS = {
+    "block_contact_radius": "contact_radius",
+    "block_stick_border": "stick_border",
+    "block_depth": "depth",
+    "block_normal_force": "normal_force",
+    "block_wear_volume": "wear_volume",
+    "block_worn_profile": "worn_profile",
+}
+
+
 @dataclass(frozen=True)
-class _Task:
+class Loaded:
+    """The contact at the end of every block of load."""
+
+    records: Sequence[Record]
+
+
+@dataclass(frozen=True)
+class Task:
     """What makes a solution that several cases share: everything but the number of cycles and xi."""
 
     shape: object
@@ -44,7 +65,7 @@ def solve_each(
 ) -> int:
     """Solve one task after the other, with all the cycles asked of it."""
     solves = 0
-    for task, wanted in _tasks(block, numbers, status).items():
+    for task, wanted in tasks(block, numbers, status).items():
         try:
             contacts = _contacts(task, list(wanted))
         except (ValueError, ArithmeticError) as problem:
@@ -52,17 +73,23 @@ def solve_each(
             for position in (p for positions in wanted.values() for p in positions):
                 status[position], messages[position] = kind, str(problem)
             continue
-        solves += 1
+        solves += solves_of(task, wanted)
         for positions, contact in zip(wanted.values(), contacts, strict=True):
             _write(block, values, positions, contact)
     return solves
 
 
-def _tasks(
+def solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
+    """Return how many solutions a task takes: one for all cycles if they are moments of one march, or none matter."""
+    marched = task.method == "sliding" or (task.method == "exact" and task.hold == "depth" and not task.blocks)
+    return 1 if marched or task.method == "limit" else len(wanted)
+
+
+def tasks(
     block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
-) -> dict[_Task, dict[tuple[float, float], list[tuple[int, int]]]]:
+) -> dict[Task, dict[tuple[float, float], list[tuple[int, int]]]]:
     """Gather the positions of each task by (N, xi)."""
-    tasks: dict[_Task, dict[tuple[float, float], list[tuple[int, int]]]] = {}
+    tasks: dict[Task, dict[tuple[float, float], list[tuple[int, int]]]] = {}
     for case in range(block.cases):
         parameters = block.case(case)
         for position in range(len(block.realisations)):
@@ -75,8 +102,8 @@ def _tasks(
     return tasks
 
 
-def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) -> _Task:
-    dimensional = parameters.stick_radius is None
+def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) -> Task:
+    dimensional = not parameters.dimensionless
     blocks = tuple(
         (
             step.cycles * float(numbers.advance[place]) * (step.amplitude_factor if dimensional else 1.0),
@@ -86,27 +113,37 @@ def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) ->
         for step in parameters.history
     )
     table = isinstance(parameters.shape, TableShape)
-    return _Task(
+    return Task(
         parameters.shape if table else None,
         float(numbers.height[place]) if table else 1.0,
         0.0 if table else float(numbers.exponent[place]),
         float(numbers.level[place]),
-        parameters.method,
+        "sliding" if parameters.path is not None else parameters.method,
         parameters.hold,
         parameters.tolerance if parameters.method == "exact" else 0.0,
-        parameters.cells if parameters.method == "literal" or parameters.hold == "force" or blocks else 0,
+        parameters.cells if on_grid(parameters) else 0,
         blocks,
     )
 
 
-def _contacts(task: _Task, wanted: list[tuple[float, float]]) -> list[Worn | Record]:
-    """Solve a task for all its (N, xi)."""
+def on_grid(parameters: FrettingWear) -> bool:
+    """Tell whether a case is solved on the uniform grid."""
+    loaded = parameters.hold == "force" or bool(parameters.history)
+    return parameters.path is None and (parameters.method == "literal" or loaded)
+
+
+def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact]:
+    """Solve a task for all its (N, xi), or all paths of sliding."""
     from mdr_dask.physics import wear
     from mdr_dask.physics.revolution import PowerProfile
-    from mdr_dask.physics.wear_exact import exact
+    from mdr_dask.physics.wear_exact import exact, gross
     from mdr_dask.physics.wear_literal import literal
 
     profile = PowerProfile(task.exponent) if task.shape is None else table_profile(task.shape, task.depth)
+    if task.method == "sliding":
+        return gross(
+            profile, [path for path, _ in wanted], constant_force=task.hold == "force", tolerance=task.tolerance
+        )
     if task.blocks or task.hold == "force":
         return [_loaded(task, profile, cycles) for cycles, _ in wanted]
     stick = profile.inside(task.level)
@@ -119,7 +156,7 @@ def _contacts(task: _Task, wanted: list[tuple[float, float]]) -> list[Worn | Rec
     return [literal(profile, stick, cycles, cells=task.cells) for cycles, _ in wanted]
 
 
-def _loaded(task: _Task, profile: Profile, cycles: float) -> Record:
+def _loaded(task: Task, profile: Profile, cycles: float) -> Loaded:
     """Run the blocks of a history, or one block at constant force."""
     from mdr_dask.physics.transforms import gauss
     from mdr_dask.physics.wear_history import LoadBlock, history
@@ -141,14 +178,14 @@ def _loaded(task: _Task, profile: Profile, cycles: float) -> Record:
         for path, amplitude, factor in (task.blocks or ((cycles, 1.0, 1.0),))
     ]
     deepest = max(block.depth or 1.0 for block in blocks) if task.hold == "depth" else 2.0
-    return history(profile, blocks, cells=task.cells, reach=min(1.7 * deepest, profile.largest_radius))[-1]
+    return Loaded(history(profile, blocks, cells=task.cells, reach=min(1.7 * deepest, profile.largest_radius)))
 
 
 def _write(
     block: Block[FrettingWear],
     values: dict[str, FloatArray],
     positions: list[tuple[int, int]],
-    contact: Worn | Record,
+    contact: Contact,
 ) -> None:
     """Write one solution to every case that shares it, dimensionless."""
     places = axes(block.parameters)
@@ -158,28 +195,30 @@ def _write(
             array[position] = answer
 
 
-def _answer(contact: Worn | Record, name: str, x: FloatArray) -> float | FloatArray:
-    """Return one output of a solution."""
-    from mdr_dask.physics.wear import Worn
+def _answer(contact: Contact, name: str, x: FloatArray) -> float | FloatArray:
+    """Return one output of a solution; those of the blocks of a history have a row for each block."""
+    records = contact.records if isinstance(contact, Loaded) else (contact,)
+    if name in BLOCK_OUTPUTS:
+        return np.array([_of_one(record, BLOCK_OUTPUTS[name], x) for record in records])
+    return _of_one(records[-1], name, x)
 
+
+def _of_one(contact: Worn | Record | Slid, name: str, x: FloatArray) -> float | FloatArray:
+    from mdr_dask.physics.wear import Worn
+    from mdr_dask.physics.wear_exact import Slid
+
+    plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
+    if name not in {"worn_profile", "worn_image", "pressure", "worn_depth"}:
+        return float(getattr(contact, plain, 1.0))  # what has no depth of its own keeps the first one
     if isinstance(contact, Worn):
-        if name == "worn_profile":
-            return contact.height(x)
-        if name == "worn_image":
-            return contact.image(x)
-        if name == "pressure":
-            return contact.pressure(x)
-        if name == "worn_depth":
-            return contact.worn_depth()
-        plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
-        return float(getattr(contact, plain))
-    fields = {"worn_profile": contact.height, "worn_image": contact.image, "pressure": contact.pressure}
-    if name in fields:
-        return np.asarray(np.interp(x, contact.radius, fields[name], right=np.nan))
+        functions = {"worn_profile": contact.height, "worn_image": contact.image, "pressure": contact.pressure}
+        return contact.worn_depth() if name == "worn_depth" else functions[name](x)
     if name == "worn_depth":
         return contact.worn_depth
-    plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
-    return float(getattr(contact, plain))
+    field = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}[name]
+    if isinstance(contact, Slid):
+        return contact.curve(field, x)
+    return np.asarray(np.interp(x, contact.radius, getattr(contact, field), right=np.nan))
 
 
 def axes(parameters: FrettingWear) -> FloatArray:
