@@ -39,8 +39,15 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     return slope
 
 
+def _require_kelvin(data: xr.Dataset) -> None:
+    missing = [name for name in ("shear_modulus", "relaxation_time", "rms_roughness", "length") if name not in data]
+    if missing:
+        raise FitError(f"the laws hold for a Kelvin body on a generated line: the store has no {', '.join(missing)}")
+
+
 def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+    _require_kelvin(data)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
@@ -237,6 +244,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
+    _require_kelvin(data)
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
     width = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
