@@ -194,6 +194,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
     states = status.reshape(work.block.cases, -1)
     messages = [
         {
+            "place": _place(work, case, number),
             "case": _describe(work.block, case),
             "realisation": work.block.realisations[number],
             "status": Status(states[case, number]).name.lower(),
@@ -211,6 +212,14 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
         "process": os.getpid(),
         "solves": result.solves,
     }
+
+
+def _place(work: Work, case: int, number: int) -> list[int]:
+    """Return where a result of a block stands in the ledger."""
+    region = work.place.region
+    shape = [part.stop - part.start for part in region]
+    inside = [int(offset) for offset in np.unravel_index(case, shape[:-1])] if len(shape) > 1 else []
+    return [part.start + offset for part, offset in zip(region, [*inside, number], strict=True)]
 
 
 def _describe(block: Block[Any], case: int) -> dict[str, Any]:

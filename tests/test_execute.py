@@ -279,3 +279,12 @@ def test_a_store_in_memory_works_like_one_on_disk(toy):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
     assert run(campaign, "memory://study.zarr").done == 12
     assert run(campaign, "memory://study.zarr").kept == 12
+
+
+def test_a_message_stands_where_its_result_does_in_the_ledger(toy, url):
+    campaign = toy.campaign(toy.axis("position", [1.0, 3.0]), toy.axis("slope", [1.0, 2.0]), fail_above=2.5)
+    run(replace(campaign, blocks={"position": 1, "realisation": 2}), url)
+    ledger = store.ledger(url, "", (2, 2, 6))
+    places = {tuple(message["place"]) for record in store.records(url, "") for message in record["messages"]}
+    assert places == {tuple(place) for place in np.argwhere(ledger == Status.FAILED).tolist()}
+    assert len(places) == 12

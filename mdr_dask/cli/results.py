@@ -29,8 +29,9 @@ limit_option = click.option("--limit", default=40, show_default=True, help="Most
 @click.command()
 @store_argument
 @click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
+@click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
 @json_option
-def status(store: str, failures: bool, form: str | None) -> None:
+def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
     """Say how far a store is, while it is being filled too.
 
     \b
@@ -40,20 +41,22 @@ def status(store: str, failures: bool, form: str | None) -> None:
     from mdr_dask import store as room
 
     groups = room.datasets(store)
-    rows = [_count(name, dataset) for name, dataset in groups.items()]
-    if not failures:
-        print_rows(rows, {}, form or "table")
+    if not (failures or messages):
+        print_rows([_count(name, dataset) for name, dataset in groups.items()], {}, form or "table")
         return
-    found = [message for name in groups for record in room.records(store, name) for message in _told(name, record)]
+    found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
+    if not messages:
+        found = [message for message in found if message["status"] != "done"]
     if form == "json":
         print_json(found)
         return
-    for reason in dict.fromkeys(message["message"] for message in found):
-        alike = [message for message in found if message["message"] == reason]
-        click.echo(f"{len(alike)} x {alike[0]['status']}: {reason}")
+    for series, reason in dict.fromkeys((message["series"], message["message"]) for message in found):
+        alike = [message for message in found if (message["series"], message["message"]) == (series, reason)]
+        kind = "warning" if alike[0]["status"] == "done" else alike[0]["status"]
+        click.echo(f"{series + ': ' if series else ''}{len(alike)} x {kind}: {reason}")
         click.echo(f"    {_shared(alike)}")
     if not found:
-        click.echo("no failures")
+        click.echo("no failures" if not messages else "no messages")
 
 
 def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:
@@ -64,8 +67,17 @@ def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:
     return {"series": name or "-", "results": states.size, **counts}
 
 
-def _told(series: str, record: dict[str, Any]) -> list[dict[str, Any]]:
-    return [{"series": series, "attempt": record["attempt"], **message} for message in record["messages"]]
+def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
+    """Return what still holds of the messages of a group: the last attempt's, where the ledger says the same."""
+    from mdr_dask import store as room
+    from mdr_dask.models.base import Status
+
+    last: dict[tuple[int, ...], dict[str, Any]] = {}
+    for record in sorted(room.records(store, series), key=lambda record: record["attempt"]):
+        for message in record["messages"]:
+            last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
+    ledger = room.ledger(store, series, dataset["status"].shape)
+    return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
 
 
 def _shared(messages: list[dict[str, Any]]) -> str:
