@@ -9,24 +9,19 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from mdr_dask.physics.kinetics_kernels import (
-    BLOCK,
-    CANDIDATES,
+from mdr_dask.physics.kinetics_kernels import BLOCK, CANDIDATES, WINDOWS, block_least, touch
+from mdr_dask.physics.kinetics_march import Pace, march
+from mdr_dask.physics.kinetics_profile import (
     DRAG,
     LENGTH,
     LOAD,
     STIFFNESS,
     SUMS,
-    WINDOWS,
     Course,
-    Pace,
     Patches,
     Profile,
-    block_least,
     height_at,
-    march,
     released,
-    touch,
 )
 from mdr_dask.physics.sliding import INVALID as STEADY_INVALID
 from mdr_dask.physics.sliding import steady_sliding
@@ -144,7 +139,21 @@ def _settle(
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1, 0.0), np.inf, reach, start, end, sums, places, spreads)
+        found = touch(
+            profile,
+            runs,
+            floor,
+            least,
+            none,
+            Course(moment, at, rate, 1, 0.0),
+            np.inf,
+            reach,
+            start,
+            end,
+            sums,
+            places,
+            spreads,
+        )
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
@@ -309,7 +318,9 @@ def velocity_jumps(
         change = float(depths[k, 1] - depths[k, 0])
         pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
         ends = float(resolutions[k]), equilibrium
-        jump = _relax(profile, float(loads[k]), tuple(reaches[k]), depths[k] + top, times, pace, ends)
+        jump = _relax(
+            profile, float(loads[k]), (float(reaches[k, 0]), float(reaches[k, 1])), depths[k] + top, times, pace, ends
+        )
         jumps.append(jump._replace(depth=jump.depth - top))
     return jumps
 
