@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,6 +13,7 @@ from pydantic import Field, model_validator
 
 from mdr_dask.models import general_sliding
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.indenter import Indenter, Plane
 from mdr_dask.models.material import Material
 from mdr_dask.models.profile_file import ProfileFile
 
@@ -31,49 +31,6 @@ CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
-
-
-class Plane(Parameters):
-    """A nominally flat body: the rough line alone, periodic."""
-
-    shape: Literal["plane"] = "plane"
-
-
-class Cone(Parameters):
-    """A cone, rough or smooth."""
-
-    shape: Literal["cone"]
-    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
-
-    def power_law(self) -> tuple[float, float]:
-        """Return coefficient and exponent of the body c r^n."""
-        return math.tan(self.angle), 1.0
-
-
-class Parabola(Parameters):
-    """A paraboloid, which stands for a sphere."""
-
-    shape: Literal["parabola"]
-    radius: float = quantity("m", "radius of curvature R at the apex", gt=0)
-
-    def power_law(self) -> tuple[float, float]:
-        """Return coefficient and exponent of the body c r^n."""
-        return 1 / (2 * self.radius), 2.0
-
-
-class Power(Parameters):
-    """A body of revolution c r^n."""
-
-    shape: Literal["power"]
-    exponent: float = quantity("1", "exponent n of the body c r^n", ge=1, le=100)
-    coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
-
-    def power_law(self) -> tuple[float, float]:
-        """Return coefficient and exponent of the body c r^n."""
-        return self.coefficient, self.exponent
-
-
-Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
 
 
 class SlidingFriction(Parameters):

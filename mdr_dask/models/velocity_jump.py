@@ -6,16 +6,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from numpy.typing import NDArray
+from pydantic import Field, field_validator, model_validator
 
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Coordinate, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.indenter import Indenter, Plane
+from mdr_dask.models.material import Material, solid_of
+from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.kinetics import Jump
+    from mdr_dask.physics.kinetics import Jump as Relaxation
+    from mdr_dask.physics.protocol_kernels import Line
 
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 SECONDS_NODE, SECONDS_MOMENT = 8e-8, 3.5e-8  # for every node of a line, and of a moment
 MOMENTS = 60
+SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of the line
 
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
@@ -35,11 +42,18 @@ class VelocityJump(Parameters):
         "m", "wavelength above which the spectrum is constant", default=None, gt=0
     )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    shear_modulus: float = quantity("Pa", "static shear modulus G of the incompressible Kelvin body", gt=0)
-    relaxation_time: float = quantity("s", "relaxation time tau = eta / G of the Kelvin body", gt=0)
+    shear_modulus: float | None = quantity(
+        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+    )
+    relaxation_time: float | None = quantity(
+        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+    )
+    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
     normal_force: float = quantity("N", "normal force F_N", gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
+    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
+    protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
         "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
     )
@@ -55,7 +69,16 @@ class VelocityJump(Parameters):
     def _changes(self) -> VelocityJump:
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
+        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
+        either = self.shear_modulus is not None or self.relaxation_time is not None
+        if (self.material is None and not kelvin) or (self.material is not None and either):
+            raise ValueError("expected shear_modulus with relaxation_time, or material")
         return self
+
+    @property
+    def is_general(self) -> bool:
+        """Whether it is beyond one jump of a Kelvin body on a periodic line."""
+        return self.material is not None or self.indenter.shape != "plane" or self.protocol.shape != "jump"
 
 
 OUTPUTS = (
@@ -63,10 +86,12 @@ OUTPUTS = (
     Output("friction_coefficient_jump", "1", "immediate change d_mu_0 of the coefficient of friction"),
     Output("friction_coefficient_after", "1", "coefficient of friction mu_2, steady at v_2"),
     Output("friction_coefficient", "1", "coefficient of friction after the jump", ("relaxation_times",)),
+    Output("indentation_depth", "m", "penetration of the mean line", ("relaxation_times",), False),
     Output("rms_slope", "1", "spectral rms slope of the line"),
     Output("discretisation_error", "1", "estimated error of the relaxing part mu - mu_2 over mu_2"),
 )
-FROM_JUMP = frozenset(output.name for output in OUTPUTS) - {"rms_slope"}
+FROM_JUMP = frozenset(output.name for output in OUTPUTS) - {"rms_slope", "indentation_depth"}
+FROM_JUMP_OR_LINE = FROM_JUMP | {"rms_slope"}
 
 
 @dataclass(frozen=True)
@@ -102,6 +127,8 @@ def _canonical(number: float) -> float:
 
 
 def _case(case: VelocityJump) -> _Case:
+    assert case.shear_modulus is not None
+    assert case.relaxation_time is not None
     return _Case(
         case.hurst,
         case.points,
@@ -118,7 +145,7 @@ def _case(case: VelocityJump) -> _Case:
 
 def _solve(
     cases: list[_Case], height: FloatArray, slope: FloatArray, resolution: FloatArray, coarser: bool
-) -> list[Jump]:
+) -> list[Relaxation]:
     """Solve the cases of one line on the nodes given, or on every other one with half as many steps."""
     from mdr_dask.physics.kinetics import velocity_jumps
 
@@ -136,15 +163,40 @@ def _solve(
     )
 
 
-def _error(fine: Jump, coarse: Jump) -> float:
+def _error(fine: Relaxation, coarse: Relaxation) -> float:
     """Return the largest difference of the relaxing parts over the final friction."""
     parts = [np.append(jump.trace, jump.at) - jump.after for jump in (fine, coarse)]
     return float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
 
 
+def _jumps(
+    cases: list[_Case], amplitude: FloatArray, block: Block[VelocityJump], realisation: int
+) -> tuple[list[int], list[dict[str, float | FloatArray]]]:
+    """Return status and outputs, in units of the line, of every case of a line in one realisation."""
+    from mdr_dask.physics import kinetics, roughness
+
+    slope_rms = roughness.spectral_slope(amplitude)
+    found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
+    if not FROM_JUMP.intersection(block.outputs):
+        return [kinetics.CONVERGED] * len(cases), found
+    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+    nodes = cases[0].points * cases[0].oversampling
+    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+    resolution = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
+    resolutions = resolution * slope_rms * np.array([case.load for case in cases])
+    jumps = _solve(cases, *line, resolutions, False)
+    for case, jump, row in zip(cases, jumps, found, strict=True):
+        row |= _outputs(case, jump)
+    if "discretisation_error" in block.outputs:
+        coarse = _solve(cases, *line, 0 * resolutions, True)
+        for fine, other, row in zip(jumps, coarse, found, strict=True):
+            row["discretisation_error"] = _error(fine, other)
+    return [jump.status for jump in jumps], found
+
+
 def compute(block: Block[VelocityJump]) -> Result:
     """Solve the cases of a block, each different one once a realisation."""
-    from mdr_dask.physics import kinetics, roughness
+    from mdr_dask.physics import kinetics
 
     shape = (block.cases, len(block.realisations))
     times = len(block.parameters.relaxation_times)
@@ -154,10 +206,11 @@ def compute(block: Block[VelocityJump]) -> Result:
     solves = 0
     parameters = [block.case(j) for j in range(block.cases)]
     scales = [case.rms_roughness / case.length for case in parameters]
-    resolution = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
     groups: dict[_Case, list[int]] = {}
+    apart = [j for j, case in enumerate(parameters) if case.is_general or "indentation_depth" in block.outputs]
     for j, parameter in enumerate(parameters):
-        groups.setdefault(_case(parameter), []).append(j)
+        if not parameter.is_general:
+            groups.setdefault(_case(parameter), []).append(j)
     lines: dict[tuple[object, ...], list[_Case]] = {}
     for case in groups:
         lines.setdefault(case.line(), []).append(case)
@@ -168,35 +221,116 @@ def compute(block: Block[VelocityJump]) -> Result:
             except ValueError as problem:
                 messages.update({(j, r): str(problem) for case in cases for j in groups[case]})
                 continue
-            slope_rms = roughness.spectral_slope(amplitude)
-            states = [kinetics.CONVERGED] * len(cases)
-            found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
-            if FROM_JUMP.intersection(block.outputs):
-                phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
-                nodes = cases[0].points * cases[0].oversampling
-                line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
-                resolutions = resolution * slope_rms * np.array([case.load for case in cases])
-                jumps = _solve(cases, *line, resolutions, False)
-                solves += len(cases)
-                states = [jump.status for jump in jumps]
-                for case, jump, row in zip(cases, jumps, found, strict=True):
-                    row |= _outputs(case, jump)
-                if "discretisation_error" in block.outputs:
-                    coarse = _solve(cases, *line, 0 * resolutions, True)
-                    for fine, other, row in zip(jumps, coarse, found, strict=True):
-                        row["discretisation_error"] = _error(fine, other)
+            states, found = _jumps(cases, amplitude, block, realisation)
+            solves += len(cases) if FROM_JUMP.intersection(block.outputs) else 0
             for case, state, row in zip(cases, states, found, strict=True):
                 for j in groups[case]:
                     status[j, r] = STATUS[state]
                     if state:
                         messages[j, r] = kinetics.MESSAGES[state]
-                    for name in block.outputs if state == kinetics.CONVERGED else ():
+                    for name in FROM_JUMP_OR_LINE.intersection(block.outputs) if state == kinetics.CONVERGED else ():
                         scale = 1.0 if name == "discretisation_error" else scales[j]
                         values[name][j, r] = row[name] * scale
+        for j in apart:
+            _follow(parameters[j], block, (j, r), values, status, messages)
+            solves += 1
     return Result(values, status, messages, solves)
 
 
-def _outputs(case: _Case, jump: Jump) -> dict[str, float | FloatArray]:
+def _follow(
+    case: VelocityJump,
+    block: Block[VelocityJump],
+    place: tuple[int, int],
+    values: dict[str, FloatArray],
+    status: NDArray[np.int8],
+    messages: dict[tuple[int, int], str],
+) -> None:
+    """Write what following every element gives: all outputs, or the depth alone beside the quick solution of a jump."""
+    from mdr_dask.physics import roughness
+
+    found, code, sentence = _along(case, roughness.phases(block.seed, block.realisations[place[1]], case.points // 2))
+    if case.is_general or code != Status.DONE:
+        status[place] = code
+    if sentence:
+        messages[place] = sentence
+    for name in block.outputs if case.is_general else ("indentation_depth",):
+        values[name][place] = found.get(name, np.nan)
+
+
+def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | FloatArray], int, str]:
+    """Follow a line through a course; return outputs, status and a sentence where it fails."""
+    from mdr_dask.physics import roughness
+    from mdr_dask.physics.protocol import foundation
+    from mdr_dask.physics.protocol_kernels import CONVERGED, NOT_CONVERGED
+
+    try:
+        amplitude = _amplitudes(case)
+        static, moduli, relaxation, viscosity = _solid(case)
+        course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+        unit = max([viscosity / static, *relaxation])
+        solid = foundation(np.array(moduli) / static, np.array(relaxation) / unit, viscosity / static / unit)
+    except (DataError, ValueError) as problem:
+        return {}, Status.FAILED, str(problem)
+    scale = Scale(unit, case.length, 4 * static * case.length * case.rms_roughness)
+    nodes, times = case.points * case.oversampling, np.array(case.relaxation_times)
+    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    found: list[Trace] = []
+    for every in (1, 2):
+        line = _under(case, height[::every], slope[::every])
+        found.append(trace(line, solid, course, case.normal_force, scale, times, case.steps_per_decade / every))
+        if found[-1].status != CONVERGED:
+            status = Status.NOT_CONVERGED if found[-1].status == NOT_CONVERGED else Status.FAILED
+            return {}, status, found[-1].message
+    fine, coarse = found
+    steep = case.rms_roughness / case.length
+    load = case.normal_force / scale.force
+    largest = max(float(np.max(np.abs(fine.drag))), 1e-300)
+    return (
+        {
+            "friction_coefficient_before": fine.before / load * steep,
+            "friction_coefficient_jump": (fine.at / fine.load_at - fine.before / load) * steep,
+            "friction_coefficient_after": fine.after * steep,
+            "friction_coefficient": fine.drag / fine.load * steep,
+            "indentation_depth": fine.depth * case.rms_roughness,
+            "rms_slope": roughness.spectral_slope(amplitude) * steep,
+            "discretisation_error": float(np.max(np.abs(fine.drag - coarse.drag))) / largest,
+        },
+        Status.DONE,
+        "",
+    )
+
+
+def _amplitudes(case: VelocityJump) -> FloatArray:
+    from mdr_dask.physics import roughness
+
+    rolloff = case.length / case.rolloff_wavelength if case.rolloff_wavelength else 0.0
+    longest = case.length / case.longest_wavelength if case.longest_wavelength else 0.0
+    return roughness.amplitudes(case.points // 2, case.hurst, rolloff, longest)
+
+
+def _solid(case: VelocityJump) -> tuple[float, tuple[float, ...], tuple[float, ...], float]:
+    """Return static modulus, moduli and times of the arms, and viscosity, in SI."""
+    if case.material is None:
+        assert case.shear_modulus is not None
+        assert case.relaxation_time is not None
+        return case.shear_modulus, (), (), case.shear_modulus * case.relaxation_time
+    solid = solid_of(case.material)
+    return solid.static_modulus, tuple(solid.moduli), tuple(solid.times), solid.viscosity
+
+
+def _under(case: VelocityJump, height: FloatArray, slope: FloatArray) -> Line:
+    """Return the line in units of its length and the rms height, with the indenter."""
+    from mdr_dask.physics.indenter import mapped
+    from mdr_dask.physics.protocol import closed_line, indented_line
+
+    if case.indenter.shape == "plane":
+        return closed_line(height, slope)
+    coefficient, exponent = case.indenter.power_law()
+    steep = mapped(exponent) * coefficient * case.length**exponent / case.rms_roughness
+    return indented_line(np.append(height, height[0]), np.append(slope, slope[0]), steep, exponent)
+
+
+def _outputs(case: _Case, jump: Relaxation) -> dict[str, float | FloatArray]:
     """Return the coefficients of friction of a line of unit slope h / L."""
     return {
         "friction_coefficient_before": jump.before / case.load,
@@ -211,7 +345,9 @@ STATUS = (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)
 
 def distinct(block: Block[VelocityJump]) -> int:
     """Return how many different cases a block holds, over all realisations."""
-    return len({_case(block.case(j)) for j in range(block.cases)}) * len(block.realisations)
+    cases = [block.case(j) for j in range(block.cases)]
+    alone = sum(case.is_general for case in cases)
+    return (len({_case(case) for case in cases if not case.is_general}) + alone) * len(block.realisations)
 
 
 def seconds(block: Block[VelocityJump]) -> float:
@@ -220,6 +356,8 @@ def seconds(block: Block[VelocityJump]) -> float:
     per_case = float(np.mean(nodes)) * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS)
     if "discretisation_error" in block.outputs:
         per_case *= 1.4
+    if any(block.case(j).is_general for j in range(block.cases)):
+        per_case = float(np.mean(nodes**2)) * SECONDS_STEPPED
     return distinct(block) * per_case + 1e-3
 
 

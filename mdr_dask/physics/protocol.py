@@ -219,10 +219,11 @@ def follow_line(
     -------
     Response
     """
-    now = State(*(part.copy() for part in state))
+    now = State(state.displacement.copy(), state.arms.copy(), state.free.copy(), state.touching.copy())
     out = np.full((ROWS, moments.size), np.nan)
     status = follow_elements(solid, line, moments, travels, reaches, loads, now, depth, out)
-    return Response(*out, now.displacement, status, now)
+    drag, depths, rate, contact, stored, work, lost = out
+    return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, status, now)
 
 
 def follow(

@@ -92,7 +92,7 @@ def _fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray
 def _fly(solid: Foundation, u: float, arms: FloatArray, decay: FloatArray, modes: FloatArray) -> float:
     """Let an element recover without force; `arms` is overwritten."""
     if arms.size == 0:
-        return u * decay[0]
+        return float(u * decay[0])
     extra = 1 if solid.viscosity > 0 else 0
     count = solid.rates.size
     for k in range(count):
@@ -159,10 +159,10 @@ def stored(solid: Foundation, u: float, arms: FloatArray) -> float:
 @njit(nogil=True, cache=True)
 def _pull(solid: Foundation, u: float, arms: FloatArray) -> float:
     """Return the force of springs and arms."""
-    force = u
+    force = 1.0 * u
     for m in range(arms.size):
         force += solid.moduli[m] * (u - arms[m])
-    return force
+    return float(force)
 
 
 @njit(nogil=True, cache=True)
@@ -344,9 +344,10 @@ def _balance(
     first: int,
 ) -> tuple[float, float, float]:
     """Return the rate of the depth that carries the load (of a dashpot), drag and fraction in contact."""
+    plain = solid.times.size == 0
     for j in range(under.size):
         gaps[j] = depth + under[j] - state.free[j]
-        pulls[j] = _pull(solid, depth + under[j], state.arms[j])
+        pulls[j] = depth + under[j] if plain else _pull(solid, depth + under[j], state.arms[j])
     carried, drag, length = _forces(gaps, pulls, slope, solid.viscosity, rate, reach, first)
     if solid.viscosity == 0:
         return rate, drag, length
@@ -363,13 +364,15 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     """Return the mean displacement that the course of the load decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
     count, arms = solid.rates.size, solid.times.size
-    modes[:] = 0.0
-    for j in range(n):
+    inward, strain, mean = solid.inward, state.arms, state.displacement.sum() / n
+    for k in range(count):
+        modes[k] = inward[k, 0] * mean if extra else 0.0
+    for m in range(arms):
+        total = 0.0
+        for j in range(n):
+            total += strain[j, m]
         for k in range(count):
-            if extra:
-                modes[k] += solid.inward[k, 0] * state.displacement[j] / n
-            for m in range(arms):
-                modes[k] += solid.inward[k, m + extra] * state.arms[j, m] / n
+            modes[k] += inward[k, m + extra] * total / n
     for k in range(count):
         z = solid.rates[k] * step
         one = -np.expm1(-z) / z
@@ -438,6 +441,8 @@ def follow_elements(
     gaps, pulls, parts = np.empty(n), np.empty(n), np.empty(n)
     decay, fades, modes = np.empty(solid.rates.size), np.empty(solid.times.size), np.empty(solid.rates.size)
     shift = under_elements(line, travels[0], under, grade)
+    u, arms, free, touching = state.displacement, state.arms, state.free, state.touching
+    plain, damping = solid.times.size == 0, solid.viscosity
     rate, work, lost = 0.0, 0.0, 0.0
     if solid.viscosity == 0:
         depth, work, good = _instant(solid, state, under, loads[0], depth)
@@ -456,41 +461,51 @@ def follow_elements(
             depth += rate * step
             for j in range(n):
                 parts[j] = 0.0
-                state.free[j] = _flight(
-                    solid, state.displacement[j], state.arms[j], 0.0, 0.0, 0.0, step, decay, scratch
-                )
+                free[j] = u[j] * decay[0] if plain else _flight(solid, u[j], arms[j], 0, 0, 0, step, decay, scratch)
             for _ in range(CORRECTIONS):
-                depth, good = depth_for(under, state.free, mean, depth)
+                depth, good = depth_for(under, free, mean, depth)
                 if not good:
                     return NOT_CONVERGED
                 for j in range(n):
-                    if state.touching[j]:
-                        w0, w1 = state.displacement[j], depth + under[j]
-                        parts[j] = _release(solid, w0, w1, state.arms[j], step, fades, scratch.arms)
+                    if touching[j]:
+                        w0, w1 = u[j], depth + under[j]
+                        push = damping * (w1 - w0) / step
+                        if plain and w0 + push > 0 and w1 + push >= 0:
+                            parts[j], free[j] = 1.0, w0 * decay[0]
+                            continue
+                        parts[j] = _release(solid, w0, w1, arms[j], step, fades, scratch.arms)
                         part = parts[j] if parts[j] < 1 else 0.0
-                        state.free[j] = _flight(solid, w0, state.arms[j], part, w0, w1, step, decay, scratch)
-            depth, good = depth_for(under, state.free, mean, depth)
+                        free[j] = _flight(solid, w0, arms[j], part, w0, w1, step, decay, scratch)
+            depth, good = depth_for(under, free, mean, depth)
             if not good:
                 return NOT_CONVERGED
             for j in range(n):
                 w0, w1 = old_depth + below[j], depth + under[j]
-                u, touching, done, gone = advance(
-                    solid,
-                    state.displacement[j],
-                    state.arms[j],
-                    state.touching[j],
-                    parts[j],
-                    state.free[j],
-                    w0,
-                    w1,
-                    step,
-                    decay,
-                    fades,
-                    scratch,
-                )
-                state.displacement[j], state.touching[j] = u, touching
-                work += done / n
-                lost += gone / n
+                if plain and not touching[j] and w1 <= free[j]:
+                    lost += 0.5 * (u[j] * u[j] - free[j] * free[j]) / n
+                    u[j] = free[j]
+                elif plain and touching[j] and w1 > free[j]:
+                    gone = damping * (w1 - u[j]) ** 2 / step
+                    work += (0.5 * (w1 * w1 - u[j] * u[j]) + gone) / n
+                    lost += gone / n
+                    u[j] = w1
+                else:
+                    u[j], touching[j], done, gone = advance(
+                        solid,
+                        u[j],
+                        arms[j],
+                        touching[j],
+                        parts[j],
+                        free[j],
+                        w0,
+                        w1,
+                        step,
+                        decay,
+                        fades,
+                        scratch,
+                    )
+                    work += done / n
+                    lost += gone / n
             if solid.viscosity == 0:
                 rate = (depth - old_depth) / step
         first = -1 if line.periodic else (-shift) % n
@@ -501,7 +516,7 @@ def follow_elements(
         )
         energy = 0.0
         for j in range(n):
-            energy += stored(solid, state.displacement[j], state.arms[j]) / n
+            energy += (0.5 * u[j] * u[j] if plain else stored(solid, u[j], arms[j])) / n
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, depth, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = energy, work, lost
     return CONVERGED

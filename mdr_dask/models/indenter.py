@@ -1,0 +1,54 @@
+"""Indenters as a campaign names them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from mdr_dask.models.base import Parameters, quantity
+
+
+class Plane(Parameters):
+    """A nominally flat body: the rough line alone, periodic."""
+
+    shape: Literal["plane"] = "plane"
+
+
+class Cone(Parameters):
+    """A cone, rough or smooth."""
+
+    shape: Literal["cone"]
+    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return math.tan(self.angle), 1.0
+
+
+class Parabola(Parameters):
+    """A paraboloid, which stands for a sphere."""
+
+    shape: Literal["parabola"]
+    radius: float = quantity("m", "radius of curvature R at the apex", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return 1 / (2 * self.radius), 2.0
+
+
+class Power(Parameters):
+    """A body of revolution c r^n."""
+
+    shape: Literal["power"]
+    exponent: float = quantity("1", "exponent n of the body c r^n", ge=1, le=100)
+    coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        return self.coefficient, self.exponent
+
+
+Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
