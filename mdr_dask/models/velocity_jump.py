@@ -144,7 +144,7 @@ def _error(fine: Jump, coarse: Jump) -> float:
 
 def compute(block: Block[VelocityJump]) -> Result:
     """Solve the cases of a block, each different one once a realisation."""
-    from mdr_dask.physics import kinetics, roughness
+    from mdr_dask.physics import kinetics
 
     shape = (block.cases, len(block.realisations))
     times = len(block.parameters.relaxation_times)
@@ -154,7 +154,6 @@ def compute(block: Block[VelocityJump]) -> Result:
     solves = 0
     parameters = [block.case(j) for j in range(block.cases)]
     scales = [case.rms_roughness / case.length for case in parameters]
-    resolution = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
     groups: dict[_Case, list[int]] = {}
     for j, parameter in enumerate(parameters):
         groups.setdefault(_case(parameter), []).append(j)
@@ -164,27 +163,11 @@ def compute(block: Block[VelocityJump]) -> Result:
     for r, realisation in enumerate(block.realisations):
         for cases in lines.values():
             try:
-                amplitude = cases[0].amplitudes()
+                states, found = _line_results(block, cases, realisation)
             except ValueError as problem:
                 messages.update({(j, r): str(problem) for case in cases for j in groups[case]})
                 continue
-            slope_rms = roughness.spectral_slope(amplitude)
-            states = [kinetics.CONVERGED] * len(cases)
-            found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
-            if FROM_JUMP.intersection(block.outputs):
-                phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
-                nodes = cases[0].points * cases[0].oversampling
-                line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
-                resolutions = resolution * slope_rms * np.array([case.load for case in cases])
-                jumps = _solve(cases, *line, resolutions, False)
-                solves += len(cases)
-                states = [jump.status for jump in jumps]
-                for case, jump, row in zip(cases, jumps, found, strict=True):
-                    row |= _outputs(case, jump)
-                if "discretisation_error" in block.outputs:
-                    coarse = _solve(cases, *line, 0 * resolutions, True)
-                    for fine, other, row in zip(jumps, coarse, found, strict=True):
-                        row["discretisation_error"] = _error(fine, other)
+            solves += len(cases) if FROM_JUMP.intersection(block.outputs) else 0
             for case, state, row in zip(cases, states, found, strict=True):
                 for j in groups[case]:
                     status[j, r] = STATUS[state]
@@ -194,6 +177,31 @@ def compute(block: Block[VelocityJump]) -> Result:
                         scale = 1.0 if name == "discretisation_error" else scales[j]
                         values[name][j, r] = row[name] * scale
     return Result(values, status, messages, solves)
+
+
+def _line_results(
+    block: Block[VelocityJump], cases: list[_Case], realisation: int
+) -> tuple[list[int], list[dict[str, float | FloatArray]]]:
+    """Return status and outputs of the cases of one line, for unit slope h / L."""
+    from mdr_dask.physics import kinetics, roughness
+
+    amplitude = cases[0].amplitudes()
+    slope_rms = roughness.spectral_slope(amplitude)
+    found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
+    if not FROM_JUMP.intersection(block.outputs):
+        return [kinetics.CONVERGED] * len(cases), found
+    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+    nodes = cases[0].points * cases[0].oversampling
+    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+    accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
+    resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
+    jumps = _solve(cases, *line, resolutions, False)
+    for case, jump, row in zip(cases, jumps, found, strict=True):
+        row |= _outputs(case, jump)
+    if "discretisation_error" in block.outputs:
+        for fine, coarse, row in zip(jumps, _solve(cases, *line, 0 * resolutions, True), found, strict=True):
+            row["discretisation_error"] = _error(fine, coarse)
+    return [jump.status for jump in jumps], found
 
 
 def _outputs(case: _Case, jump: Jump) -> dict[str, float | FloatArray]:
@@ -206,7 +214,7 @@ def _outputs(case: _Case, jump: Jump) -> dict[str, float | FloatArray]:
     }
 
 
-STATUS = (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)
+STATUS = (Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.NOT_CONVERGED)
 
 
 def distinct(block: Block[VelocityJump]) -> int:
