@@ -17,8 +17,8 @@ from mdr_dask.physics.backward_euler import solve
 from mdr_dask.physics.kinetics import velocity_jump
 
 POINTS, HURST, LOAD, REACH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
-WINDOWS = 0.3, 1.0, 2.0, 5.0
-LAST = 10.0
+WINDOWS = 0.3, 1.0, 2.0, 3.0
+LAST = 6.0
 
 
 def stepped(height: np.ndarray, with_rate: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -37,18 +37,14 @@ def stepped(height: np.ndarray, with_rate: bool) -> tuple[np.ndarray, np.ndarray
     drag = []
     for _ in range(int(LAST * ratio)):
         free = fade * np.roll(u, 1)
-        for _ in range(60):
-            touches = depth + height > free
-            force = (depth + height + ratio * rise)[touches] if not with_rate else None
-            if force is None:
-                force = (1 + ratio) * (depth + height - free)[touches]
-            stiffness = (1 + ratio if with_rate else 1.0) * force.size
-            step = (LOAD * n - force.sum()) / stiffness
-            depth += step
-            if abs(step) < 1e-12:
-                break
+        low, high = depth - 0.2, depth + 0.2
+        for _ in range(36):  # the load grows with the depth, by leaps where the rate is left out
+            depth = 0.5 * (low + high)
+            w = depth + height
+            force = np.where(w > free, (1 + ratio) * (w - free) if with_rate else np.maximum(w + ratio * rise, 0), 0)
+            low, high = (depth, high) if force.sum() < LOAD * n else (low, depth)
         u = np.maximum(depth + height, free)
-        drag.append(float(force @ rise[touches]) / LOAD)
+        drag.append(float(force @ rise) / LOAD)
     trace = np.array(drag)
     return np.arange(1, trace.size + 1) / ratio, trace - trace[-1]
 
