@@ -138,7 +138,7 @@ def relaxation_of(
     integral = trace[0] / (whole @ trace)
     integral_low, integral_high = interval(integral, np.array([other[0] / (whole @ other) for other in others]))
     off = y - amplitude * np.exp(-rate * t)
-    sure = np.maximum(error[inside], 1e-300)
+    sure = np.where(error[inside] > 0, error[inside], np.inf)  # at rest the trace has no scatter
     row = dict.fromkeys(RATE_FIELDS, np.nan) | {
         "rate": rate,
         "rate_low": low,

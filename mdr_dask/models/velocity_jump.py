@@ -217,7 +217,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     for r, realisation in enumerate(block.realisations):
         for cases in lines.values():
             try:
-                amplitude = cases[0].amplitudes()
+                states, found = _line_results(block, cases, realisation)
             except ValueError as problem:
                 messages.update({(j, r): str(problem) for case in cases for j in groups[case]})
                 continue
@@ -340,7 +340,7 @@ def _outputs(case: _Case, jump: Relaxation) -> dict[str, float | FloatArray]:
     }
 
 
-STATUS = (Status.DONE, Status.NOT_CONVERGED, Status.FAILED)
+STATUS = (Status.DONE, Status.NOT_CONVERGED, Status.FAILED, Status.NOT_CONVERGED)
 
 
 def distinct(block: Block[VelocityJump]) -> int:

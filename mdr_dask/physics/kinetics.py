@@ -29,10 +29,11 @@ from mdr_dask.physics.sliding import steady_sliding
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-CONVERGED, NOT_CONVERGED, INVALID = 0, 1, 2
+CONVERGED, NOT_CONVERGED, INVALID, STRAYED = 0, 1, 2, 3
 MESSAGES = {
     NOT_CONVERGED: "the depth for the load was not found at one moment after the jump",
     INVALID: "load, velocity and profile must be finite, the load and both velocities positive",
+    STRAYED: "friction after the jump did not come to the steady state at the new velocity",
 }
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
@@ -40,6 +41,7 @@ NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no fin
 NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
 EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
+LONG, STRAY = 15.0, 0.02  # relaxation times after which friction has come so near to its end, of all its changes
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
 
@@ -378,6 +380,9 @@ def _relax(
         )
         if status == 1:
             return failed
+        strays = course[0, count - 1] >= LONG and abs(course[3, count - 1] - after) > STRAY * np.ptp(course[3, :count])
+        if status == 0 and strays:
+            return failed._replace(status=STRAYED)
         if status == 0:
             trace = _at_times(course[0, :count], course[3, :count], times, after)
             return Jump(before, course[3, 0], after, trace, np.array([first.depth, last.depth]), count, CONVERGED)

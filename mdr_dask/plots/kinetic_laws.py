@@ -18,6 +18,11 @@ def _fitted(series: Mapping[str, xr.Dataset], name: str) -> xr.Dataset:
     return next(fit for fit in FITS if fit.name == name).compute(series)
 
 
+def _meant(series: Mapping[str, xr.Dataset]) -> Mapping[str, xr.Dataset]:
+    """Return the series over velocity and Hurst exponent, which Figs. 4.5-4.7 show; all where there is none."""
+    return {name: data for name, data in series.items() if {"velocity", "hurst"} <= set(data.dims)} or series
+
+
 def _colours(values: np.ndarray) -> list[Any]:
     """Return one colour for every value, by rank."""
     from matplotlib import colormaps
@@ -62,6 +67,7 @@ def draw_jump_law(series: Mapping[str, xr.Dataset]) -> Figure:
 
     from mdr_dask.fit.kinetics import LAW, jump_law
 
+    series = _meant(series)
     cases, law = _fitted(series, "kinetics"), _fitted(series, "jump_law")
     figure = Figure(figsize=(5.6, 4.2), layout="constrained")
     axes = figure.subplots()
@@ -84,6 +90,7 @@ def draw_rate(series: Mapping[str, xr.Dataset]) -> Figure:
     """Draw b over v_1 tau q_max for every Hurst exponent, with the powers fitted (Fig. 4.6)."""
     from matplotlib.figure import Figure
 
+    series = _meant(series)
     cases, powers = _fitted(series, "kinetics"), _fitted(series, "rate_power")
     half = (cases["rate_high"] - cases["rate_low"]) / 2
     cases = cases.isel(case=np.flatnonzero((half < 0.5 * cases["rate"]).values))
@@ -113,7 +120,7 @@ def draw_power(series: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the power of b over v_1 tau q_max over the Hurst exponent (Fig. 4.7)."""
     from matplotlib.figure import Figure
 
-    powers = _fitted(series, "rate_power")
+    powers = _fitted(_meant(series), "rate_power")
     figure = Figure(figsize=(5, 3.8), layout="constrained")
     axes = figure.subplots()
     hurst = powers["hurst"].values
