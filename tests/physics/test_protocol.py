@@ -164,7 +164,8 @@ def test_parabola_against_an_independent_integration() -> None:
         moments, found = jump(bowl(nodes, c), KELVIN, reaches, load, 2.0)
         depth = np.interp(times, moments, found.depth)
         errors.append(np.max(np.abs(depth / solved.y[0] - 1)))
-        assert np.max(np.abs(np.interp(times, moments, found.drag) / drag - 1)) < 600 / nodes**2 + 1e-3
+    # the drag of a moment knows the leading edge to a part of an element only
+    assert np.max(np.abs(np.interp(times, moments, found.drag) / drag - 1)) < 5e-3
     assert errors[1] < 1e-5
     assert errors[1] < errors[0] / 4
 
