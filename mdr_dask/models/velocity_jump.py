@@ -175,11 +175,8 @@ def compute(block: Block[VelocityJump]) -> Result:
     parameters = [block.case(j) for j in range(block.cases)]
     scales = [case.rms_roughness / case.length for case in parameters]
     resolution = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
-    groups: dict[_Case, list[int]] = {}
+    groups = _grouped(parameters)
     apart = [j for j, case in enumerate(parameters) if case.is_general or "indentation_depth" in block.outputs]
-    for j, parameter in enumerate(parameters):
-        if not parameter.is_general:
-            groups.setdefault(_case(parameter), []).append(j)
     lines: dict[tuple[object, ...], tuple[FloatArray, FloatArray]] = {}
     for r, realisation in enumerate(block.realisations):
         lines.clear()
@@ -216,6 +213,15 @@ def compute(block: Block[VelocityJump]) -> Result:
             _follow(parameters[j], block, (j, r), values, status, messages)
             solves += 1
     return Result(values, status, messages, solves)
+
+
+def _grouped(cases: list[VelocityJump]) -> dict[_Case, list[int]]:
+    """Return the places of the cases that have the quick solution, by what decides it."""
+    groups: dict[_Case, list[int]] = {}
+    for j, case in enumerate(cases):
+        if not case.is_general:
+            groups.setdefault(_case(case), []).append(j)
+    return groups
 
 
 def _follow(
