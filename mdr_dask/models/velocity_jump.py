@@ -169,31 +169,6 @@ def _error(fine: Relaxation, coarse: Relaxation) -> float:
     return float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
 
 
-def _jumps(
-    cases: list[_Case], amplitude: FloatArray, block: Block[VelocityJump], realisation: int
-) -> tuple[list[int], list[dict[str, float | FloatArray]]]:
-    """Return status and outputs, in units of the line, of every case of a line in one realisation."""
-    from mdr_dask.physics import kinetics, roughness
-
-    slope_rms = roughness.spectral_slope(amplitude)
-    found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
-    if not FROM_JUMP.intersection(block.outputs):
-        return [kinetics.CONVERGED] * len(cases), found
-    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
-    nodes = cases[0].points * cases[0].oversampling
-    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
-    resolution = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
-    resolutions = resolution * slope_rms * np.array([case.load for case in cases])
-    jumps = _solve(cases, *line, resolutions, False)
-    for case, jump, row in zip(cases, jumps, found, strict=True):
-        row |= _outputs(case, jump)
-    if "discretisation_error" in block.outputs:
-        coarse = _solve(cases, *line, 0 * resolutions, True)
-        for fine, other, row in zip(jumps, coarse, found, strict=True):
-            row["discretisation_error"] = _error(fine, other)
-    return [jump.status for jump in jumps], found
-
-
 def compute(block: Block[VelocityJump]) -> Result:
     """Solve the cases of a block, each different one once a realisation."""
     from mdr_dask.physics import kinetics
@@ -206,14 +181,11 @@ def compute(block: Block[VelocityJump]) -> Result:
     solves = 0
     parameters = [block.case(j) for j in range(block.cases)]
     scales = [case.rms_roughness / case.length for case in parameters]
-    groups: dict[_Case, list[int]] = {}
-    apart = [j for j, case in enumerate(parameters) if case.is_general or "indentation_depth" in block.outputs]
-    for j, parameter in enumerate(parameters):
-        if not parameter.is_general:
-            groups.setdefault(_case(parameter), []).append(j)
+    groups = _grouped(parameters)
     lines: dict[tuple[object, ...], list[_Case]] = {}
     for case in groups:
         lines.setdefault(case.line(), []).append(case)
+    apart = [j for j, case in enumerate(parameters) if case.is_general or "indentation_depth" in block.outputs]
     for r, realisation in enumerate(block.realisations):
         for cases in lines.values():
             try:
@@ -221,7 +193,6 @@ def compute(block: Block[VelocityJump]) -> Result:
             except ValueError as problem:
                 messages.update({(j, r): str(problem) for case in cases for j in groups[case]})
                 continue
-            states, found = _jumps(cases, amplitude, block, realisation)
             solves += len(cases) if FROM_JUMP.intersection(block.outputs) else 0
             for case, state, row in zip(cases, states, found, strict=True):
                 for j in groups[case]:
@@ -235,6 +206,40 @@ def compute(block: Block[VelocityJump]) -> Result:
             _follow(parameters[j], block, (j, r), values, status, messages)
             solves += 1
     return Result(values, status, messages, solves)
+
+
+def _line_results(
+    block: Block[VelocityJump], cases: list[_Case], realisation: int
+) -> tuple[list[int], list[dict[str, float | FloatArray]]]:
+    """Return status and outputs of the cases of one line, for unit slope h / L."""
+    from mdr_dask.physics import kinetics, roughness
+
+    amplitude = cases[0].amplitudes()
+    slope_rms = roughness.spectral_slope(amplitude)
+    found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
+    if not FROM_JUMP.intersection(block.outputs):
+        return [kinetics.CONVERGED] * len(cases), found
+    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+    nodes = cases[0].points * cases[0].oversampling
+    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+    accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
+    resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
+    jumps = _solve(cases, *line, resolutions, False)
+    for case, jump, row in zip(cases, jumps, found, strict=True):
+        row |= _outputs(case, jump)
+    if "discretisation_error" in block.outputs:
+        for fine, coarse, row in zip(jumps, _solve(cases, *line, 0 * resolutions, True), found, strict=True):
+            row["discretisation_error"] = _error(fine, coarse)
+    return [jump.status for jump in jumps], found
+
+
+def _grouped(cases: list[VelocityJump]) -> dict[_Case, list[int]]:
+    """Return the places of the cases that have the quick solution, by what decides it."""
+    groups: dict[_Case, list[int]] = {}
+    for j, case in enumerate(cases):
+        if not case.is_general:
+            groups.setdefault(_case(case), []).append(j)
+    return groups
 
 
 def _follow(

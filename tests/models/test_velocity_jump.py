@@ -5,7 +5,7 @@ from pydantic import ValidationError
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute, coordinates, distinct, seconds
 
-EVERY = tuple(output.name for output in MODEL.outputs)
+EVERY = tuple(output.name for output in MODEL.outputs if output.default)
 BASE = {
     "length": 0.002,
     "points": 400,

@@ -179,26 +179,6 @@ def test_single_hill_against_an_independent_integration() -> None:
     assert np.max(np.abs(found.trace / drag - 1)) < 2e-6
 
 
-def test_energy_of_a_transient() -> None:
-    """Work done on the elements is stored or dissipated."""
-    height, slope = smooth_bump()
-    nodes, reach, load = height.size, 0.05, 0.5
-    steady = steady_sliding(height, slope, np.array([reach]), np.array([load]))
-    u = np.maximum(steady.depth[0] + height, 0)
-    u *= load / u.mean()
-    errors = []
-    for steps in (2000, 4000):
-        moments = np.linspace(0, 1, steps)
-        ones = np.ones(steps)
-        state = follow(height, slope, moments, moments * reach, reach * ones, load * ones, u, float(steady.depth[0]))
-        power = reach * state.drag + load * state.rate
-        width = moments[1]
-        work, lost = (np.sum(row[1:] + row[:-1])[()] * width / 2 for row in (power[5:], state.dissipated[5:]))
-        errors.append(abs(work - (state.stored[-1] - state.stored[5]) - lost) / work)
-    assert errors[1] < 2e-3
-    assert nodes == 4000
-
-
 def test_bad_numbers_are_a_status() -> None:
     height, slope = line()
     for load, reaches in ((np.nan, (0.1, 0.12)), (0.3, (0.1, -0.1)), (0.0, (0.1, 0.12))):

@@ -1,0 +1,131 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+
+EVERY = tuple(output.name for output in MODEL.outputs)
+BASE = {
+    "length": 0.002,
+    "points": 100,
+    "rms_roughness": 2e-6,
+    "shear_modulus": 1e7,
+    "relaxation_time": 1e-3,
+    "normal_force": 0.1,
+    "velocity": 0.05,
+    "relaxation_times": (0.05, 0.5, 2.0, 12.0),
+}
+STEP = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
+
+
+def block(columns: dict[str, np.ndarray] | None = None, **changes: object) -> Block[VelocityJump]:
+    columns = columns or {}
+    cases = next(iter(columns.values())).size if columns else 1
+    kept = {name: value for name, value in (BASE | changes).items() if value is not None}
+    return Block(VelocityJump.model_validate(kept), columns, cases, (0, 3), 5, EVERY)
+
+
+def test_one_step_is_the_jump() -> None:
+    """The general way and the quick one agree within their errors."""
+    step, quick = (compute(block(oversampling=16, **change)).values for change in ({"protocol": STEP}, {}))
+    for name in EVERY[:1] + EVERY[2:4]:
+        assert np.allclose(step[name], quick[name], rtol=4e-3), name
+    assert np.allclose(step["indentation_depth"], quick["indentation_depth"], rtol=1e-12)
+
+
+def test_value_depends_on_the_case_alone() -> None:
+    whole = block({"velocity": np.array([0.01, 0.05])}, protocol=STEP)
+    together = compute(whole)
+    for j in range(whole.cases):
+        for r, realisation in enumerate(whole.realisations):
+            alone = compute(whole.part(j, realisation))
+            for name in EVERY:
+                assert np.array_equal(alone.values[name][0, 0], together.values[name][j, r], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "protocol",
+    [
+        {"shape": "steps", "start": "rest", "times": [0.0, 2e-3], "velocities": [0.03, 0.05]},
+        {"shape": "ramp", "duration": 2e-3, "velocity": 0.05, "force": 0.1, "start": "rest"},
+        {"shape": "steps", "times": [0.0, 1e-3], "velocities": [0.2, 0.05], "forces": [0.2, 0.1]},
+    ],
+)
+@pytest.mark.parametrize(
+    "material", [None, {"standard_solid": {"static_modulus": 1e7, "glass_modulus": 3e7, "relaxation_time": 3e-4}}]
+)
+def test_every_course_ends_in_its_steady_state(protocol: dict[str, object], material: dict[str, object] | None) -> None:
+    kelvin = {} if material is None else {"shear_modulus": None, "relaxation_time": None, "material": material}
+    found = compute(block(protocol=protocol, relaxation_times=(1.0, 60.0), **kelvin)).values
+    assert np.allclose(found["friction_coefficient"][..., -1], found["friction_coefficient_after"], rtol=0.01)
+
+
+def test_oscillation_returns_every_period() -> None:
+    swing = {"shape": "oscillation", "amplitude": 0.02, "frequency": 500.0}
+    found = compute(block(protocol=swing, relaxation_times=(10.0, 12.0, 14.0))).values["friction_coefficient"]
+    assert np.allclose(found[..., 0], found[..., 2], rtol=0.03)
+
+
+def test_table_is_the_ramp(tmp_path: Path) -> None:
+    file = tmp_path / "protocol.csv"
+    file.write_text("time,velocity,force\n0,0.05,0.1\n0.002,0.1,0.2\n")
+    table = compute(block(protocol={"shape": "table", "file": str(file)}))
+    ramp = compute(block(protocol={"shape": "ramp", "duration": 2e-3, "velocity": 0.1, "force": 0.2}))
+    for name in EVERY:
+        assert np.array_equal(table.values[name], ramp.values[name]), name
+
+
+@pytest.mark.parametrize(
+    "indenter",
+    [
+        {"shape": "parabola", "radius": 0.01},
+        {"shape": "cone", "angle": 0.05},
+        {"shape": "power", "exponent": 4.0, "coefficient": 1e6},
+    ],
+)
+def test_indenters(indenter: dict[str, object]) -> None:
+    found = compute(block(indenter=indenter))
+    assert np.all(found.status == Status.DONE), found.messages
+    after = found.values["friction_coefficient_after"]
+    assert np.allclose(found.values["friction_coefficient"][..., -1], after, rtol=0.01)
+
+
+def test_contact_that_leaves_the_line_is_a_status() -> None:
+    found = compute(block(indenter={"shape": "parabola", "radius": 1.0}, normal_force=1e3))
+    assert np.all(found.status == Status.FAILED)
+    assert all("leaves the line" in message for message in found.messages.values())
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"velocity": 1e-7},
+        {"velocity": 1e3, "relaxation_times": (1e-4, 1e-3)},
+        {"normal_force": 1e-6},
+        {"normal_force": 1e6},
+        {"hurst": 0.0, "rms_roughness": 1e-9},
+        {"protocol": {"shape": "steps", "times": [0.0, 1e-3], "velocities": [0.0, -0.05]}},
+        {"protocol": {"shape": "steps", "times": [0.0], "velocities": [0.05], "forces": [100.0]}},
+    ],
+)
+def test_extremes_are_values_or_a_status(change: dict[str, object]) -> None:
+    found = compute(block(**({"protocol": STEP} | change)))
+    done = found.status == Status.DONE
+    assert np.all(np.isfinite(found.values["friction_coefficient"][done]))
+    assert all((j, r) in found.messages for j, r in np.argwhere(~done))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"protocol": {"shape": "steps", "times": [0.0, 1.0], "velocities": [1.0]}}, "for each of 2 times"),
+        ({"protocol": {"shape": "steps", "times": [1.0, 0.5], "velocities": [1.0, 2.0]}}, "increasing times"),
+        ({"material": {"kelvin": {"shear_modulus": 1e6, "relaxation_time": 1e-3}}}, "or material"),
+    ],
+)
+def test_impossible_courses_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ValidationError, match=message):
+        block(**change)
