@@ -22,6 +22,10 @@ class StoreBusyError(StoreError):
     """Another runner is at work on the store."""
 
 
+class ClusterError(MdrDaskError):
+    """A Dask cluster that does not answer, goes away, or runs another version of the program."""
+
+
 class DataError(MdrDaskError):
     """A table, profile or selection that does not hold what was asked of it."""
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -16,16 +20,23 @@ from numpy.typing import NDArray
 
 from mdr_dask import store
 from mdr_dask.campaign import Campaign
+from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
-from mdr_dask.task import Outcome, Work, run_block, write_off
+from mdr_dask.store import Place
+from mdr_dask.task import Outcome, Work, run_block, versions, write_off
 
 if TYPE_CHECKING:
+    from dask.delayed import Delayed
     from distributed import Client, Future
 
 #: Blocks handed to the threads at a time: the graph never grows with the study.
 THREAD_WINDOW = 64
+#: Run in every worker process: Ctrl-C reaches them too, and it is for the driver to end them.
+IGNORE_INTERRUPTS = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+#: Seconds that a scheduler is given to answer.
+SCHEDULER_PATIENCE = 10
 
 
 @dataclass(frozen=True)
@@ -118,27 +129,54 @@ def run(
         If the campaign is too large to be run.
     """
     with store.lock(url):
-        chunks: Mapping[str, Mapping[str, int]] = {}
-        realisations = 0
-        if store.exists(url):
-            stored = store.reconcile(url, campaign)
-            campaign, chunks, realisations = stored.campaign, stored.chunks, stored.realisations
-        layout = templates(campaign, max(campaign.replication.at_least, realisations), chunks)
+        layout, asked = _plan(campaign, url)
         with _executor(resources) as execute:
-            return _run_rounds(url, layout, execute, report, retry_failed)
+            return _run_rounds(url, layout, asked, execute, report, retry_failed)
+
+
+def outlook(campaign: Campaign, url: str) -> Progress:
+    """Return what a store holds of the first round of a campaign, without touching it; results kept and to do.
+
+    Raises
+    ------
+    StoreError
+        If the store was made from another campaign.
+    CampaignError
+        If the campaign is too large to be run.
+    """
+    layout, asked = _plan(campaign, url)
+    first = (0, next(rounds(campaign.replication)))
+    found = [_cells(url, t, mask, mask, first, retry_failed=False) for t, mask in zip(layout, asked, strict=True)]
+    return _begin_round(Progress(), found)
+
+
+def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDArray[np.bool_]]]:
+    """Lay out a campaign together with what is stored of it; say which cases it asks for."""
+    if not store.exists(url):
+        layout = templates(campaign, campaign.replication.at_least)
+        return layout, [np.ones(template.shape[:-1], dtype=bool) for template in layout]
+    stored = store.reconcile(url, campaign)
+    layout = templates(stored.campaign, max(campaign.replication.at_least, stored.realisations), stored.chunks)
+    asked = [stored.asked.get(t.series.name, np.ones(t.shape[:-1], dtype=bool)) for t in layout]
+    return layout, asked
 
 
 _Execute = Callable[[Iterable[Work], Callable[[Outcome], None]], None]
 
 
 def _run_rounds(
-    url: str, layout: tuple[Template, ...], execute: _Execute, report: Callable[[Progress], None], retry_failed: bool
+    url: str,
+    layout: tuple[Template, ...],
+    asked: list[NDArray[np.bool_]],
+    execute: _Execute,
+    report: Callable[[Progress], None],
+    retry_failed: bool,
 ) -> Progress:
     """Run round after round, each over the cases that the one before left too uncertain."""
     campaign = layout[0].campaign
     start = time.monotonic()
     progress = Progress()
-    needed = [np.ones(template.shape[:-1], dtype=bool) for template in layout]
+    needed = asked
     before = 0
 
     def account(outcome: Outcome) -> None:
@@ -153,7 +191,10 @@ def _run_rounds(
                 break
             layout = _grow(layout, count)
         store.lay_out(url, layout)
-        found = [_cells(url, t, mask, (before, count), retry_failed) for t, mask in zip(layout, needed, strict=True)]
+        found = [
+            _cells(url, template, asked_here, needed_here, (before, count), retry_failed)
+            for template, asked_here, needed_here in zip(layout, asked, needed, strict=True)
+        ]
         progress = _begin_round(progress, found)
         report(progress)
         execute(_work(url, layout, found), account)
@@ -170,7 +211,7 @@ def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ..
 def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
     until = template.campaign.replication.until
     values = {name: store.values(url, template.series.name, name)[..., :count] for name in until}
-    return needs_more(values, store.ledger(url, template.series.name)[..., :count], until)
+    return needs_more(values, store.ledger(url, template.series.name, template.shape)[..., :count], until)
 
 
 @dataclass(frozen=True)
@@ -178,46 +219,51 @@ class _Cells:
     """Which results of a group a round has to compute, and which only need a word in the ledger."""
 
     wanted: NDArray[np.bool_]
-    unsettled: NDArray[np.bool_]
+    spared: NDArray[np.bool_]
     kept: int
 
 
 def _cells(
-    url: str, template: Template, needed: NDArray[np.bool_], realisations: tuple[int, int], retry_failed: bool
+    url: str,
+    template: Template,
+    asked: NDArray[np.bool_],
+    needed: NDArray[np.bool_],
+    realisations: tuple[int, int],
+    retry_failed: bool,
 ) -> _Cells:
-    status = store.ledger(url, template.series.name)
+    status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
     if retry_failed:
         open_states += [Status.FAILED, Status.NOT_CONVERGED]
     in_round = np.zeros(status.shape, dtype=bool)
-    in_round[..., slice(*realisations)] = True
+    in_round[..., slice(*realisations)] = asked[..., None]
     wanted = in_round & needed[..., None] & np.isin(status, open_states)
-    unsettled = in_round & ~wanted & (status == Status.MISSING)
-    return _Cells(wanted, unsettled, int(np.count_nonzero(in_round & ~wanted & ~unsettled)))
+    spared = in_round & ~wanted & (status == Status.MISSING)
+    return _Cells(wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
 
 
 def _begin_round(progress: Progress, found: list[_Cells]) -> Progress:
     kept = sum(cells.kept for cells in found)
-    new = sum(int(np.count_nonzero(cells.wanted) + np.count_nonzero(cells.unsettled)) for cells in found)
+    new = sum(int(np.count_nonzero(cells.wanted) + np.count_nonzero(cells.spared)) for cells in found)
     return replace(progress, total=progress.total + kept + new, kept=progress.kept + kept)
 
 
 def _work(url: str, layout: tuple[Template, ...], found: list[_Cells]) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
+    laid_out = uuid.uuid4().hex
     for template, cells in zip(layout, found, strict=True):
         attempts = store.attempts(url, template.series.name)
         for index in template.block_indices():
             region = template.region(index)
-            wanted = cells.wanted[region]
-            if wanted.any() or cells.unsettled[region].any():
+            wanted, spared = cells.wanted[region], cells.spared[region]
+            if wanted.any() or spared.any():
                 yield Work(
-                    url=url,
+                    place=Place(url, template.series.name, index, region, laid_out),
                     model=template.campaign.model,
-                    series=template.series.name,
-                    index=index,
-                    region=region,
+                    versions=versions(template.campaign.model),
                     block=template.block(index),
-                    wanted=None if wanted.all() else wanted,
+                    wanted=wanted,
+                    spared=spared,
                     attempt=attempts.get(index, 0) + 1,
                 )
 
@@ -254,7 +300,10 @@ def _cores() -> int:
 
 
 def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], threads: int) -> None:
-    """Run on Dask's threaded scheduler: no server, no sockets; a window of blocks is a graph."""
+    """Run on Dask's threaded scheduler: no server, no sockets; a window of blocks is a graph.
+
+    However it ends, the blocks that have begun are finished first, for the store is still ours.
+    """
     import dask
     from dask.callbacks import Callback
 
@@ -262,37 +311,61 @@ def _run_threads(works: Iterable[Work], account: Callable[[Outcome], None], thre
         if isinstance(value, Outcome):
             account(value)
 
-    task = dask.delayed(run_block, pure=False, traverse=False)
+    def task(work: Work) -> Delayed:
+        """Make a task that Dask does not look into for tasks to wait for, which takes longer than all the rest."""
+        return dask.delayed(partial(run_block, work), name=f"block-{uuid.uuid4().hex}", traverse=False)()
+
     remaining = iter(works)
-    with Callback(posttask=finished):
+    with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
         while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
-            dask.compute(
-                [task(work) for work in window], scheduler="threads", num_workers=threads, optimize_graph=False
-            )
+            dask.compute([task(work) for work in window], scheduler="threads", pool=pool, optimize_graph=False)
 
 
 @contextmanager
 def _client(resources: Resources) -> Iterator[Client]:
-    from distributed import Client, LocalCluster
+    from distributed import Client
 
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its tracebacks end up in our errors, in one sentence
     if resources.scheduler is not None:
-        with Client(resources.scheduler, set_as_default=False) as client:
+        with _connected(resources.scheduler) as client:
             yield client
         return
-    if resources.cluster is not None:
-        package, _, name = resources.cluster["class"].rpartition(".")
-        cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
-        cluster.scale(**resources.cluster.get("scale", {}))
-    else:
-        cluster = LocalCluster(
+    with _cluster(resources) as cluster, Client(cluster, set_as_default=False) as client:
+        yield client
+
+
+def _connected(address: str) -> Client:
+    from distributed import Client
+    from distributed.comm import get_address_host_port
+
+    try:
+        get_address_host_port(address)
+        return Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no Dask scheduler answers at {address!r}: {str(error) or type(error).__name__}") from None
+
+
+def _cluster(resources: Resources) -> Any:
+    from distributed import LocalCluster
+
+    if resources.cluster is None:
+        return LocalCluster(
             n_workers=resources.workers,
             threads_per_worker=1,
             dashboard_address="127.0.0.1:0",
             scheduler_port=0,
             protocol="tcp://",
+            silence_logs=logging.CRITICAL,
+            preload=[IGNORE_INTERRUPTS],
         )
-    with cluster, Client(cluster, set_as_default=False) as client:
-        yield client
+    package, _, name = resources.cluster["class"].rpartition(".")
+    try:
+        cluster = getattr(import_module(package), name)(**resources.cluster.get("arguments", {}))
+        if "scale" in resources.cluster:
+            cluster.scale(**resources.cluster["scale"])
+    except (ImportError, AttributeError, TypeError, ValueError, OSError, RuntimeError) as error:
+        raise ClusterError(f"cannot start {resources.cluster['class']!r}: {type(error).__name__}: {error}") from None
+    return cluster
 
 
 def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[Outcome], None]) -> None:
@@ -316,7 +389,7 @@ def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[O
     for future in queue:
         work = running.pop(future)
         try:
-            account(future.result())
+            account(_outcome(future))
         except KilledWorker:
             suspects.append(work)
         future.release()
@@ -325,15 +398,31 @@ def _run_distributed(client: Client, works: Iterable[Work], account: Callable[[O
         _run_suspect(client, work, account)
 
 
-def _run_suspect(client: Client, work: Work, account: Callable[[Outcome], None]) -> None:
-    """Run one block with nothing else on the cluster; if it kills its workers again, it is written down as failed."""
-    from distributed import KilledWorker
+def _outcome(future: Future) -> Outcome:
+    """Return what a task sent home; a scheduler that went away is no fault of the task."""
+    from concurrent.futures import CancelledError
 
     try:
-        account(client.submit(run_block, work, pure=False).result())
-    except KilledWorker as error:
-        account(
-            write_off(
-                work, f"its worker died again and again ({error.allowed_failures} times), memory is the usual cause"
-            )
-        )
+        outcome: Outcome = future.result()
+    except (CancelledError, ModuleNotFoundError) as error:
+        what = "the scheduler went away" if isinstance(error, CancelledError) else f"a worker lacks {error.name!r}"
+        raise ClusterError(f"{what}; what is in the store is kept: run the campaign again") from None
+    return outcome
+
+
+def _run_suspect(client: Client, suspect: Work, account: Callable[[Outcome], None]) -> None:
+    """Run a block with nothing else on the cluster, by halves if it kills its workers, down to the result to blame."""
+    from distributed import KilledWorker
+
+    pieces = [suspect]
+    attempts = itertools.count(suspect.attempt)
+    while pieces:
+        work = replace(pieces.pop(), attempt=next(attempts))
+        try:
+            account(_outcome(client.submit(run_block, work, pure=False)))
+        except KilledWorker as error:
+            halves = work.halves()
+            pieces += reversed(halves)
+            if not halves:
+                died = f"its worker died again and again ({error.allowed_failures + 1} times)"
+                account(write_off(work, f"{died}, memory is the usual cause"))

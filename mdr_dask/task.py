@@ -12,23 +12,49 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+import mdr_dask
 from mdr_dask import models, store
+from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Block, Model, Result, Status
-from mdr_dask.plan import BlockIndex
+from mdr_dask.store import Place
 
 
 @dataclass(frozen=True)
 class Work:
-    """One task: everything a worker needs to compute a block and write it."""
+    """One task: everything a worker needs to compute a block and write it.
 
-    url: str
+    Parameters
+    ----------
+    place : Place
+        Where it stands in the store.
+    model : str
+        Name of the model.
+    versions : tuple
+        What the driver runs, as `versions` gives it.
+    block : Block
+        Its cases and realisations.
+    wanted, spared : bool array, shape of the block
+        Results to compute, and those to write down as not needed.
+    attempt : int
+        How often the block has been run, this time included.
+    """
+
+    place: Place
     model: str
-    series: str
-    index: BlockIndex
-    region: tuple[slice, ...]
+    versions: tuple[str, int]
     block: Block[Any]
-    wanted: NDArray[np.bool_] | None
+    wanted: NDArray[np.bool_]
+    spared: NDArray[np.bool_]
     attempt: int
+
+    def halves(self) -> tuple[Work, ...]:
+        """Return the same work as two tasks, to be run one after the other; none for a single result."""
+        cells = np.flatnonzero(self.wanted)
+        if cells.size < 2:
+            return ()
+        first = np.zeros_like(self.wanted)
+        first.flat[cells[: cells.size // 2]] = True
+        return replace(self, wanted=first), replace(self, wanted=self.wanted & ~first)
 
 
 @dataclass(frozen=True)
@@ -41,28 +67,57 @@ class Outcome:
     write_seconds: float
 
 
+def versions(model: str) -> tuple[str, int]:
+    """Return what decides the numbers of a model: the versions of the program and of the model."""
+    return mdr_dask.__version__, models.load(model).version
+
+
 def run_block(work: Work) -> Outcome:
-    """Compute a block and write it: whole, at once, ledger last; doing it twice changes nothing."""
+    """Compute a block and write it: whole, at once, ledger last; doing it twice changes nothing.
+
+    Raises
+    ------
+    ClusterError
+        If this worker has another version of the program than the driver.
+    StoreError
+        If the store cannot be read or written.
+    """
+    if versions(work.model) != work.versions:
+        raise ClusterError(_other_version(work))
     model = models.load(work.model)
     _one_blas_thread()
     started = time.perf_counter()
-    shape = tuple(part.stop - part.start for part in work.region)
-    if work.wanted is None:
+    if work.wanted.all():
         result = _compute(model, work.block)
+        shape = work.wanted.shape
         values = {name: array.reshape(shape + array.shape[2:]) for name, array in result.values.items()}
         status = result.status.reshape(shape)
-        computed = np.ones(shape, dtype=bool)
     else:
-        values, status = store.read_block(work.url, work.series, work.region, work.block.outputs)
-        computed = work.wanted
-        result = _compute_part(model, work.block, computed.reshape(work.block.cases, -1), values, status)
+        values, status = store.read_block(work.place, work.block.outputs)
+        status[work.spared] = Status.NOT_NEEDED
+        result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
-    store.write_values(work.url, work.series, work.region, values)
-    store.write_record(work.url, work.series, work.index, work.attempt, _record(work, result, status, middle - started))
-    store.write_status(work.url, work.series, work.region, status)
-    newly = computed | (status == Status.NOT_NEEDED)
-    counts = np.bincount(status[newly], minlength=len(Status))
-    return Outcome(tuple(counts.tolist()), result.solves, middle - started, time.perf_counter() - middle)
+    _write(work, values if work.wanted.any() else {}, status, _record(work, result, status, middle - started))
+    return Outcome(_counts(work, status), result.solves, middle - started, time.perf_counter() - middle)
+
+
+def _other_version(work: Work) -> str:
+    here, there = (
+        f"mdr_dask {program} with {work.model} {model}" for program, model in (versions(work.model), work.versions)
+    )
+    return f"worker {platform.node()} has {here}, this program is {there}; install the same on both"
+
+
+def _write(
+    work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], record: dict[str, Any]
+) -> None:
+    store.write_values(work.place, values)
+    store.write_record(work.place, work.attempt, record)
+    store.write_status(work.place, status)
+
+
+def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
+    return tuple(np.bincount(status[work.wanted | work.spared], minlength=len(Status)).tolist())
 
 
 def _compute(model: Model[Any], block: Block[Any]) -> Result:
@@ -110,7 +165,6 @@ def _compute_part(
 ) -> Result:
     """Compute the wanted results of a block into arrays that hold the others already."""
     flat_status = status.reshape(wanted.shape)
-    flat_status[~wanted & (flat_status == Status.MISSING)] = Status.NOT_NEEDED
     cases, numbers = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if cases.size == 0:
         return Result({}, status)
@@ -149,7 +203,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
     ]
     return {
         "attempt": work.attempt,
-        "block": list(work.index),
+        "block": list(work.place.index),
         "compute_seconds": seconds,
         "finished": time.time(),
         "host": platform.node(),
@@ -175,12 +229,10 @@ def _one_blas_thread() -> None:
 
 def write_off(work: Work, message: str) -> Outcome:
     """Write a block down as failed without computing it, because computing it kills whoever tries."""
-    values, status = store.read_block(work.url, work.series, work.region, work.block.outputs)
-    lost = np.ones(status.shape, dtype=bool) if work.wanted is None else work.wanted
-    status[lost] = Status.FAILED
-    flat = status.reshape(work.block.cases, -1)
-    result = Result({}, flat, dict.fromkeys(zip(*np.nonzero(lost.reshape(flat.shape)), strict=True), message))
-    store.write_values(work.url, work.series, work.region, values)
-    store.write_record(work.url, work.series, work.index, work.attempt, _record(work, result, status, 0.0))
-    store.write_status(work.url, work.series, work.region, status)
-    return Outcome(tuple(np.bincount(status[lost], minlength=len(Status)).tolist()), 0, 0.0, 0.0)
+    _, status = store.read_block(work.place, ())
+    status[work.spared] = Status.NOT_NEEDED
+    status[work.wanted] = Status.FAILED
+    lost = zip(*np.nonzero(work.wanted.reshape(work.block.cases, -1)), strict=True)
+    result = Result({}, status, {(int(case), int(number)): message for case, number in lost})
+    _write(work, {}, status, _record(work, result, status, 0.0))
+    return Outcome(_counts(work, status), 0, 0.0, 0.0)

@@ -33,7 +33,7 @@ def sigma(fitted, name):
 
 @pytest.mark.slow
 def test_zone_one_over_the_hurst_exponent(groups):
-    fitted = available("sliding_friction")["zone_one"].compute(groups)
+    fitted = available("sliding_friction")["zone_one"].results(groups)["zone_one"]
     assert (abs(fitted.alpha - ALPHA) < 4 * sigma(fitted, "alpha") + ALPHA_WINDOW).all()
     assert (abs(fitted.beta - BETA) < 4 * sigma(fitted, "beta") + BETA_WINDOW).all()
     middle = fitted.sel(hurst=slice(0.15, 0.85))
@@ -43,7 +43,7 @@ def test_zone_one_over_the_hurst_exponent(groups):
 
 @pytest.mark.slow
 def test_the_plateau_over_the_hurst_exponent(groups):
-    fitted = available("sliding_friction")["plateau"].compute(groups)
+    fitted = available("sliding_friction")["plateau"].results(groups)["plateau"]
     plateau = fitted.plateau.squeeze()
     assert plateau.sel(hurst=0.0) == pytest.approx(1.26, abs=0.06)
     middle = plateau.sel(hurst=slice(0.15, 0.85))

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -139,13 +140,16 @@ def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path)
     """SIGKILL at random moments, again and again, until a run gets through: no byte differs, no block is done twice."""
     long = CAMPAIGN.replace("realisations: 8", "realisations: 96").replace("points: 500", "points: 20000")
     campaign.write_text(long + "store: {path: killed.zarr, blocks: {realisation: 2}}\n")
+    random = np.random.default_rng(1)
     kills = 0
-    for moment in np.random.default_rng(1).uniform(0.8, 2.5, 40):
+    there = 0
+    while there < 48:
+        enough = there + random.integers(1, 16)
         with subprocess.Popen(command("run", str(campaign), "--quiet"), stdout=subprocess.DEVNULL) as process:
-            try:
-                process.wait(moment)
-                break
-            except subprocess.TimeoutExpired:
+            while process.poll() is None and there < enough:
+                time.sleep(random.uniform(0.0, 0.05))
+                there = len(list(Path("killed.zarr").glob("status/c/*/*/*")))
+            if process.poll() is None and there < 48:
                 process.send_signal(signal.SIGKILL)
                 kills += 1
     assert process.returncode == 0
@@ -200,3 +204,101 @@ def test_interrupting_says_how_to_go_on_and_readers_may_look_meanwhile(campaign)
         _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "the same command goes on" in errors
+
+
+LONG = CAMPAIGN.replace("realisations: 8", "realisations: 400").replace("points: 500", "points: 20000")
+LIVE = LONG + "store: {path: live.zarr, blocks: {realisation: 1}}\n"
+
+
+def started(*arguments: str) -> subprocess.Popen[str]:
+    """Start a command that runs into live.zarr, in a process group of its own, and wait for its first blocks."""
+    process = subprocess.Popen(
+        command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and not list(Path("live.zarr").glob("status/c/*/*/*")):
+        time.sleep(0.05)
+    return process
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("word", [signal.SIGINT, signal.SIGTERM], ids=["Ctrl-C", "wall time"])
+@pytest.mark.parametrize("options", [["--threads", "1"], ["--workers", "1"]], ids=["threads", "workers"])
+def test_an_interrupted_process_group_ends_quietly_and_leaves_nobody_behind(campaign, options, word):
+    psutil = pytest.importorskip("psutil")
+    campaign.write_text(LIVE)
+    process = started("run", str(campaign), "--quiet", *options)
+    children = psutil.Process(process.pid).children(recursive=True)
+    os.killpg(process.pid, word)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.strip().splitlines() == [
+        "interrupted; nothing is lost: the same command goes on where this one stopped"
+    ]
+    _, alive = psutil.wait_procs(children, timeout=20)
+    assert not alive
+    assert not Path(".live.zarr.runner").exists()
+
+
+@pytest.mark.slow
+def test_a_second_process_is_refused_until_the_first_is_gone_however_it_went(campaign, capsys):
+    campaign.write_text(LIVE)
+    first = started("run", str(campaign), "--quiet")
+    assert main(["run", str(campaign), "--quiet"]) == 2
+    assert f"process {first.pid} on " in capsys.readouterr().err
+    first.kill()
+    first.communicate(timeout=60)
+    second = started("run", str(campaign), "--quiet")
+    time.sleep(2)
+    assert main(["run", str(campaign), "--quiet"]) == 2
+    assert f"process {second.pid} on " in capsys.readouterr().err
+    second.terminate()
+    second.communicate(timeout=60)
+    assert second.returncode == 130
+
+
+def test_dry_run_on_a_store_says_what_remains(campaign, filled, capsys):
+    campaign.write_text(CAMPAIGN.replace("realisations: 8", "realisations: 12"))
+    assert main(["run", str(campaign), "--dry-run"]) == 0
+    assert "64 results are in the store already, 32 remain" in capsys.readouterr().out
+    assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["results"], document["kept"], document["to_do"]) == (96, 64, 32)
+    assert xr.open_zarr(filled).sizes["realisation"] == 8
+
+
+def test_what_is_no_store_is_named_in_one_line(campaign, tmp_path, capsys):
+    Path("empty.zarr").mkdir()
+    for arguments, message in (
+        (["status", str(campaign)], f"{campaign}: a file, expected the folder of a store"),
+        (["show", "empty.zarr"], "empty.zarr: no store here"),
+        (["show", str(tmp_path)], f"{tmp_path}: no store here"),
+        (["run", str(campaign), "--store", str(tmp_path)], f"{tmp_path}: a folder that holds something else"),
+        (["run", str(campaign), "--store", str(campaign)], f"{campaign}: a file, expected the folder of a store"),
+        (["run", str(campaign), "--store", "nobody://x"], "nobody://x: Protocol not known: nobody"),
+        (["schema", "-o", "nowhere/schema.json"], "nowhere/schema.json: No such file or directory"),
+    ):
+        assert main(arguments) == 2
+        errors = capsys.readouterr().err
+        assert message in errors
+        assert len(errors.splitlines()) == 1
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(filled):
+    line = subprocess.run(
+        f"{sys.executable} -m mdr_dask show {filled} --realisations --limit 0 --json | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert line.stdout == "{\n"
+    assert line.stderr == ""
+
+
+def test_a_store_may_be_named_by_a_file_url(campaign, tmp_path, capsys):
+    url = f"file://{tmp_path}/named.zarr"
+    assert main(["run", str(campaign), "--quiet", "--store", url]) == 0
+    assert main(["show", url, "friction_coefficient"]) == 0
+    assert main(["run", str(campaign), "--quiet", "--store", str(tmp_path / "named.zarr")]) == 0
+    assert "all 64 results are there already" in capsys.readouterr().out

@@ -47,3 +47,23 @@ def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
     path.write_text("{}")
     assert main(["master-curve", str(path)]) == 2
     assert "not a master curve kept by --keep" in capsys.readouterr().err
+
+
+def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
+    rows = [
+        f"{force},{velocity},{kelvin},{1 / (1 + (force * velocity**-0.15 * 10 ** (0.02 * (kelvin - 300))) ** -0.7)}"
+        for force in np.geomspace(1, 100, 12)
+        for velocity in (1e-3, 1e-2, 1e-1)
+        for kelvin in (290, 300, 310)
+    ]
+    path, kept, figure = tmp_path / "table.csv", tmp_path / "kept.json", tmp_path / "master.png"
+    path.write_text("force,velocity,temperature,mu\n" + "\n".join(rows))
+    assert main(["master-curve", str(path), "--keep", str(kept), "--plot", str(figure)]) == 0
+    printed = capsys.readouterr()
+    assert "second_factor" in printed.out
+    assert "chi-squared of the sum" in printed.err
+    assert figure.stat().st_size > 10_000
+    assert main(["master-curve", str(kept), "--reference", "0.001", "--json"]) == 0
+    moved = json.loads(capsys.readouterr().out)["data_vars"]
+    np.testing.assert_allclose(moved["shift_factor"]["data"], [0, -0.15, -0.3], atol=2e-3)
+    np.testing.assert_allclose(moved["second_factor"]["data"], [-0.2, 0, 0.2], atol=2e-3)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -18,6 +20,8 @@ class ToyParameters(Parameters):
     noise: float = quantity("1", "standard deviation over realisations", default=0.5, ge=0)
     fail_above: float = quantity("m", "positions above it fail", default=1e9)
     raise_above: float = quantity("m", "positions above it raise, in spite of the promise", default=1e9)
+    kill_above: float = quantity("m", "positions above it end the process", default=1e9)
+    dies_once: str = ""
 
 
 COMPUTED: list[tuple[float, int]] = []
@@ -27,6 +31,11 @@ def compute(block: Block[ToyParameters]) -> Result:
     position, slope = block.column("position"), block.column("slope")
     if (position > block.parameters.raise_above).any():
         raise RuntimeError("position too high")
+    if (position > block.parameters.kill_above).any():
+        os._exit(1)
+    if block.parameters.dies_once and not Path(block.parameters.dies_once).exists():
+        Path(block.parameters.dies_once).touch()
+        os._exit(1)
     noise = np.array(
         [
             np.random.Generator(np.random.Philox(np.random.SeedSequence(block.seed, spawn_key=(r,)))).standard_normal()
@@ -57,12 +66,26 @@ MODEL = Model(
 )
 
 
-def register(monkeypatch) -> None:
-    """Make ``model: toy`` known for the length of a test."""
+def _module() -> ModuleType:
     module = ModuleType("mdr_dask.models.toy")
     module.MODEL = MODEL
-    monkeypatch.setitem(sys.modules, "mdr_dask.models.toy", module)
+    return module
+
+
+def register(monkeypatch) -> None:
+    """Make ``model: toy`` known for the length of a test."""
+    monkeypatch.setitem(sys.modules, "mdr_dask.models.toy", _module())
     monkeypatch.setattr(models, "NAMES", (*models.NAMES, "toy"))
+
+
+def install() -> None:
+    """Make ``model: toy`` known to this process, a worker, for good."""
+    sys.modules["mdr_dask.models.toy"] = _module()
+    models.NAMES = (*models.NAMES, "toy")
+
+
+#: What a worker process runs first, to know the model.
+PRELOAD = f"import sys; sys.path[:0] = [{str(Path(__file__).parent)!r}]; import toy; toy.install()\n"
 
 
 def axis(path: str, values, dim: str | None = None) -> Axis:
@@ -78,4 +101,4 @@ def campaign(*axes: Axis, name: str = "", realisations=SIX, outputs=("height",),
     return Campaign("toy", "toy", 1, realisations, (series,), tuple(outputs), None, "", {}, "text", "toy.yaml")
 
 
-__all__ = ["COMPUTED", "MODEL", "Replication", "Tolerance", "axis", "campaign", "register"]
+__all__ = ["COMPUTED", "MODEL", "PRELOAD", "Replication", "Tolerance", "axis", "campaign", "install", "register"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 
 import click
@@ -39,8 +41,10 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     from mdr_dask.errors import MdrDaskError
 
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         result = cli.main(arguments, prog_name="mdr-dask", standalone_mode=False)
+        sys.stdout.flush()
     except click.ClickException as error:
         error.show()
         return error.exit_code
@@ -51,6 +55,14 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo(str(error), err=True)
         return 2
     except BrokenPipeError:
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        click.echo(f"{error.filename or 'input or output'}: {error.strerror or error}", err=True)
+        return 2
     return result if isinstance(result, int) else 0
+
+
+def _interrupt(*_: object) -> None:
+    """Treat the word of a batch system at the wall time like Ctrl-C."""
+    raise KeyboardInterrupt

@@ -11,6 +11,7 @@ from mdr_dask.cli.printing import print_json, print_rows
 from mdr_dask.cli.progress import reporter, seconds
 
 if TYPE_CHECKING:
+    from mdr_dask.campaign import Campaign
     from mdr_dask.execute import Progress, Resources
     from mdr_dask.plan import Estimate
 
@@ -115,13 +116,11 @@ def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options:
     mdr-dask run campaigns/friction_force.yaml --scheduler tcp://head:8786
     """
     from mdr_dask.campaign import load
-    from mdr_dask.plan import estimate
 
     study = load(campaign)
     url = options["url"] or study.store
-    costs = estimate(study)
     if dry_run:
-        _print_plan(study.name, url, costs, form)
+        _print_plan(study, url, form)
         return 0
     from mdr_dask import execute
 
@@ -132,14 +131,27 @@ def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options:
     return 1 if progress.failed else 0
 
 
-def _print_plan(name: str, url: str, costs: Estimate, form: str | None) -> None:
+def _print_plan(study: Campaign, url: str, form: str | None) -> None:
+    from mdr_dask import store
+    from mdr_dask.plan import estimate
+
+    costs = estimate(study)
+    kept, to_do = 0, costs.results
+    if store.exists(url):
+        from mdr_dask.execute import outlook
+
+        progress = outlook(study, url)
+        kept, to_do = progress.kept, progress.to_do
     if form == "json":
-        print_json({"campaign": name, "store": url, **_costs(costs)})
+        print_json({"campaign": study.name, "store": url, **_costs(costs), "kept": kept, "to_do": to_do})
         return
-    click.echo(f"{name} -> {url}")
+    click.echo(f"{study.name} -> {url}")
     click.echo(f"{costs.cases} cases x {costs.realisations} realisations = {costs.results} results")
     click.echo(f"{costs.solves} solves remain after sharing, in {costs.blocks} blocks")
     click.echo(f"{costs.bytes / 2**20:.3g} MiB uncompressed, about {seconds(costs.seconds)} on one core")
+    if kept:
+        left = seconds(costs.seconds * to_do / costs.results)
+        click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
 
 
 def _resources(options: dict[str, Any]) -> Resources:

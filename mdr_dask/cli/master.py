@@ -48,7 +48,7 @@ def master_curve(
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
     SOURCE is a store, a table (CSV with a row of names, perhaps one of units) or a result kept by --keep, which
-    is then only re-referenced.
+    is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -76,11 +76,14 @@ def master_curve(
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
-    from mdr_dask.fit.master_curve import read_table
+    from mdr_dask.fit.master_curve import friction_of_roughness, read_table
 
     if Path(source).is_file():
         return read_table(source)
-    return selection.select(selection.group(store.datasets(source), series), selections)
+    groups = store.datasets(source)
+    if series is None and len(groups) > 1:
+        return selection.select(friction_of_roughness(groups), selections)
+    return selection.select(selection.group(groups, series), selections)
 
 
 def _read(path: Path) -> xr.Dataset:
@@ -106,6 +109,15 @@ def _print(curve: xr.Dataset, form: str | None) -> None:
     factors = curve[[f"{name}{part}" for name in kept for part in ("", "_error", "_low", "_high")]]
     rows, units = table(factors)
     print_rows(rows, units, form or "table")
+    if "second" in curve.attrs:
+        rows, units = table(curve[[f"second_factor{part}" for part in ("", "_error", "_low", "_high")]])
+        print_rows(rows, units, form or "table")
+        click.echo(
+            f"shift = {by} part + {curve.attrs['second']} part, zero at {curve.attrs['second_reference']:.6g}; "
+            f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} a degree of freedom, "
+            f"probability {curve.attrs['probability']:.2g}",
+            err=True,
+        )
     low, high = (float(curve["curve_abscissa"].attrs[f"measured_{end}"]) for end in ("low", "high"))
     ends = curve["curve_abscissa"].to_numpy()
     click.echo(

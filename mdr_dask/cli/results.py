@@ -166,10 +166,11 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 @click.command()
 @store_argument
 @click.argument("names", nargs=-1)
+@series_option
 @limit_option
 @json_option
 @csv_option
-def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> None:
+def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form: str | None) -> None:
     """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
 
     \b
@@ -186,11 +187,17 @@ def fit(store: str, names: tuple[str, ...], limit: int, form: str | None) -> Non
         return
     _require_known(names, list(known), f"law for {model}")
     groups = stores.datasets(store)
+    if series is not None:
+        groups = {series: selection.group(groups, series)}
     for name in names:
-        rows, units = table(known[name].compute(groups))
-        if len(names) > 1 and not form:
-            click.echo(f"{name}: {known[name].summary}")
-        print_rows(rows, units, form or "table", limit)
+        found = known[name].results(groups)
+        for group, result in found.items():
+            if (len(names) > 1 or len(found) > 1) and not form:
+                click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
+            rows, units = table(result)
+            print_rows(
+                [{"series": group, **row} for row in rows] if group and form else rows, units, form or "table", limit
+            )
 
 
 def _list(model: str, summaries: dict[str, str]) -> None:

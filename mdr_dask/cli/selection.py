@@ -42,7 +42,7 @@ def select(dataset: xr.Dataset, selections: tuple[str, ...]) -> xr.Dataset:
         if not equals or name not in known:
             raise click.UsageError(
                 f"expected --select NAME=VALUE or NAME=A:B with one of {', '.join(known)}, got {text!r}"
-                f"{_meant(name, known)}"
+                f"{'' if name in known else _meant(name, known)}"
             )
         dataset = _pick(dataset, name, wanted)
     return dataset

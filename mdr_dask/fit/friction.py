@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -38,19 +39,30 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     return slope
 
 
+def _require_kelvin(data: xr.Dataset) -> None:
+    missing = [name for name in ("shear_modulus", "relaxation_time", "rms_roughness", "length") if name not in data]
+    if missing:
+        raise FitError(f"the laws hold for a Kelvin body on a generated line: the store has no {', '.join(missing)}")
+
+
 def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
     """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+    _require_kelvin(data)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
     return data["friction_coefficient"] / slope, xr.DataArray(force), xr.DataArray(velocity)
 
 
+@lru_cache(maxsize=4)
+def _weights(count: int) -> FloatArray:
+    generator = np.random.Generator(np.random.Philox(0))
+    return np.vstack([np.ones(count), generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)])
+
+
 def _resampled(values: FloatArray) -> FloatArray:
     """Return means over the last axis, realisations: of all of them first, then of `RESAMPLES` bootstrap samples."""
-    count = values.shape[-1]
-    generator = np.random.Generator(np.random.Philox(0))
-    weights = np.vstack([np.ones(count), generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)])
+    weights = _weights(values.shape[-1])
     known = np.isfinite(values)
     total = np.where(known, values, 0.0) @ weights.T
     number = known @ weights.T
@@ -80,25 +92,14 @@ def _groups(value: xr.DataArray, inner: list[str]) -> Iterator[dict[str, Any]]:
 def _each(
     series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], dict[str, xr.Variable]]
 ) -> xr.Dataset:
-    """Fit every series for itself, and in it every point of the dimensions that the fit does not use up."""
-    found: dict[str, xr.Dataset] = {}
-    reasons = []
-    for name, data in series.items():
-        try:
-            used = ["realisation", *inner(data)]
-            parts = []
-            for where in _groups(data["friction_coefficient"], used):
-                part = data.isel(where)
-                point = {key: part.coords.get(key, index) for key, index in where.items()}
-                parts.append(xr.Dataset(fit(part), coords=point).expand_dims(list(where)))
-            found[name] = cast(xr.Dataset, xr.combine_by_coords(parts, combine_attrs="override"))
-        except FitError as problem:
-            reasons.append(f"{name or 'store'}: {problem}")
-    if not found:
-        raise FitError("; ".join(reasons))
-    if len(found) == 1:
-        return next(iter(found.values()))
-    return xr.concat(list(found.values()), xr.DataArray(list(found), dims="series", name="series"), join="outer")
+    """Fit every point of the dimensions of a series that the fit does not use up."""
+    data = next(iter(series.values())).load()
+    parts = []
+    for where in _groups(data["friction_coefficient"], ["realisation", *inner(data)]):
+        part = data.isel(where)
+        point = {key: part.coords.get(key, index) for key, index in where.items()}
+        parts.append(xr.Dataset(fit(part), coords=point).expand_dims(list(where)))
+    return cast(xr.Dataset, xr.combine_by_coords(parts, combine_attrs="override"))
 
 
 def _varying(data: xr.Dataset, *names: str) -> list[str]:
@@ -124,18 +125,25 @@ def _table(data: xr.Dataset, *columns: xr.DataArray) -> list[FloatArray]:
     return [flat[0], *(column[:, 0] for column in flat[1:])]
 
 
+def _region_one(rate: FloatArray) -> int | None:
+    """Return where friction begins to go with the velocity: the lowest one, but for the floor of the papers' method."""
+    if rate.size == 1:
+        return 0
+    linear = np.flatnonzero(np.abs(rate[1:] / rate[:-1] - 1) < LINEAR)
+    return int(linear[0]) if linear.size else None
+
+
 def _zone_one(data: xr.Dataset) -> dict[str, xr.Variable]:
     """Fit log (mu / v) over log force in zone 1, at the low end of the velocities."""
     friction, force, velocity = _table(data, *numbers(data))
     rate = friction / (np.sqrt(2) * velocity[:, None])
     points, loads = [], []
-    for load in np.unique(force):
+    for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1])]):
         same = np.flatnonzero(force == load)
         same = same[np.argsort(velocity[same])]
-        mean = np.nanmean(rate[same], axis=1)
-        linear = same.size == 1 or abs(mean[1] / mean[0] - 1) < LINEAR
-        if linear and ZONE_ONE[0] <= load <= ZONE_ONE[1]:
-            points.append(rate[same[0]])
+        at = _region_one(np.nanmean(rate[same], axis=1))
+        if at is not None:
+            points.append(rate[same[at]])
             loads.append(load)
     if len(points) < 3:
         raise FitError(
@@ -236,6 +244,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
+    _require_kelvin(data)
     coefficient, exponent = _body(data)
     load = data["normal_force"] / (4 * data["shear_modulus"])
     width = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
@@ -277,23 +286,27 @@ FITS: tuple[Fit, ...] = (
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: _each(series, _zone_one_axes, _zone_one),
+        apart=True,
     ),
     Fit(
         "plateau",
         MODELS,
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
         lambda series: _each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
+        apart=True,
     ),
     Fit(
         "interpolation",
         MODELS,
         "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
         lambda series: _each(series, _zone_one_axes, _interpolation),
+        apart=True,
     ),
     Fit(
         "indenter",
         MODELS,
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
         lambda series: _each(series, _indenter_axes, _indenter),
+        apart=True,
     ),
 )

@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
 from mdr_dask.models.tables import parse_table
-from mdr_dask.physics import shift_laws, superposition
+from mdr_dask.physics import shift_laws, superposition, two_shifts
 
 FloatArray = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
     "normal_force": ("force", "load", "f_n", "fn"),
     "velocity": ("v", "speed", "sliding_velocity"),
-    "temperature": ("T", "t_c", "t_k", "temp"),
+    "temperature": ("T", "t_c", "t_k", "temp", "material_temperature"),
     "frequency": ("f", "freq", "omega"),
     "time": ("t",),
     "modulus": ("relaxation_modulus", "e_relax", "g_relax", "storage_modulus", "e_stor", "g_stor", "e'", "g'"),
@@ -29,7 +30,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
 ABSOLUTE_ZERO = -273.15
-NORMAL_95 = 1.959963984540054
+SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
 
 
 def read_table(path: str | Path) -> pd.DataFrame:
@@ -64,6 +65,8 @@ def master_curve(
 ) -> xr.Dataset:
     """Shift curves of a table into one.
 
+    A table that varies in velocity and in temperature gives a factor of each, added: log x + a(v) + b(T).
+
     Parameters
     ----------
     table : Dataset or DataFrame
@@ -83,10 +86,12 @@ def master_curve(
     Dataset
         ``shift_factor`` and ``vertical_factor`` (decades added to the logarithms of abscissa and ordinate) over the
         group, with
-        ``_error``, ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
+        ``_error`` (68 %), ``_low`` and ``_high`` (95 %) and ``covariance``; ``point_abscissa``, ``point_ordinate``,
         ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
-        decades), with the range measured at the reference in its attrs; constants of the laws that apply.
+        decades), with the range measured at the reference in its attrs; constants of the laws that apply. With two
+        groups also ``second_factor`` over the second one, the constants of its laws, and in the attrs ``second``,
+        ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
 
     Raises
     ------
@@ -95,7 +100,11 @@ def master_curve(
     """
     frame = _frame(table)
     over, values, by = _columns(frame, abscissa, ordinate, group)
-    _require_one_group(frame, {over, values, by})
+    second = _second_group(frame, {over, values, by})
+    if second is not None:
+        if vertical or draws:
+            raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors and bootstrap")
+        return _of_two_groups(frame, over, values, (by, second), reference)
     groups, curves = _curves(frame, over, values, by)
     nearest = None if reference is None else _nearest(groups, reference)
     result = superposition.superpose(groups, curves, vertical, nearest, draws)
@@ -152,11 +161,53 @@ def _varies(frame: pd.DataFrame, names: list[str | None]) -> bool:
     return all(frame[name].nunique() > 1 for name in (names[0], names[2]))
 
 
-def _require_one_group(frame: pd.DataFrame, used: set[str]) -> None:
-    for name in ("velocity", "temperature", "normal_force"):
+def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
+    """Return what the table varies in beside the columns used, or refuse it if that is no second group."""
+    found = None
+    for name in ("normal_force", "velocity", "temperature"):
         column = _find(frame, name)
         if column is not None and column not in used and frame[column].nunique() > 1:
-            raise DataError(f"the table varies in {column!r} too: keep one of its values, or group by it")
+            if found is not None or name == "normal_force":
+                raise DataError(f"the table varies in {column!r} too: keep one of its values, or group by it")
+            found = column
+    return found
+
+
+def _of_two_groups(
+    frame: pd.DataFrame, over: str, values: str, by: tuple[str, str], reference: float | None
+) -> xr.Dataset:
+    """Shift curves that differ in two things; the reference is of the first."""
+    keys, curves = [], []
+    rows = frame[[over, values, *by]].dropna()
+    first, second = (_clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
+    centres = [
+        {label: float(rows[name].to_numpy()[labels == label].mean()) for label in np.unique(labels)}
+        for name, labels in zip(by, (first, second), strict=True)
+    ]
+    for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
+        part = rows[(first == one) & (second == other)]
+        (_,), (curve,) = _curves(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
+        keys.append((centres[0][one], centres[1][other]))
+        curves.append(curve)
+    a, b = np.array(keys).T
+    zero = _nearest(np.unique(a), np.unique(a)[np.unique(a).size // 2] if reference is None else reference)
+    found = two_shifts.superpose_twice(a, b, curves, (zero, float(np.unique(b)[np.unique(b).size // 2])))
+    units = frame.attrs.get("units", {})
+    dataset = _dataset(found.first, over, values, by[0], units)
+    dataset["point_shift"] = (
+        "point",
+        (found.first.horizontal[found.first.member] + found.second.horizontal[found.second.member]),
+        {"units": "1"},
+    )
+    dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
+    extra = _dataset(found.second, over, values, by[1], units)
+    for part in ("", "_error", "_low", "_high"):
+        dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
+    laws = _laws(found.first, over, by[0], units.get(by[0], "")) | _laws(
+        found.second, over, by[1], units.get(by[1], "")
+    )
+    about = {"second": by[1], "second_reference": found.second.reference}
+    return dataset.assign(laws).assign_attrs(about, chi_squared=found.chi_squared, probability=found.probability)
 
 
 def _curves(
@@ -204,16 +255,18 @@ def _dataset(
             "group": by,
             "reference": result.reference,
             "noise": result.noise,
+            "freedom": result.freedom,
         },
     )
+    narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
     factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
     factors["vertical_factor"] = (result.vertical, result.vertical_error)
     for name, (factor, error) in factors.items():
         meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
         dataset[name] = (by, factor, {"units": "1", "long_name": meaning})
-        dataset[f"{name}_error"] = (by, error, {"units": "1", "long_name": "standard error"})
-        dataset[f"{name}_low"] = (by, factor - NORMAL_95 * error, {"units": "1"})
-        dataset[f"{name}_high"] = (by, factor + NORMAL_95 * error, {"units": "1"})
+        dataset[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
+        dataset[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
+        dataset[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
     dataset["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
     dataset["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
     dataset["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
@@ -279,6 +332,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         covariance=covariance,
         reference=float(curve.attrs["reference"]),
         noise=float(curve.attrs["noise"]),
+        freedom=float(curve.attrs["freedom"]),
         x=np.log10(curve["point_abscissa"].to_numpy()),
         y=np.log10(curve["point_ordinate"].to_numpy()),
         member=np.searchsorted(groups, curve["point_group"].to_numpy()),
@@ -294,7 +348,12 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         values: curve["curve_ordinate"].attrs.get("units", ""),
     }
     new = superposition.rereference(old, reference)
-    return _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
+    dataset = _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
+    for name in set(curve.data_vars) - set(dataset.data_vars):
+        dataset[name] = curve[name]
+    if "point_shift" in curve:
+        dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])
+    return dataset.assign_attrs({name: value for name, value in curve.attrs.items() if name not in dataset.attrs})
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -331,7 +390,10 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
 def _of_store(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the factors and the constants of their law; the merged curve is what ``mdr-dask master-curve`` is for."""
     curve = master_curve(friction_of_roughness(series))
-    return curve[[name for name, values in curve.data_vars.items() if set(values.dims) <= {curve.attrs["group"]}]]
+    groups = curve.attrs["group"], curve.attrs.get("second", curve.attrs["group"])
+    return curve[
+        [name for name, values in curve.data_vars.items() if not values.dims or values.dims[0] in groups]
+    ].drop_vars(["covariance", "vertical_covariance"])
 
 
 FITS = (

@@ -93,6 +93,7 @@ class Case:
 
     def solve(self, phases: Callable[[int], FloatArray], accuracy: float) -> ViscoelasticSteady:
         """Solve on the grid given, or on the coarsest that meets the accuracy."""
+        from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED
         from mdr_dask.physics.viscoelastic_sliding import steady_viscoelastic_sliding
 
         oversampling = COARSEST if self.oversampling == "auto" else int(self.oversampling)
@@ -101,7 +102,7 @@ class Case:
             found = steady_viscoelastic_sliding(
                 height, spacing, solid_of(self.material), self.velocity, self.force, self.body[0] == 0
             )
-            enough = found.error <= accuracy or found.status != 0
+            enough = found.error <= accuracy or found.status not in (CONVERGED, NOT_CONVERGED)
             if self.oversampling != "auto" or enough or oversampling >= FINEST:
                 return found
             oversampling *= 2

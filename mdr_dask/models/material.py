@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import FloatArray, NamedFile, Parameters, quantity
@@ -42,6 +42,12 @@ class PronySeries(Parameters):
     times: Numbers = quantity("s", "relaxation time of each arm")
     viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
 
+    @model_validator(mode="after")
+    def _a_time_for_every_modulus(self) -> PronySeries:
+        if len(self.moduli) != len(self.times):
+            raise ValueError(f"expected a time for every modulus, got {len(self.times)} and {len(self.moduli)}")
+        return self
+
 
 class PowerLaw(Parameters):
     """A Prony series whose loss modulus is a power of the frequency."""
@@ -73,6 +79,16 @@ class ModulusTable(Parameters):
         "1", "given where the moduli are of tension: divides them by 2 (1 + nu)", default=None, ge=-1, le=0.5
     )
     arms_per_decade: float = quantity("1", "density of relaxation times", default=1.0, gt=0, le=5)
+
+    @model_validator(mode="after")
+    def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
+        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        if info.context is not None:
+            try:
+                _columns(self)
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
 
 
 class Wlf(Parameters):
@@ -170,6 +186,17 @@ def _fitted(table: ModulusTable) -> LinearSolid:
 
 def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return angular frequency, storage and loss modulus in SI, at one temperature."""
+    omega, storage, loss, temperature = _columns(chosen)
+    if temperature is None or np.ptp(temperature) < SAME_TEMPERATURE:
+        return omega, storage, loss
+    if chosen.table_temperature is not None:
+        near = np.abs(temperature - chosen.table_temperature) <= SAME_TEMPERATURE
+        return omega[near], storage[near], loss[near]
+    return _superposed(chosen, temperature, omega, storage, loss)
+
+
+def _columns(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
+    """Return angular frequency, storage and loss modulus and perhaps temperature in SI, as the file has them."""
     table = parse_table(chosen.file.read_text(), chosen.file.name)
     if table.values.shape[1] < 3:
         raise DataError(
@@ -177,15 +204,18 @@ def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
         )
     scales = [table.scale(0, chosen.frequency_unit), *(table.scale(column, chosen.modulus_unit) for column in (1, 2))]
     omega, storage, loss = (table.values[:, column] * scale for column, scale in enumerate(scales))
+    if not all(np.all(np.isfinite(column) & (column > 0)) for column in (omega, storage, loss)):
+        raise DataError(f"{chosen.file.name}: frequencies and moduli must be positive and finite")
     temperature = _temperatures(table)
-    if temperature is None or np.ptp(temperature) < SAME_TEMPERATURE:
-        return omega, storage, loss
-    if chosen.table_temperature is not None:
-        near = np.abs(temperature - chosen.table_temperature) <= SAME_TEMPERATURE
-        if np.count_nonzero(near) < 2:
-            raise DataError(f"{chosen.file.name}: got no rows at {chosen.table_temperature:g} K")
-        return omega[near], storage[near], loss[near]
-    return _superposed(chosen, temperature, omega, storage, loss)
+    if temperature is not None and np.ptp(temperature) >= SAME_TEMPERATURE:
+        if chosen.table_temperature is None and chosen.reference is None:
+            raise DataError(
+                f"{chosen.file.name}: has several temperatures: name one by table_temperature, or a reference"
+            )
+        wanted = chosen.table_temperature
+        if wanted is not None and np.count_nonzero(np.abs(temperature - wanted) <= SAME_TEMPERATURE) < 2:
+            raise DataError(f"{chosen.file.name}: got no rows at {wanted:g} K")
+    return omega, storage, loss, temperature
 
 
 def _temperatures(table: Table) -> FloatArray | None:
@@ -201,8 +231,6 @@ def _superposed(
     """Shift every temperature to the reference by its storage modulus."""
     from mdr_dask.physics.superposition import superpose
 
-    if chosen.reference is None:
-        raise DataError(f"{chosen.file.name}: has several temperatures: name one by table_temperature, or a reference")
     order = np.argsort(temperature, kind="stable")
     member = np.empty(order.size, dtype=np.intp)
     member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))

@@ -7,11 +7,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
-from mdr_dask.models.tables import parse_table
+from mdr_dask.models.tables import SCALES, parse_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.measured import MeasuredLine
@@ -37,6 +37,16 @@ class ProfileFile(Parameters):
     @classmethod
     def _bare_name(cls, value: Any) -> Any:
         return {"file": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
+        """Refuse a bad file where a campaign names it, before any case fails of it."""
+        if info.context is not None:
+            try:
+                line_of(self)
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
 
 
 @lru_cache(maxsize=16)
@@ -72,8 +82,18 @@ def _topography(profile: ProfileFile) -> tuple[Any, Any]:
         ) from None
     if hashlib.sha256(Path(profile.file.path).read_bytes()).hexdigest() != profile.file.sha256:
         raise DataError(f"{profile.file.path}: changed since the campaign was read")
-    line = SurfaceTopography.read_topography(profile.file.path)
+    try:
+        line = SurfaceTopography.read_topography(profile.file.path)
+    except Exception as problem:  # every reader of every format has errors of its own
+        reason = type(problem).__name__
+        raise DataError(f"{profile.file.name}: SurfaceTopography cannot read it: {reason}") from None
     if line.dim != 1:
-        raise DataError(f"{profile.file.name}: expected a line scan, got a map")
-    x, z = line.to_unit("m").positions_and_heights()
-    return x, z
+        raise DataError(
+            f"{profile.file.name}: expected a line scan, got a map of {' x '.join(map(str, line.nb_grid_pts))} points: "
+            "save one of its lines as x, z"
+        )
+    x, z = (line if line.unit is None else line.to_unit("m")).positions_and_heights()
+    scale = SCALES.get(profile.unit.lower()) if line.unit is None else 1.0
+    if scale is None:
+        raise DataError(f"expected one of the units {', '.join(SCALES)}, got {profile.unit!r}")
+    return x * scale, z * scale

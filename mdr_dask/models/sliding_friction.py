@@ -24,11 +24,11 @@ IntArray = NDArray[np.intp]
 
 ACCURACY = 0.01  # where the campaign does not say
 FINEST = 64  # oversampling beyond which `auto` gives up
-SAFETY_BOTH, SAFETY_EVEN, SAFETY_FINER = 0.9, 1.5, 1.5  # see docs/friction.md for how honest they make the estimate
-CLOSE = 0.02  # change of the depth between grids that is taken from the tangent
+SAFETY = 3.0  # see docs/friction.md for how honest it makes the estimate
+CLOSE = 0.005  # change of the depth between grids that is taken from the tangent
 SEARCH = 1e-7  # error of the search for the depth in 99 % of cases
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
-NODE_LINE, NODE_STEPPED, NODE_SWEPT = 5e-8, 1e-9, 1.3e-8  # seconds for every node of a line and of a solution
+NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
@@ -151,6 +151,10 @@ class _Line:
         """Return the amplitudes of its harmonics."""
         return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
 
+    def slope(self) -> float:
+        """Return the spectral rms slope."""
+        return _slope(self)
+
 
 @lru_cache(maxsize=32)
 def _amplitudes(modes: int, hurst: float, rolloff: float, longest: float) -> FloatArray:
@@ -159,12 +163,19 @@ def _amplitudes(modes: int, hurst: float, rolloff: float, longest: float) -> Flo
     return roughness.amplitudes(modes, hurst, rolloff, longest)
 
 
+@lru_cache(maxsize=1024)
+def _slope(line: _Line) -> float:
+    from mdr_dask.physics import roughness
+
+    return roughness.spectral_slope(line.amplitudes())
+
+
 @dataclass(frozen=True)
 class _Task:
     """Cases on one realisation of a line, in units of its length and rms height."""
 
     line: _Line
-    phase: FloatArray
+    turned: NDArray[np.complex128]  # exp(i phi) of its harmonics
     scheme: Scheme
     reaches: FloatArray  # v tau / L
     loads: FloatArray  # F_N / (4 G L h)
@@ -179,8 +190,8 @@ class _Task:
         from mdr_dask.physics import roughness
 
         amplitude, count = self.line.amplitudes(), self.line.points * oversampling
-        height = roughness.line(amplitude, self.phase, count)
-        slope = roughness.line(amplitude, self.phase, count, 1) if scheme == "hermite" else height
+        height = roughness.turned_line(amplitude, self.turned, count)
+        slope = roughness.turned_line(amplitude, self.turned, count, 1) if scheme == "hermite" else height
         if self.line.coefficient == 0:
             return height, slope
         return np.append(height, height[0]), np.append(slope, slope[0])
@@ -203,35 +214,35 @@ class _Task:
         """Solve the cases on one grid, without an estimate of the error."""
         return self.solve(self.nodes(oversampling, self.scheme), self.scheme)
 
-    def with_error(self, oversampling: int, near: Steady | None = None) -> tuple[Steady, FloatArray]:
-        """Solve the cases on one grid and estimate the relative error of their friction.
-
-        The exact sweep on a fine grid is compared with the two grids that hold every other node: two, because one may
-        agree by accident. Anything else is compared with the exact sweep on a grid twice as fine.
-        """
-        nodes = self.nodes(oversampling, self.scheme)
-        steady = self.solve(nodes, self.scheme, near)
-        if self.scheme != "hermite" or oversampling % 2 or self.line.points * oversampling < 32:
-            finer = self.solve(self.nodes(2 * oversampling, "hermite"), "hermite")
-            return steady, SAFETY_FINER * _difference(steady, finer)
-        even, odd = ((nodes[0][first::2], nodes[1][first::2]) for first in (0, 1))
-        error = _difference(self.solve(even, self.scheme, steady, CLOSE), steady)
-        if self.line.coefficient:
-            return steady, SAFETY_EVEN * error
-        return steady, SAFETY_BOTH * np.maximum(error, _difference(self.solve(odd, self.scheme, steady, CLOSE), steady))
+    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
+        """Solve the cases on one grid and estimate the relative error of their friction."""
+        steady = self.on_grid(oversampling)
+        return steady, self._error(steady, self.nodes(2 * oversampling, "hermite"))
 
     def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
         oversampling = 2 if self.scheme == "hermite" else 1
-        steady, error = self.with_error(oversampling)
+        steady = self.on_grid(oversampling)
+        finer = self.nodes(2 * oversampling, "hermite")
+        error = self._error(steady, finer)
         while oversampling < FINEST:
             wanting = ~(error <= accuracy) & (steady.status == 0)
             if not np.any(wanting):
                 break
             oversampling *= 2
-            finer, error[wanting] = self.only(wanting).with_error(oversampling, steady.only(wanting))
-            steady = steady.replaced(wanting, finer)
+            some = self.only(wanting)
+            found = some.solve(finer, self.scheme, steady.only(wanting))
+            finer = self.nodes(2 * oversampling, "hermite")
+            error[wanting] = some._error(found, finer)
+            steady = steady.replaced(wanting, found)
         return steady, error
+
+    def _error(self, steady: Steady, finer: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Compare a solution with the exact sweep over cubic cells of half the width.
+
+        The finer grid has a small part of the error of the coarser one; a coarser grid has many times its error.
+        """
+        return SAFETY * _difference(steady, self.solve(finer, "hermite", steady, CLOSE))
 
 
 def _difference(one: Steady, other: Steady) -> FloatArray:
@@ -373,51 +384,73 @@ def compute(block: Block[SlidingFriction]) -> Result:
     answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
     cases = _cases(block)
     _smooth(cases, answer)
-    for key, members in cases.groups():
+    groups = []
+    for (line, oversampling, scheme), members in cases.groups():
         try:
-            key[0].amplitudes()
+            line.amplitudes()
         except ValueError as problem:
             answer.warn(members, str(problem))
             continue
-        _rough(key, members, cases, answer)
+        groups.append(_Group.of(line, oversampling, scheme, members, cases))
+    # realisations outside: every line of one has the same phases
+    for r, realisation in enumerate(block.realisations):
+        for group in groups:
+            group.solve(r, realisation, answer)
     return Result(answer.values, answer.status, answer.messages, answer.solves)
 
 
-def _rough(key: tuple[_Line, int | str, Scheme], members: IntArray, cases: _Cases, answer: _Answer) -> None:
-    """Solve the cases of one group in every realisation."""
-    from mdr_dask.physics import roughness
+@dataclass(frozen=True)
+class _Group:
+    """Cases that share rough lines and grids, each different one once."""
 
-    line, oversampling, scheme = key
-    block = answer.block
-    slope = roughness.spectral_slope(line.amplitudes())
-    numbers = np.stack([cases.reaches[members], cases.loads[members]])
-    (reaches, loads), which = np.unique(numbers, axis=1, return_inverse=True)
-    height = cases.height[members]
-    scale = height / cases.length[members]
-    contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
-    accuracy = ACCURACY if block.accuracy is None else block.accuracy
-    for r, realisation in enumerate(block.realisations):
-        phase = roughness.phases(block.seed, realisation, line.points // 2)
-        task = _Task(line, phase, scheme, reaches, loads, contact)
-        if oversampling == "auto":
+    line: _Line
+    oversampling: int | str
+    scheme: Scheme
+    members: IntArray
+    reaches: FloatArray
+    loads: FloatArray
+    which: IntArray  # the entry of `reaches` and `loads` of every member
+    height: FloatArray
+    scale: FloatArray  # slope of a line of unit length and height
+
+    @classmethod
+    def of(cls, line: _Line, oversampling: int | str, scheme: Scheme, members: IntArray, cases: _Cases) -> _Group:
+        """Collect the different cases among the members."""
+        numbers = np.stack([cases.reaches[members], cases.loads[members]])
+        (reaches, loads), which = np.unique(numbers, axis=1, return_inverse=True)
+        height = cases.height[members]
+        scale = height / cases.length[members]
+        return cls(line, oversampling, scheme, members, reaches, loads, which, height, scale)
+
+    def solve(self, r: int, realisation: int, answer: _Answer) -> None:
+        """Solve the cases in one realisation, the r-th of the block."""
+        from mdr_dask.physics import roughness
+
+        block = answer.block
+        turned = roughness.turns(block.seed, realisation, self.line.points // 2)
+        contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
+        task = _Task(self.line, turned, self.scheme, self.reaches, self.loads, contact)
+        accuracy = ACCURACY if block.accuracy is None else block.accuracy
+        if self.oversampling == "auto":
             steady, error = task.to_accuracy(accuracy)
         elif "discretisation_error" in block.outputs:
-            steady, error = task.with_error(int(oversampling))
+            steady, error = task.with_error(int(self.oversampling))
         else:
-            steady, error = task.on_grid(int(oversampling)), np.full(loads.size, np.nan)
-        answer.solves += loads.size
+            steady, error = task.on_grid(int(self.oversampling)), np.full(self.loads.size, np.nan)
+        answer.solves += self.loads.size
+        which = self.which
         found = {
-            "friction_coefficient": (steady.drag / loads)[which] * scale,
-            "indentation_depth": steady.depth[which] * height,
+            "friction_coefficient": (steady.drag / self.loads)[which] * self.scale,
+            "indentation_depth": steady.depth[which] * self.height,
             "contact_fraction": steady.contact_fraction[which],
-            "contact_slope": steady.contact_slope[which] * scale,
-            "rms_slope": slope * scale,
+            "contact_slope": steady.contact_slope[which] * self.scale,
+            "rms_slope": self.line.slope() * self.scale,
             "discretisation_error": error[which],
         }
-        answer.put(members, r, found, steady.status[which])
-        if oversampling == "auto":
+        answer.put(self.members, r, found, steady.status[which])
+        if self.oversampling == "auto":
             for j in np.flatnonzero((steady.status == 0) & ~(error <= accuracy)):
-                for member in members[which == j]:
+                for member in self.members[which == j]:
                     answer.messages[int(member), r] = f"estimated error {error[j]:.1e} on the finest grid"
 
 
@@ -488,7 +521,7 @@ def seconds(block: Block[SlidingFriction]) -> float:
 
 def memory(block: Block[SlidingFriction]) -> float:
     """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
-    grid = [FINEST if value == "auto" else 2 * int(value) for value in block.column("oversampling")]
+    grid = [2 * (FINEST if value == "auto" else int(value)) for value in block.column("oversampling")]
     return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
 
 

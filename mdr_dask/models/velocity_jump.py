@@ -84,6 +84,11 @@ class _Case:
     change: float
     times: tuple[float, ...]
 
+    def line(self) -> tuple[object, ...]:
+        """Return what cases must share to be solved together."""
+        grid = self.hurst, self.points, self.rolloff, self.longest, self.oversampling
+        return *grid, self.steps_per_decade, self.times
+
     def amplitudes(self) -> FloatArray:
         from mdr_dask.physics import roughness
 
@@ -111,19 +116,21 @@ def _case(case: VelocityJump) -> _Case:
     )
 
 
-def _solve(case: _Case, height: FloatArray, slope: FloatArray, resolution: float, coarser: bool) -> Jump:
-    """Solve a case on the nodes given, or on every other one with half as many steps."""
-    from mdr_dask.physics.kinetics import velocity_jump
+def _solve(
+    cases: list[_Case], height: FloatArray, slope: FloatArray, resolution: FloatArray, coarser: bool
+) -> list[Jump]:
+    """Solve the cases of one line on the nodes given, or on every other one with half as many steps."""
+    from mdr_dask.physics.kinetics import velocity_jumps
 
-    every, steps = (2, case.steps_per_decade / 2) if coarser else (1, case.steps_per_decade)
-    reaches = case.reach, case.reach * (1 + case.change)
-    return velocity_jump(
+    shared = cases[0]
+    every, steps = (2, shared.steps_per_decade / 2) if coarser else (1, shared.steps_per_decade)
+    return velocity_jumps(
         height[::every],
         slope[::every],
-        case.load,
-        reaches,
-        np.array(case.times),
-        np.pi * case.points,
+        np.array([case.load for case in cases]),
+        np.array([(case.reach, case.reach * (1 + case.change)) for case in cases]),
+        np.array(shared.times),
+        np.pi * shared.points,
         steps,
         resolution,
     )
@@ -151,38 +158,41 @@ def compute(block: Block[VelocityJump]) -> Result:
     groups: dict[_Case, list[int]] = {}
     for j, parameter in enumerate(parameters):
         groups.setdefault(_case(parameter), []).append(j)
-    lines: dict[tuple[object, ...], tuple[FloatArray, FloatArray]] = {}
+    lines: dict[tuple[object, ...], list[_Case]] = {}
+    for case in groups:
+        lines.setdefault(case.line(), []).append(case)
     for r, realisation in enumerate(block.realisations):
-        lines.clear()
-        for case, members in groups.items():
+        for cases in lines.values():
             try:
-                amplitude = case.amplitudes()
+                amplitude = cases[0].amplitudes()
             except ValueError as problem:
-                messages.update({(j, r): str(problem) for j in members})
+                messages.update({(j, r): str(problem) for case in cases for j in groups[case]})
                 continue
             slope_rms = roughness.spectral_slope(amplitude)
-            key = (case.hurst, case.points, case.rolloff, case.longest, case.oversampling)
-            if key not in lines:
-                phase = roughness.phases(block.seed, realisation, case.points // 2)
-                nodes = case.points * case.oversampling
-                lines[key] = tuple(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))  # type: ignore[assignment]
-            found: dict[str, float | FloatArray] = {"rms_slope": slope_rms}
-            state = kinetics.CONVERGED
+            states = [kinetics.CONVERGED] * len(cases)
+            found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
             if FROM_JUMP.intersection(block.outputs):
-                jump = _solve(case, *lines[key], resolution * slope_rms * case.load, False)
-                solves += 1
-                state = jump.status
-                found |= _outputs(case, jump)
-                if "discretisation_error" in block.outputs and state == kinetics.CONVERGED:
-                    coarse = _solve(case, *lines[key], 0.0, True)
-                    found["discretisation_error"] = _error(jump, coarse)
-            for j in members:
-                status[j, r] = STATUS[state]
-                if state:
-                    messages[j, r] = kinetics.MESSAGES[state]
-                for name in block.outputs if state == kinetics.CONVERGED else ():
-                    scale = 1.0 if name == "discretisation_error" else scales[j]
-                    values[name][j, r] = found[name] * scale
+                phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+                nodes = cases[0].points * cases[0].oversampling
+                line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+                resolutions = resolution * slope_rms * np.array([case.load for case in cases])
+                jumps = _solve(cases, *line, resolutions, False)
+                solves += len(cases)
+                states = [jump.status for jump in jumps]
+                for case, jump, row in zip(cases, jumps, found, strict=True):
+                    row |= _outputs(case, jump)
+                if "discretisation_error" in block.outputs:
+                    coarse = _solve(cases, *line, 0 * resolutions, True)
+                    for fine, other, row in zip(jumps, coarse, found, strict=True):
+                        row["discretisation_error"] = _error(fine, other)
+            for case, state, row in zip(cases, states, found, strict=True):
+                for j in groups[case]:
+                    status[j, r] = STATUS[state]
+                    if state:
+                        messages[j, r] = kinetics.MESSAGES[state]
+                    for name in block.outputs if state == kinetics.CONVERGED else ():
+                        scale = 1.0 if name == "discretisation_error" else scales[j]
+                        values[name][j, r] = row[name] * scale
     return Result(values, status, messages, solves)
 
 

@@ -11,10 +11,13 @@ from scipy.interpolate import CubicSpline
 
 from mdr_dask.physics.kinetics_kernels import (
     BLOCK,
+    CANDIDATES,
     DRAG,
     LENGTH,
     LOAD,
     STIFFNESS,
+    SUMS,
+    WINDOWS,
     Course,
     Pace,
     Patches,
@@ -25,6 +28,7 @@ from mdr_dask.physics.kinetics_kernels import (
     released,
     touch,
 )
+from mdr_dask.physics.sliding import INVALID as STEADY_INVALID
 from mdr_dask.physics.sliding import steady_sliding
 
 FloatArray = NDArray[np.float64]
@@ -38,6 +42,8 @@ MESSAGES = {
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
+NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
+EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
@@ -132,12 +138,13 @@ def _settle(
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
     start, end = np.empty(floor.size), np.empty(floor.size)
+    places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums)
+        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1, 0.0), np.inf, reach, start, end, sums, places, spreads)
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
@@ -221,7 +228,8 @@ def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, 
     """
     finer = STEPS_PER_DECADE / per_decade
     first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
-    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * max(abs(change), NEGLIGIBLE * load), last)
+    scale = max(abs(change), NEGLIGIBLE * load)
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, NEWTON * scale, last)
 
 
 def velocity_jump(
@@ -262,21 +270,48 @@ def velocity_jump(
     Jump
         With ``mu = drag / load`` times height over length.
     """
-    empty = np.full(times.size, np.nan)
-    failed = Jump(np.nan, np.nan, np.nan, empty, np.full(2, np.nan), 0, INVALID)
-    both = np.array(reaches)
-    good = np.all(np.isfinite(height)) and np.all(both > 0) and np.all(np.isfinite(both)) and 0 < load < np.inf
-    if not good:
-        return failed
-    steady = steady_sliding(height, slope, both, np.full(2, load))
-    if steady.status.any():
-        return failed._replace(status=NOT_CONVERGED)
+    cases = np.array([load]), np.array([reaches])
+    return velocity_jumps(height, slope, *cases, times, wavenumber, per_decade, np.array([resolution]))[0]
+
+
+def velocity_jumps(
+    height: FloatArray,
+    slope: FloatArray,
+    loads: FloatArray,
+    reaches: FloatArray,
+    times: FloatArray,
+    wavenumber: float,
+    per_decade: float,
+    resolutions: FloatArray,
+) -> list[Jump]:
+    """Return the jumps of many cases on one line, whose steady states are found together; see :func:`velocity_jump`.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+    loads, resolutions : array, shape (cases,)
+    reaches : array, shape (cases, 2)
+    times, wavenumber, per_decade
+        As of one case, which does not depend on the others.
+    """
+    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, INVALID)
+    if not np.all(np.isfinite(height)):
+        return [failed] * loads.size
+    steady = steady_sliding(height, slope, reaches.ravel(), np.repeat(loads, 2), contact=False)
+    depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
     profile, top = cubic_profile(height, slope)
-    pace = pace_after(
-        float(times[-1]), reaches[1], wavenumber, per_decade, float(steady.depth[1] - steady.depth[0]), load
-    )
-    jump = _relax(profile, load, reaches, steady.depth + top, times, pace, resolution)
-    return jump._replace(depth=jump.depth - top)
+    equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
+    jumps = []
+    for k in range(loads.size):
+        if states[k].any():
+            jumps.append(failed._replace(status=INVALID if STEADY_INVALID in states[k] else NOT_CONVERGED))
+            continue
+        change = float(depths[k, 1] - depths[k, 0])
+        pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
+        ends = float(resolutions[k]), equilibrium
+        jump = _relax(profile, float(loads[k]), tuple(reaches[k]), depths[k] + top, times, pace, ends)
+        jumps.append(jump._replace(depth=jump.depth - top))
+    return jumps
 
 
 def _relax(
@@ -286,10 +321,10 @@ def _relax(
     depths: FloatArray,
     times: FloatArray,
     pace: Pace,
-    resolution: float,
+    ends: tuple[float, float],
 ) -> Jump:
     """Solve both steady states on one profile and march between them."""
-    sums = np.empty(4)
+    sums = np.empty(SUMS)
     failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
     floor = np.zeros(profile.height.size)
     low, high = float(depths.min()), float(depths.max())
@@ -314,6 +349,8 @@ def _relax(
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed
+        resolution, equilibrium = ends
+        settled = min(max(equilibrium, resolution / max(abs(sums[DRAG] - after), 1e-300)), 1.0)
         course = np.empty((4, MOMENTS))
         course[:, 0] = 0.0, first.depth, rate, sums[DRAG]
         count, status = march(
@@ -325,7 +362,7 @@ def _relax(
             load,
             pace,
             (low - margin, high + margin),
-            (last.depth, after, resolution),
+            (last.depth, after, max(10 * equilibrium, settled) * abs(last.depth - first.depth), settled),
             *course,
         )
         if status == 1:
@@ -342,11 +379,12 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
     """Return the steady state at a depth."""
     nothing = np.empty(0)
     none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
-    start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(4)
+    start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(SUMS)
+    places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
-    course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1)
-    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums), 0)
+    course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1, 0.0)
+    found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums, places, spreads), 0)
     pressed = np.empty(found)
     for k in range(found):
         pressed[k] = depth + height_at(profile, end[k])[0]

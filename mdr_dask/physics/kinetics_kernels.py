@@ -26,10 +26,14 @@ BLOCK = 16
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 TRIALS = 80
-CLOSE, EXACT = 1e-7, 1e-11  # of the load: where a last secant step follows, and where none is needed
+EXACT = 1e-11  # of the load
 ROOT_STEPS = 60
+SETTLED = 2.5  # times the time since when a march has been near its end: where it ends
+NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
+MET = 3e-4  # of a cell: a last Newton step that is not checked
 GUARD_CELLS = 200.0
-LOAD, DRAG, LENGTH, STIFFNESS = range(4)
+LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS = range(6)
+SUMS = 6
 
 
 class Profile(NamedTuple):
@@ -70,15 +74,19 @@ class Patches(NamedTuple):
 
 
 class Course(NamedTuple):
-    """The depth and its rate at the moments so far, ``count`` of them; constant depth where there is none."""
+    """The depth and its rate at the moments so far, ``count`` of them; constant depth where there is none.
+
+    ``stiff`` is the derivative of the last rate by the last depth.
+    """
 
     time: FloatArray
     depth: FloatArray
     rate: FloatArray
     count: int  # type: ignore[assignment]
+    stiff: float
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i over 0..1."""
     h = profile.height[i]
@@ -87,7 +95,7 @@ def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     return h, enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
     y = x / profile.cell
@@ -101,7 +109,7 @@ def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return the height at x, its integral up to x and that of its slope squared."""
     y = x / profile.cell
@@ -117,7 +125,7 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
     h0, area0, square0 = integrals_at(profile, start)
@@ -125,15 +133,18 @@ def add_patch(profile: Profile, start: float, end: float, lift: float, reach: fl
     sums[LOAD] += lift * (end - start) + area1 - area0 + reach * (h1 - h0)
     sums[DRAG] += lift * (h1 - h0) + 0.5 * (h1 * h1 - h0 * h0) + reach * (square1 - square0)
     sums[LENGTH] += end - start
+    sums[TILT] += h1 - h0
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _moment(course: Course, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = course.count - 1
     if last <= 0 or t >= course.time[last]:
         return course.depth[last], course.rate[last], 0.0
-    low, high = 0, last
+    low, high, back = last - 1, last, 1
+    while course.time[low] > t and low > 0:
+        high, low, back = low, max(low - back, 0), 2 * back
     while high - low > 1:
         middle = (low + high) // 2
         if course.time[middle] <= t:
@@ -152,16 +163,29 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     )
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
+def _follows(course: Course, t: float) -> float:
+    """Return the derivative of the depth at time t by the last depth."""
+    last = course.count - 1
+    if last <= 0 or t >= course.time[last]:
+        return 1.0
+    if t <= course.time[last - 1]:
+        return 0.0
+    step = course.time[last] - course.time[last - 1]
+    y = (t - course.time[last - 1]) / step
+    return y * y * (3 - 2 * y + course.stiff * step * (y - 1))
+
+
+@njit(nogil=True, cache=True, _nrt=False)
 def _left_from(
     profile: Profile, course: Course, t: float, reach: float, x: float, place: float
 ) -> tuple[float, float, float]:
-    """Return displacement at x of an element that left near `place`, its slope along x, and how much has faded.
+    """Return displacement at x of an element that left near `place`, its slope along x, and its derivative by the depth.
 
     The leaving point of that element is where its load vanished then, not where it vanishes now; a few Newton steps
     from there suffice, because the displacement is stationary in it.
     """
-    best, best_slope, best_fade = -1.0, 0.0, 0.0
+    best, best_slope, best_gain = -1.0, 0.0, 0.0
     s = place
     for _ in range(4):
         then = t - (x - s) / reach
@@ -170,19 +194,21 @@ def _left_from(
         d, rate, change = _moment(course, then)
         h, slope, curvature = height_at(profile, s)
         fade = np.exp(-(x - s) / reach)
-        u = (d + h) * fade
-        if u > best:
-            best, best_slope, best_fade = u, -(d + h + rate) * fade / reach, fade
         force = d + h + rate + reach * slope
         falls = (rate + change) / reach + slope + reach * curvature
         step = -force / falls if falls < 0 else 0.0
-        if abs(step) < 1e-4 * profile.cell:
+        near = abs(step) < NEAR * profile.cell
+        u = (d + h + (0.5 * force * step / reach if near else 0.0)) * fade
+        if u > best:
+            best, best_slope = u, -(d + h + rate) * fade / reach
+            best_gain = _follows(course, then) * fade
+        if near:
             break
         s = min(max(s + min(max(step, -2 * profile.cell), 2 * profile.cell), 0.0), x)
-    return best, best_slope, best_fade
+    return best, best_slope, best_gain
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
     s = x - reach * t
@@ -205,7 +231,7 @@ def _before(profile: Profile, first: Patches, t: float, reach: float, x: float) 
     return u, -u / first.reach
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _wake(
     profile: Profile,
     first: Patches,
@@ -217,20 +243,20 @@ def _wake(
     count: int,
     oldest: float,
 ) -> tuple[float, float, float]:
-    """Return the displacement at x of elements in free flight, its slope along x, and how much has faded."""
-    u, slope, fade = 0.0, 0.0, 0.0
+    """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
+    u, slope, gain = 0.0, 0.0, 0.0
     for k in range(count):
-        value, value_slope, value_fade = _left_from(profile, course, t, reach, x, places[k])
+        value, value_slope, value_gain = _left_from(profile, course, t, reach, x, places[k])
         if value > u:
-            u, slope, fade = value, value_slope, value_fade
+            u, slope, gain = value, value_slope, value_gain
     if first.count > 0 and t < 45 and x - reach * t > oldest:
         value, value_slope = _before(profile, first, t, reach, x)
         if value > u:
-            u, slope, fade = value, value_slope, 0.0
-    return u, slope, fade
+            u, slope, gain = value, value_slope, 0.0
+    return u, slope, gain
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _unloading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' falls through zero between low and high."""
     x = 0.5 * (low + high)
@@ -251,7 +277,7 @@ def _unloading(profile: Profile, lift: float, reach: float, low: float, high: fl
     return x
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _meeting(
     profile: Profile,
     first: Patches,
@@ -265,13 +291,13 @@ def _meeting(
     count: int,
     oldest: float,
 ) -> tuple[float, float, float]:
-    """Return where the profile rises through the wake, the slope of their gap there, and how much has faded."""
+    """Return where the profile rises through the wake, the slopes of their gap by place and depth."""
     depth = course.depth[course.count - 1]
-    slope, fade = 1.0, 0.0
+    slope, gain = 1.0, 0.0
     for _ in range(ROOT_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
-        u, u_slope, fade = _wake(profile, first, course, t, reach, x, places, count, oldest)
+        u, u_slope, gain = _wake(profile, first, course, t, reach, x, places, count, oldest)
         h, h_slope, _ = height_at(profile, x)
         gap = depth + h - u
         slope = h_slope - u_slope
@@ -280,13 +306,13 @@ def _meeting(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2 * profile.cell
-        if abs(step) < 1e-6 * profile.cell or high - low < 1e-9 * profile.cell:
-            return min(max(x + step, low), high), slope, fade
+        if abs(step) < MET * profile.cell or high - low < 1e-9 * profile.cell:
+            return min(max(x + step, low), high), slope, 1 - gain
         x += step
-    return x, slope, fade
+    return x, slope, 1 - gain
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12 * profile.cell:
@@ -300,7 +326,7 @@ def _losing(profile: Profile, first: Patches, t: float, reach: float, depth: flo
     return high
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
     now = course.count - 1
@@ -314,7 +340,7 @@ def _spreads(course: Course, t: float, reach: float, window: float, spreads: Flo
         spreads[k] = highest - lowest
 
 
-@njit(nogil=True, cache=True, inline="always")
+@njit(nogil=True, cache=True, _nrt=False, inline="always")
 def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     """Return the range of the depth while the profile went a distance."""
     k = 0
@@ -324,7 +350,30 @@ def _spread(spreads: FloatArray, window: float, distance: float) -> float:
     return float(spreads[k])
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
+def _worth_keeping(
+    profile: Profile,
+    course: Course,
+    t: float,
+    reach: float,
+    x: float,
+    pressed: float,
+    spreads: FloatArray,
+    window: float,
+    places: FloatArray,
+    count: int,
+) -> int:
+    """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
+    kept = 0
+    for k in range(count):
+        u = _left_from(profile, course, t, reach, x, places[k])[0]
+        if u + 2 * _spread(spreads, window, 2 * (x - places[k]) + window) >= pressed:
+            places[kept] = places[k]
+            kept += 1
+    return kept
+
+
+@njit(nogil=True, cache=True, _nrt=False)
 def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
     """Write the least p + reach p' over the nodes that end the cells of each block of `BLOCK` cells."""
     for m in range(least.size):
@@ -334,7 +383,7 @@ def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
         least[m] = value
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
     s = x - reach * t
@@ -355,7 +404,7 @@ def _next_free(profile: Profile, first: Patches, t: float, reach: float, x: floa
     return float(until + turns + reach * t)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def touch(
     profile: Profile,
     runs: IntArray,
@@ -368,6 +417,8 @@ def touch(
     start: FloatArray,
     end: FloatArray,
     sums: FloatArray,
+    places: FloatArray,
+    spreads: FloatArray,
 ) -> int:
     """Find the patches in contact at time t, at the last depth and rate of the course, and add up their forces.
 
@@ -388,8 +439,10 @@ def touch(
         Time since the jump, and v tau / L since then.
     start, end : array
         Written: the patches.
-    sums : array, shape (4,)
-        Written: load and drag over 4 G L, length in contact, derivative of the load by the depth at constant rate.
+    sums : array, shape (SUMS,)
+        Written: load and drag over 4 G L, length in contact, rise over it, derivatives of load and drag by the depth.
+    places, spreads : array, shape (CANDIDATES,), (WINDOWS,)
+        Room.
 
     Returns
     -------
@@ -399,13 +452,13 @@ def touch(
     depth = course.depth[course.count - 1]
     lift = depth + course.rate[course.count - 1]
     height, slope, cell = profile.height, profile.slope, profile.cell
-    places, known, found, edges = np.empty(CANDIDATES), 0, 0, 0.0
+    known, found, edges, edges_drag = 0, 0, 0.0, 0.0
     oldest, last_start = -np.inf, -np.inf
     contact, begin, free_from = profile.periodic, profile.origin, 0.0
     finish = 1.0 + profile.origin if profile.periodic else np.inf
     guard = first.count > 0 and reach * t < GUARD_CELLS * cell
     next_free = _next_free(profile, first, t, reach, begin) if guard and contact else np.inf
-    window, spreads = WINDOW_CELLS * cell, np.empty(WINDOWS)
+    window = WINDOW_CELLS * cell
     _spreads(course, t, reach, window, spreads)
     fade_of_cell = np.exp(-cell / (min(reach, first.reach) if first.count > 0 else reach))
     least_free, known_at = 0.0, 0.0
@@ -440,10 +493,8 @@ def touch(
                 add_patch(profile, begin, until, lift, reach, sums)
                 start[found], end[found] = begin, until
                 found += 1
-                w_begin, w = depth + height_at(profile, begin)[0], depth + height_at(profile, until)[0]
-                spread = _spread(spreads, window, 2 * (until - places[0]) + window) if known > 0 else spreads[0]
-                if w_begin * np.exp(-(until - begin) / reach) + 2 * spread < w:
-                    known = 0
+                w = depth + height_at(profile, until)[0]
+                known = _worth_keeping(profile, course, t, reach, until, w, spreads, window, places, known)
                 least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                 oldest, last_start = last_start, begin
                 if not lost:
@@ -470,11 +521,12 @@ def touch(
             least_free, known_at = (u - spread) * fade_of_cell, probe
             if gap > 0:
                 guess = probe - gap / rise if rise > 0 else low
-                begin, rise, fade = _meeting(profile, first, course, t, reach, low, probe, guess, places, known, oldest)
+                begin, rise, gain = _meeting(profile, first, course, t, reach, low, probe, guess, places, known, oldest)
                 h, h_slope, _ = height_at(profile, begin)
-                memory = fade if course.count == 1 else 0.0
                 if rise > 0:
-                    edges += max(lift + h + reach * h_slope, 0.0) * (1 - memory) / rise
+                    edge = max(lift + h + reach * h_slope, 0.0) * gain / rise
+                    edges += edge
+                    edges_drag += edge * h_slope
                 contact = True
                 next_free = _next_free(profile, first, t, reach, begin) if guard else np.inf
             if pulls and gap > -2 * spread:
@@ -485,8 +537,7 @@ def touch(
                     start[found], end[found] = begin, probe
                     found += 1
                     oldest, last_start = last_start, begin
-                    if 2 * spread < gap:
-                        known = 0
+                known = _worth_keeping(profile, course, t, reach, probe, depth + h1, spreads, window, places, known)
                 known = min(known, CANDIDATES - 1)
                 places[known] = probe
                 known += 1
@@ -500,11 +551,12 @@ def touch(
         add_patch(profile, begin, finish, lift, reach, sums)
         start[found], end[found] = begin, finish
         found += 1
-    sums[STIFFNESS] = sums[LENGTH] + edges
+    sums[STIFFNESS] = sums[LENGTH] * (1 + course.stiff) + edges
+    sums[DRAG_STIFFNESS] = sums[TILT] * (1 + course.stiff) + edges_drag
     return found
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def released(profile: Profile, first: Patches, reach: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 
@@ -514,8 +566,8 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
         The state before the jump; displacements and depth do not change at once.
     reach, rate : float
         New v tau / L, and new rate of the depth.
-    sums : array, shape (4,)
-        Written: load and drag over 4 G L, length in contact (twice: it is the derivative of the load by the rate).
+    sums : array, shape (SUMS,)
+        Written: load and drag over 4 G L, length in contact, which is the derivative of the load by the rate.
     """
     sums[:] = 0.0
     lift = first.depth + rate
@@ -527,7 +579,9 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
         pressed = lift + h + reach * slope > 0
         while x0 < first.end[k]:
             x1 = min((i + 1) * cell, first.end[k])
-            h, slope, _ = height_at(profile, x1)
+            h, slope = profile.height[i + 1], profile.slope[i + 1]
+            if x1 == first.end[k]:
+                h, slope, _ = height_at(profile, x1)
             now = lift + h + reach * slope > 0
             if pressed and not now:
                 add_patch(profile, begin, _unloading(profile, lift, reach, x0, x1), lift, reach, sums)
@@ -538,10 +592,9 @@ def released(profile: Profile, first: Patches, reach: float, rate: float, sums: 
             i += 1
         if pressed:
             add_patch(profile, begin, first.end[k], lift, reach, sums)
-    sums[STIFFNESS] = sums[LENGTH]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _loading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' rises through zero between low and high, by bisection."""
     for _ in range(ROOT_STEPS):
@@ -554,19 +607,19 @@ def _loading(profile: Profile, lift: float, reach: float, low: float, high: floa
     return high
 
 
-@njit(nogil=True, cache=True)
-def _rate_weights(course: Course, now: int, order: int) -> tuple[float, float]:
+@njit(nogil=True, cache=True, _nrt=False)
+def _rate_weights(time: FloatArray, depth: FloatArray, now: int, order: int) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now`, from the polynomial through the last depths (BDF)."""
-    t = course.time[now]
+    t = time[now]
     a, b = 0.0, 0.0
     for j in range(1, order + 1):
-        a += 1 / (t - course.time[now - j])
+        a += 1 / (t - time[now - j])
     for j in range(1, order + 1):
-        weight = 1 / (course.time[now - j] - t)
+        weight = 1 / (time[now - j] - t)
         for m in range(1, order + 1):
             if m != j:
-                weight *= (t - course.time[now - m]) / (course.time[now - j] - course.time[now - m])
-        b += weight * course.depth[now - j]
+                weight *= (t - time[now - m]) / (time[now - j] - time[now - m])
+        b += weight * depth[now - j]
     return a, b
 
 
@@ -581,6 +634,8 @@ class Pace(NamedTuple):
         Largest ratio of one step to the one before.
     miss : float
         Largest difference, in depth, of what a parabola foretells from what is found.
+    close : float
+        Largest change of depth that one step of Newton is trusted with.
     until : float
         Last time.
     """
@@ -588,10 +643,11 @@ class Pace(NamedTuple):
     first: float
     growth: float
     miss: float
+    close: float
     until: float
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, _nrt=False)
 def _balance(
     profile: Profile,
     runs: IntArray,
@@ -603,54 +659,46 @@ def _balance(
     load: float,
     weights: tuple[float, float],
     limits: tuple[float, float],
-    gain: float,
-    room: tuple[FloatArray, FloatArray],
-) -> tuple[int, float, float]:
-    """Find the depth that carries the load at the last moment of the course, by secants.
+    close: float,
+    room: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+) -> tuple[int, float]:
+    """Find the depth that carries the load at the last moment of the course, by Newton steps.
 
     Returns
     -------
     status : int
         0 found, 1 not found, 2 limits exceeded.
     drag : float
-    gain : float
-        True derivative of the load over the one at frozen past, for the next moment.
     """
     now = course.count - 1
     guess, (a, b) = course.depth[now], weights
-    sums = np.empty(4)
+    start, end, sums, places, spreads = room
     low, high = limits
-    off, before, before_off, before_drag = np.inf, guess, np.inf, 0.0
     for trial in range(TRIALS):
         course.depth[now], course.rate[now] = guess, a * guess + b
-        found = touch(profile, runs, floor, least, first, course, course.time[now], reach, room[0], room[1], sums)
+        found = touch(
+            profile, runs, floor, least, first, course, course.time[now], reach, start, end, sums, places, spreads
+        )
         if found < 0:
-            return 2, 0.0, gain
-        off = sums[LOAD] / load - 1
-        drag = sums[DRAG]
-        if abs(off) <= (CLOSE if trial > 0 else EXACT):
-            if trial > 0 and off != before_off:
-                share = off / (before_off - off)
-                guess += share * (guess - before)
-                drag += share * (drag - before_drag)
-            course.depth[now], course.rate[now] = guess, a * guess + b
-            return 0, drag, gain
-        stiffness = (sums[STIFFNESS] + a * sums[LENGTH]) / load
-        if trial > 0 and (off - before_off) * (guess - before) > 0:
-            gain = min(max((off - before_off) / (guess - before) / stiffness, 0.02), 2.0)
+            return 2, 0.0
+        off = sums[LOAD] - load
+        step = -off / sums[STIFFNESS] if sums[STIFFNESS] > 0 else 0.5 * (low + high) - guess
         if off < 0:
             low = guess
         else:
             high = guess
+        if abs(step) <= close or abs(off) <= EXACT * load:
+            guess += step
+            course.depth[now], course.rate[now] = guess, a * guess + b
+            return 0, sums[DRAG] + step * sums[DRAG_STIFFNESS]
         if high - low <= 1e-13 * (abs(low) + abs(high)):
-            return 0, drag, gain  # the load jumps here, as a grid lets it where a patch comes or goes
-        before, before_off, before_drag = guess, off, drag
-        guess -= off / (gain * stiffness)
+            return 0, sums[DRAG]  # the load jumps here, as a grid lets it where a patch comes or goes
+        guess += step
         if not limits[0] <= guess <= limits[1]:
-            return 2, 0.0, gain
+            return 2, 0.0
         if trial > 4 and not low < guess < high:
             guess = 0.5 * (low + high)
-    return 1, 0.0, gain
+    return 1, 0.0
 
 
 @njit(nogil=True, cache=True)
@@ -663,7 +711,7 @@ def march(
     load: float,
     pace: Pace,
     limits: tuple[float, float],
-    aim: tuple[float, float, float],
+    aim: tuple[float, float, float, float],
     time: FloatArray,
     depth: FloatArray,
     rate: FloatArray,
@@ -681,7 +729,7 @@ def march(
     limits : tuple of float
         Least and greatest depth for which `runs` and `floor` hold.
     aim : tuple of float
-        Final depth and drag, and how near to both the march ends (zero for never).
+        Final depth and drag, how near to the depth the march ends, and which part of the largest distance of the drag.
     time, depth, rate, drag : array, shape (m,)
         Written from the second entry on; the first one holds the state right after the jump.
 
@@ -692,10 +740,11 @@ def march(
     status : int
         0 done, 1 depth not found, 2 limits exceeded.
     """
-    room = np.empty(4 * first.count + 4096), np.empty(4 * first.count + 4096)
+    most = 4 * first.count + 4096
+    room = np.empty(most), np.empty(most), np.empty(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(profile.height.size // BLOCK)
     block_least(profile, reach, least)
-    near, gain, step, now = 0, 1.0, pace.first, 1
+    near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - aim[1])
     while time[now - 1] < pace.until:
         if now == time.size:
             return now, 1
@@ -703,17 +752,17 @@ def march(
         if pace.until - time[now] < 0.1 * step:
             time[now] = pace.until
         taken = time[now] - time[now - 1]
-        course = Course(time, depth, rate, now + 1)
         if now == 1:
             weights = 2 / taken, -2 * depth[0] / taken - rate[0]
             foretold = depth[0] + taken * rate[0]
         else:
-            weights = _rate_weights(course, now, min(now, 3))
+            weights = _rate_weights(time, depth, now, min(now, 3))
             bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
             foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
         depth[now] = min(max(foretold, limits[0]), limits[1])
-        status, drag[now], gain = _balance(
-            profile, runs, floor, least, first, course, reach, load, weights, limits, gain, room
+        course = Course(time, depth, rate, now + 1, weights[0])
+        status, drag[now] = _balance(
+            profile, runs, floor, least, first, course, reach, load, weights, limits, pace.close, room
         )
         miss = abs(depth[now] - foretold) if status == 0 else 8 * pace.miss
         if miss > 2 * pace.miss or status != 0:
@@ -722,8 +771,10 @@ def march(
             step = taken * max(0.25, 0.8 * (pace.miss / miss) ** (1 / 3))
             continue
         step = taken * min(pace.growth, 0.9 * (pace.miss / max(miss, 1e-300)) ** (1 / 3))
-        near = near + 1 if abs(drag[now] - aim[1]) <= aim[2] and abs(depth[now] - aim[0]) <= aim[2] else 0
+        farthest = max(farthest, abs(drag[now] - aim[1]))
+        settled = abs(drag[now] - aim[1]) <= aim[3] * farthest and abs(depth[now] - aim[0]) <= aim[2]
+        near = near if settled else time[now]
         now += 1
-        if near == 8:
+        if settled and time[now - 1] > SETTLED * near:
             break
     return now, 0

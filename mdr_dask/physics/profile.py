@@ -83,12 +83,12 @@ def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[Fl
     for i in range(enter.size):
         rise = height[i + 1] - height[i]
         b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
-        x = summit(enter[i], b, c)
-        if x > 1:
-            x = 0.0 if height[i] >= height[i + 1] else 1.0
-            peaks[i] = max(height[i], height[i + 1])
-        else:
-            peaks[i] = height[i] + x * (enter[i] + x * (b + x * c))
+        x = 0.0 if height[i] >= height[i + 1] else 1.0
+        peaks[i] = max(height[i], height[i + 1])
+        inside = summit(enter[i], b, c)
+        top = height[i] + inside * (enter[i] + inside * (b + inside * c))
+        if inside < 1 and top > peaks[i]:
+            x, peaks[i] = inside, top
         if i == 0 or peaks[i] > peaks[best]:
             best, place = i, x
     return peaks, best, place

@@ -8,27 +8,55 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from mdr_dask.physics.indenter import shape
+from mdr_dask.physics.protocol_kernels import (
+    CONVERGED,
+    NOT_CONVERGED,
+    OUTSIDE_LINE,
+    ROWS,
+    Foundation,
+    Line,
+    State,
+    follow_elements,
+    mean_after,
+    orbit,
+    under_elements,
+)
 
 FloatArray = NDArray[np.float64]
 
-CONVERGED, NOT_CONVERGED = 0, 1
-MESSAGES = {NOT_CONVERGED: "the depth for the load was not found at one moment of the protocol"}
+MESSAGES = {
+    NOT_CONVERGED: "the depth for the load was not found at one moment of the protocol",
+    OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
+}
+TURNS = 3000  # of an element around the line before it is as it was
+STEADY = 1e-14  # of the depth at the start
+NEARLY = 1e-6  # of the load: what the steady state at the start may miss
+TOUCHING = 1e-12  # of its height: what touches but for rounding
 
 
 class Response(NamedTuple):
-    """State at every moment of a protocol.
+    """State at every moment of a protocol, energies in height squared.
 
     Parameters
     ----------
-    drag, depth, rate, contact, stored, dissipated : array, shape (moments,)
-        F_x / (4 G L) in the unit of height squared over length; depth; its derivative by t / tau; fraction in contact;
-        energy stored and power dissipated over 4 G L, in height squared (per tau).
+    drag, depth, rate, contact : array, shape (moments,)
+        F_x / (4 G L) in the unit of height squared over length; depth; its derivative by t / tau; fraction in contact.
+    stored : array, shape (moments,)
+        Energy stored over 4 G L.
+    work, lost : array, shape (moments,)
+        Work done on the elements and energy lost since the first moment, over 4 G L; their difference is what the
+        stored energy has grown by, but for rounding. An element that leaves a line that does not close counts with
+        all that it will lose.
     displacement : array, shape (n,)
-        Of every element at the end, for going on from there.
+        Of every element at the end.
     status : int
         `CONVERGED` or a key of `MESSAGES`.
+    state : State
+        Of every element at the end, for going on from there.
     """
 
     drag: FloatArray
@@ -36,172 +64,165 @@ class Response(NamedTuple):
     rate: FloatArray
     contact: FloatArray
     stored: FloatArray
-    dissipated: FloatArray
+    work: FloatArray
+    lost: FloatArray
     displacement: FloatArray
     status: int
+    state: State
 
 
-@njit(nogil=True, cache=True)
-def _under(height: FloatArray, slope: FloatArray, travel: float, under: FloatArray, slope_under: FloatArray) -> None:
-    """Write height and slope of the profile over every element after a travel, from cubic cells."""
-    n = height.size
-    cells = travel * n
-    shift = int(np.floor(cells))
-    y = cells - shift
-    a0, a1 = (1 + 2 * y) * (1 - y) ** 2, y * y * (3 - 2 * y)
-    b0, b1 = y * (1 - y) ** 2 / n, y * y * (y - 1) / n
-    g0, k0, k1 = 6 * y * (y - 1) * n, (1 - y) * (1 - 3 * y), y * (3 * y - 2)
-    i = shift % n
-    for j in range(n):
-        m = i + 1 if i + 1 < n else 0
-        under[j] = a0 * height[i] + a1 * height[m] + b0 * slope[i] + b1 * slope[m]
-        slope_under[j] = g0 * (height[i] - height[m]) + k0 * slope[i] + k1 * slope[m]
-        i = m
+def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
+    """Return the foundation of a solid, with the modes in which it recovers without force.
+
+    Parameters
+    ----------
+    moduli, times : array_like, shape (arms,)
+        G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
+    viscosity : float
+        eta / G_inf in that unit; 1 for the Kelvin body (no arms) if the unit is tau.
+
+    Raises
+    ------
+    ValueError
+        If the solid is elastic, so that nothing relaxes.
+    """
+    g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
+    if g.size == 0 and not viscosity > 0:
+        raise ValueError("expected a solid with an arm or a dashpot, got an elastic one")
+    glass = 1 + g.sum()
+    arms, load = np.diag(g), np.zeros(g.size)
+    if viscosity > 0:
+        weight = np.append(viscosity, g * tau)
+        stiffness = np.block([[np.array([[glass]]), -g[None, :]], [-g[:, None], arms]])
+        load = np.append(1.0, load)
+    else:
+        weight, stiffness, load = g * tau, arms - np.outer(g, g) / glass, g / glass
+    root = np.sqrt(weight)
+    rates, modes = np.linalg.eigh(stiffness / root / root[:, None])
+    outward = np.ascontiguousarray(modes / root[:, None])
+    inward = np.ascontiguousarray(modes.T * root)
+    return Foundation(g, tau, float(viscosity), rates, outward, inward, modes.T @ (load / root))
 
 
-@njit(nogil=True, cache=True)
-def _depth(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
-    n = under.size
-    for _ in range(200):
-        total, touching = 0.0, 0
-        for j in range(n):
-            w = depth + under[j]
-            if w > free[j]:
-                total += w
-                touching += 1
-            else:
-                total += free[j]
-        if touching == 0:
-            nearest = np.inf
-            for j in range(n):
-                nearest = min(nearest, free[j] - under[j])
-            if abs(total - mean * n) <= 1e-12 * abs(mean) * n:
-                return nearest, True
-            depth = nearest + (mean * n - total)
-            continue
-        step = (mean * n - total) / touching
-        depth += step
-        if abs(step) <= 1e-12 * (abs(depth) + abs(mean)):
-            return depth, True
-    return depth, False
+KELVIN = foundation([], [], 1.0)
 
 
-@njit(nogil=True, cache=True)
-def _forces(
-    under: FloatArray, slope: FloatArray, free: FloatArray, depth: float, rate: float, reach: float
-) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact; edges are placed inside the cells by linear interpolation."""
-    n = under.size
-    load, drag, length = 0.0, 0.0, 0.0
-    gap0 = depth + under[n - 1] - free[n - 1]
-    f0, s0 = depth + under[n - 1] + rate + reach * slope[n - 1], slope[n - 1]
-    for j in range(n):
-        gap1 = depth + under[j] - free[j]
-        f1, s1 = depth + under[j] + rate + reach * slope[j], slope[j]
-        low, high = 0.0, 1.0
-        if gap0 < 0 and gap1 < 0:
-            high = 0.0
-        elif gap0 < 0:
-            low = gap0 / (gap0 - gap1)
-        elif gap1 < 0:
-            high = gap0 / (gap0 - gap1)
-        if f0 <= 0 and f1 <= 0:
-            high = low
-        elif f0 < 0:
-            low = max(low, f0 / (f0 - f1))
-        elif f1 < 0:
-            high = min(high, f0 / (f0 - f1))
-        if high > low:
-            width, middle = high - low, 0.5 * (low + high)
-            f, s = f0 + (f1 - f0) * middle, s0 + (s1 - s0) * middle
-            load += width * f
-            drag += width * (f * s + width * width / 12 * (f1 - f0) * (s1 - s0))
-            length += width
-        gap0, f0, s0 = gap1, f1, s1
-    return load / n, drag / n, length / n
+def closed_line(height: FloatArray, slope: FloatArray) -> Line:
+    """Return a periodic line of unit length from heights and slopes at its n nodes."""
+    return Line(np.append(height, height[0]), np.append(slope, slope[0]), True)
 
 
-@njit(nogil=True, cache=True)
-def _rate(
-    under: FloatArray, slope: FloatArray, free: FloatArray, depth: float, rate: float, reach: float, load: float
-) -> tuple[float, float, float]:
-    """Find the rate of the depth that carries the load; return it with drag and fraction in contact."""
-    drag, length = 0.0, 0.0
-    for _ in range(60):
-        carried, drag, length = _forces(under, slope, free, depth, rate, reach)
-        if length <= 0 or abs(carried - load) <= 1e-11 * load:
-            break
-        rate += (load - carried) / length
-    return rate, drag, length
+def indented_line(height: FloatArray, slope: FloatArray, coefficient: float, exponent: float) -> Line:
+    """Return a rough indenter h(x) - c |x|^n on a line that does not close.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n + 1,)
+        The roughness and its derivative at the nodes of a line of unit length, both ends included.
+    coefficient, exponent : float
+        c > 0 and n >= 1; x is measured from node n // 2. The kink of a cone is rounded over one cell.
+    """
+    n = height.size - 1
+    smooth, left, right = shape((np.arange(n + 1) - n // 2) / n, coefficient, exponent)
+    return Line(height + smooth, slope + 0.5 * (left + right), False)
 
 
-@njit(nogil=True, cache=True)
-def _follow(
-    height: FloatArray,
-    slope: FloatArray,
+def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tuple[State, float, int]:
+    """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
+
+    One element is carried around the line until it comes back as it was, in steps of one cell by the method of
+    :func:`follow_line`; the depth is the root of a mean displacement that increases with it. At ``reach = 0`` the
+    elements have rested under the load for ever.
+
+    Returns
+    -------
+    state : State
+    depth : float
+    status : int
+        `CONVERGED` or a key of `MESSAGES`.
+    """
+    n, arms = line.height.size - 1, solid.times.size
+    state = State(np.zeros(n), np.zeros((n, arms)), np.zeros(n), np.zeros(n, np.bool_))
+    low = -float(line.height[:n].max())
+
+    def excess(depth: float) -> float:
+        carried = _sliding(line, solid, state, reach, depth) if reach > 0 else _resting(line, state, depth)
+        return carried / load - 1
+
+    width = load
+    while (found := excess(low + width)) < 0:
+        low, width = low + width, 2 * width
+    if not np.isfinite(found):
+        return state, np.nan, NOT_CONVERGED
+    depth = brentq(excess, low, low + width, xtol=1e-15 * width, rtol=STEADY)
+    if not abs(excess(depth)) < NEARLY:
+        return state, depth, NOT_CONVERGED
+    outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
+    return state, depth, OUTSIDE_LINE if outside else CONVERGED
+
+
+def _resting(line: Line, state: State, depth: float) -> float:
+    """Fill all elements of a body at rest; return the load."""
+    w = depth + line.height[:-1]
+    state.displacement[:] = np.maximum(w, 0)
+    state.arms[:] = state.displacement[:, None]
+    state.free[:] = 0.0
+    state.touching[:] = w > 0
+    return float(state.displacement.mean())
+
+
+def _sliding(line: Line, solid: Foundation, state: State, reach: float, depth: float) -> float:
+    """Fill all elements in the steady state at a depth; return the load that makes their mean what it is."""
+    if depth + line.height[:-1].max() <= 0:
+        return 0.0
+    n = line.height.size - 1
+    good, last = orbit(solid, line, reach, depth, state, TURNS)
+    if not good:
+        return np.nan
+    step, modes = 1 / (n * reach), np.empty(solid.rates.size)
+    mean = float(state.displacement.mean()) + (0.0 if line.periodic else last / n)
+    without = mean_after(solid, state, 0.0, 0.0, step, modes)
+    return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
+
+
+def follow_line(
+    line: Line,
+    solid: Foundation,
     moments: FloatArray,
     travels: FloatArray,
     reaches: FloatArray,
     loads: FloatArray,
-    u: FloatArray,
+    state: State,
     depth: float,
-    mean: float,
-    out: FloatArray,
-) -> int:
-    """March all elements through the moments; see :func:`follow`. Rows of `out` are the fields of `Response`."""
-    n = height.size
-    under, grade = np.empty(n), np.empty(n)
-    below, before_grade = np.empty(n), np.empty(n)
-    free, pressed = np.empty(n), np.empty(n)
-    _under(height, slope, travels[0], under, grade)
-    rate = 0.0
-    for j in range(n):  # what touches at first touches but for rounding
-        if abs(depth + under[j] - u[j]) < 1e-12 * (abs(depth) + abs(under[j]) + u[j]):
-            u[j] = depth + under[j]
-    rate, drag, length = _rate(under, grade, u, depth, rate, reaches[0], loads[0])
-    previous = u.copy()
-    for now in range(moments.size):
-        if now > 0:
-            step = moments[now] - moments[now - 1]
-            below[:], before_grade[:] = under, grade
-            old_depth, old_rate, old_reach = depth, rate, reaches[now - 1]
-            _under(height, slope, travels[now], under, grade)
-            fade = np.exp(-step)
-            rise = (loads[now] - loads[now - 1]) / step
-            mean = (mean - loads[now - 1] + rise) * fade + loads[now] - rise
-            for j in range(n):
-                previous[j] = u[j]
-                free[j] = u[j] * fade
-                pressed[j] = free[j]
-            for _ in range(3):
-                depth, good = _depth(under, free, mean, depth)
-                if not good:
-                    return NOT_CONVERGED
-                rate, drag, length = _rate(under, grade, free, depth, rate, reaches[now], loads[now])
-                for j in range(n):
-                    w0 = old_depth + below[j]
-                    f0 = (w0 + old_rate + old_reach * before_grade[j]) * step
-                    f1 = (depth + under[j] + rate + reaches[now] * grade[j]) * step / fade
-                    if w0 >= previous[j] * (1 - 1e-12) and f0 > 0 and f1 < 0:
-                        y = f0 / (f0 - f1)
-                        w1 = (depth + under[j]) / fade
-                        peak = w0 + y * (f0 + y * (3 * (w1 - w0) - 2 * f0 - f1 + y * (f0 + f1 - 2 * (w1 - w0))))
-                        pressed[j] = max(peak, w0) * fade
-                    else:
-                        pressed[j] = previous[j] * fade
-                free[:] = pressed
-            for j in range(n):
-                u[j] = max(depth + under[j], free[j])
-        stored, lost = 0.0, 0.0
-        for j in range(n):
-            stored += 0.5 * u[j] * u[j]
-            w = depth + under[j]
-            speed = rate + reaches[now] * grade[j]
-            lost += speed * speed if u[j] == w and w + speed > 0 else u[j] * u[j]
-        out[0, now], out[1, now], out[2, now], out[3, now] = drag, depth, rate, length
-        out[4, now], out[5, now] = stored / n, lost / n
-    return CONVERGED
+) -> Response:
+    """Follow every element of any linear foundation under any line through a course of velocity and load.
+
+    Within a step an element in contact is moved at constant speed, one in flight recovers by the modes of the solid,
+    and it is let go or touched inside the step where force or gap vanish. The total of the loads decides the mean
+    displacement, whatever is in contact, so that the depth is the root of a convex sum.
+
+    Parameters
+    ----------
+    line : Line
+        From :func:`closed_line` or :func:`indented_line`; elements enter the latter undeformed.
+    solid : Foundation
+    moments : array, shape (m,)
+        Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
+    travels, reaches : array, shape (m,)
+        Distance travelled over L, and its derivative, of either sign.
+    loads : array, shape (m,)
+        F_N / (4 G_inf L), positive; linear between the moments.
+    state, depth
+        At the first moment, as :func:`steady_start` or an earlier `Response` gives them; left as they are.
+
+    Returns
+    -------
+    Response
+    """
+    now = State(*(part.copy() for part in state))
+    out = np.full((ROWS, moments.size), np.nan)
+    status = follow_elements(solid, line, moments, travels, reaches, loads, now, depth, out)
+    return Response(*out, now.displacement, status, now)
 
 
 def follow(
@@ -214,32 +235,24 @@ def follow(
     displacement: FloatArray,
     depth: float,
 ) -> Response:
-    """Follow every element of a periodic line through a course of velocity and load.
-
-    In free flight an element fades exponentially; in contact it has the displacement that the profile imposes, and
-    where it leaves within a step the largest displacement is found inside the step. The total of the loads fixes the
-    mean displacement, F_N / (4 G L) = I + tau dI/dt, so that the depth is the root of a convex sum.
+    """Follow every element of a Kelvin foundation on a periodic line; time in tau.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
         Profile of unit length, as in :func:`mdr_dask.physics.kinetics.cubic_profile`.
-    moments : array, shape (m,)
-        Times over tau, increasing; a jump needs the moments before and after it apart by a short step.
-    travels, reaches : array, shape (m,)
-        Distance travelled over L, and its derivative by t / tau, of either sign.
-    loads : array, shape (m,)
-        F_N / (4 G L), positive; linear between the moments.
+    moments, travels, reaches, loads
+        As in :func:`follow_line`.
     displacement : array, shape (n,)
         Of every element at the first moment; the profile stands over element j at ``x_j + travel``.
     depth : float
         Depth at the first moment.
-
-    Returns
-    -------
-    Response
     """
-    u = displacement.copy()
-    out = np.full((6, moments.size), np.nan)
-    status = _follow(height, slope, moments, travels, reaches, loads, u, depth, float(u.mean()), out)
-    return Response(out[0], out[1], out[2], out[3], out[4], out[5], u, status)
+    line = closed_line(height, slope)
+    under, grade = np.empty(height.size), np.empty(height.size)
+    under_elements(line, float(travels[0]), under, grade)
+    w = depth + under
+    touching = np.abs(w - displacement) < TOUCHING * (abs(depth) + np.abs(under) + displacement)
+    u = np.where(touching, w, displacement)
+    state = State(u, np.zeros((u.size, 0)), u.copy(), touching)
+    return follow_line(line, KELVIN, moments, travels, reaches, loads, state, depth)

@@ -38,7 +38,7 @@ MESSAGES = {
 }
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
-LATTICE_BITS = 14  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
+LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
 @dataclass(frozen=True)

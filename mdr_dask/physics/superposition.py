@@ -10,11 +10,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
-from scipy.linalg import cho_factor, cho_solve
-from scipy.sparse import csr_array, diags_array, hstack
 
 from mdr_dask.errors import DataError
+from mdr_dask.physics import spline_system
 
 FloatArray = NDArray[np.float64]
 
@@ -37,6 +35,15 @@ DRAW_ITERATIONS = 3
 WEIGHED = (0, 1, 2, 4, 8)
 """Iterations that choose the smoothing anew."""
 
+EXPECTED_SHIFT = 1.0
+"""Standard deviation, in widths of a curve, that shifts between neighbours are expected to have about the usual one.
+
+It decides only where the curves do not: on a plateau, or along a straight line with vertical factors.
+"""
+
+LEAST_SHARE = 1e-3
+"""Likelihood of a smoothing, relative to all, below which it is left out."""
+
 CONVERGED = 1e-5
 """Last step of the shifts, in decades."""
 
@@ -57,6 +64,8 @@ class Superposition:
         The group's value at which the factors are zero.
     noise : float
         Scatter of log10 y about the curve.
+    freedom : float
+        Degrees of freedom of the scatter, for quantiles of Student's t.
     x, y : array, shape (points,)
         All points after shifting, ascending in x.
     member : array of int, shape (points,)
@@ -76,6 +85,7 @@ class Superposition:
     covariance: FloatArray
     reference: float
     noise: float
+    freedom: float
     x: FloatArray
     y: FloatArray
     member: NDArray[np.intp]
@@ -132,14 +142,16 @@ def superpose(
     """
     values, sorted_curves = _sorted(groups, curves)
     problem = _Problem.of(values, sorted_curves)
-    shifts, weight = problem.fit(problem.first_guess(sorted_curves), None)
+    guess = problem.first_guess(sorted_curves)
+    problem = replace(problem, usual=float(np.median(np.diff(guess, prepend=0.0))))
+    shifts, settled = problem.fit(guess, None)
     if vertical:
         problem = replace(problem, vertical=True)
-        shifts, weight = problem.fit(np.append(shifts, np.zeros(values.size - 1)), None)
-    result = problem.result(shifts, weight, values)
+        shifts, settled = problem.fit(np.append(shifts, np.zeros(values.size - 1)), None)
+    result = problem.result(shifts, settled, values)
     _require_overlap(result)
     if draws:
-        result = replace(result, draws=problem.bootstrap(shifts, weight, draws, seed))
+        result = replace(result, draws=problem.bootstrap(shifts, settled, draws, seed))
     return rereference(result, values[values.size // 2] if reference is None else reference)
 
 
@@ -169,6 +181,7 @@ class _Problem:
     curves: int
     vertical: bool
     width: float
+    usual: float = 0.0
 
     @classmethod
     def of(cls, values: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> _Problem:
@@ -194,34 +207,42 @@ class _Problem:
         pairs = [_pair_shift(*one, *other) for one, other in pairwise(curves)]
         return np.cumsum(np.array(pairs))
 
-    def knots(self, x: FloatArray) -> FloatArray:
+    def cells(self, x: FloatArray) -> tuple[float, float, int]:
+        """Return where the spline begins, the width of its cells and their number."""
         cells = int(np.clip(np.ceil(CELLS_PER_CURVE * np.ptp(x) / self.width), 2 * DEGREE, MOST_CELLS))
-        step = np.ptp(x) * (1 + 1e-9) / cells
-        knots = x.min() - 0.5e-9 * np.ptp(x) + step * np.arange(-DEGREE, cells + DEGREE + 1)
-        return np.asarray(knots, dtype=np.float64)
+        return float(x.min()), float(np.ptp(x)) / cells, cells
 
-    def fit(self, shifts: FloatArray, weight: float | None, iterations: int = ITERATIONS) -> tuple[FloatArray, float]:
-        """Return shifts by damped Gauss-Newton steps, and the smoothing weight, chosen unless given."""
-        smoothing, longest = weight, 0.3 * self.width
-        system, step = _System.at(self, shifts), np.zeros(self.free)
+    def fit(
+        self, shifts: FloatArray, settled: _Settled | None, iterations: int = ITERATIONS
+    ) -> tuple[FloatArray, _Settled]:
+        """Return shifts by damped Gauss-Newton steps, and smoothing and scatter, found unless given."""
+        choice, longest = settled or _Settled(FIRST_WEIGHT, 0.0), 0.3 * self.width
+        system = _System.at(self, shifts, choice)
         for iteration in range(iterations):
-            if weight is None and iteration in WEIGHED:
-                smoothing = system.likeliest_weight()
-            assert smoothing is not None
-            step = system.solve(smoothing)[system.splines :]
+            if settled is None and iteration in WEIGHED:
+                choice = system.likeliest()
+                system = _System.at(self, shifts, choice)
+            step = system.solve(choice.weight)[system.splines :]
             largest = float(np.abs(step).max())
             if largest < CONVERGED or longest < CONVERGED:
                 break
-            proposal = _System.at(self, shifts + step * min(1.0, longest / largest))
-            if proposal.misfit(smoothing) <= system.misfit(smoothing) * (1 + 1e-6):
+            proposal = _System.at(self, shifts + step * min(1.0, longest / largest), choice)
+            if proposal.misfit(choice.weight) <= system.misfit(choice.weight) * (1 + 1e-6):
                 shifts, system = shifts + step * min(1.0, longest / largest), proposal
             else:
                 longest = 0.3 * min(longest, largest)
-        return shifts, float(smoothing if smoothing is not None else 1.0)
+        return shifts, choice
 
-    def result(self, shifts: FloatArray, weight: float, values: FloatArray) -> Superposition:
-        system = _System.at(self, shifts)
-        solution, covariance, noise = system.posterior(weight)
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Return rows and targets of what is expected of the shifts: neighbours lie `usual` apart, within a width."""
+        rows = np.zeros((self.curves - 1, self.free))
+        rows[:, : self.curves - 1] = np.eye(self.curves - 1) - np.eye(self.curves - 1, k=-1)
+        scale = EXPECTED_SHIFT * self.width
+        return rows / scale, np.full(self.curves - 1, self.usual / scale)
+
+    def result(self, shifts: FloatArray, settled: _Settled, values: FloatArray) -> Superposition:
+        system = _System.at(self, shifts, settled)
+        solution, covariance, noise, freedom = system.posterior(settled.weight)
         horizontal, vertical = self.split(shifts)
         full = np.zeros((2 * self.curves, 2 * self.curves))
         places = np.r_[1 : self.curves, self.curves + 1 : 2 * self.curves][: self.free]
@@ -229,9 +250,9 @@ class _Problem:
         x, y = self.x + horizontal[self.member], self.y + vertical[self.member]
         order = np.argsort(x, kind="stable")
         grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
-        rows = BSpline.design_matrix(grid, system.knots, DEGREE).toarray()
+        rows = system.curve(grid)
         inner = covariance[: system.splines, : system.splines]
-        error = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, inner, rows), 0))
+        error = np.sqrt(np.maximum(np.sum((rows @ inner) * rows, axis=1), 0))
         own = x[self.member == 0]
         return Superposition(
             values,
@@ -240,6 +261,7 @@ class _Problem:
             full,
             float(values[0]),
             noise,
+            freedom,
             x[order],
             y[order],
             self.member[order],
@@ -250,19 +272,27 @@ class _Problem:
             np.empty((0, 2 * self.curves)),
         )
 
-    def bootstrap(self, shifts: FloatArray, weight: float, draws: int, seed: int) -> FloatArray:
+    def bootstrap(self, shifts: FloatArray, settled: _Settled, draws: int, seed: int) -> FloatArray:
         """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves)."""
         generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-        system = _System.at(self, shifts)
-        fitted, scatter = system.residuals(weight)
+        system = _System.at(self, shifts, settled)
+        fitted, scatter = system.residuals(settled.weight)
         vertical = self.split(shifts)[1][self.member]
         places = [np.flatnonzero(self.member == curve) for curve in range(self.curves)]
         samples = np.empty((draws, 2 * self.curves))
         for row in samples:
             drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
             again = replace(self, y=fitted + drawn - vertical)
-            row[:] = np.concatenate(self.split(again.fit(shifts, weight, DRAW_ITERATIONS)[0]))
+            row[:] = np.concatenate(self.split(again.fit(shifts, settled, DRAW_ITERATIONS)[0]))
         return samples
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """Weight of the curvature, and variance of the scatter by which the expected overlap is weighed."""
+
+    weight: float
+    variance: float
 
 
 @dataclass(frozen=True)
@@ -272,85 +302,132 @@ class _System:
     """
 
     splines: int
-    knots: FloatArray
-    design: FloatArray
+    low: float
+    step: float
+    first: NDArray[np.intp]
+    value: FloatArray
+    steepness: FloatArray
+    member: NDArray[np.intp]
     target: FloatArray
     normal: FloatArray
     right: FloatArray
+    total: float
     penalty: FloatArray
 
     @classmethod
-    def at(cls, problem: _Problem, shifts: FloatArray) -> _System:
+    def at(cls, problem: _Problem, shifts: FloatArray, settled: _Settled) -> _System:
+        """Linearise about the curve of a smoothing: a rougher one has steeper slopes, and promises too much."""
         horizontal, vertical = problem.split(shifts)
         x, target = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
-        knots = problem.knots(x)
-        basis = BSpline.design_matrix(x, knots, DEGREE)
-        splines = basis.shape[1]
-        gram = (basis.T @ basis).toarray()
-        penalty = _curvature(splines) * np.trace(gram) / splines
-        smooth = cho_solve(
-            cho_factor(gram + FIRST_WEIGHT * penalty + 1e-9 * np.eye(splines)), np.asarray(basis.T @ target)
-        )
-        slope = BSpline(knots, smooth, DEGREE).derivative()(x)
-        moved = csr_array((problem.member[:, None] == np.arange(1, problem.curves)).astype(np.float64))
-        columns = [basis, moved.multiply(slope[:, None])] + ([-moved] if problem.vertical else [])
-        design = csr_array(hstack(columns))
-        padded = np.zeros((design.shape[1], design.shape[1]))
-        padded[:splines, :splines] = penalty
-        return cls(splines, knots, design.toarray(), target, (design.T @ design).toarray(), design.T @ target, padded)
+        low, step, cells = problem.cells(x)
+        splines, first = cells + DEGREE, np.empty(x.size, np.intp)
+        value, slope = np.empty((x.size, DEGREE + 1)), np.empty((x.size, DEGREE + 1))
+        spline_system.spline_rows(x, low, step, cells, first, value, slope)
+        size = splines + problem.free
+        normal, right = np.empty((size, size)), np.empty(size)
+        shape = problem.curves, splines, problem.vertical, target, normal, right
+        spline_system.normal_equations(first, value, np.zeros(x.size), problem.member, *shape)
+        gram = normal[:splines, :splines].copy()
+        curvature = _curvature(splines) * np.trace(gram) / splines
+        smooth = gram + settled.weight * curvature
+        spline_system.factorise(smooth)
+        curve = spline_system.solve(smooth, right[:splines].copy())
+        steepness = np.einsum("ij,ij->i", slope, curve[first[:, None] + np.arange(DEGREE + 1)])
+        spline_system.normal_equations(first, value, steepness, problem.member, *shape)
+        penalty = np.zeros((size, size))
+        penalty[:splines, :splines] = curvature
+        rows, wanted = problem.expected()
+        missing = wanted - rows @ shifts
+        normal[splines:, splines:] += settled.variance * (rows.T @ rows)
+        right[splines:] += settled.variance * (rows.T @ missing)
+        total = float(target @ target + settled.variance * (missing @ missing))
+        return cls(splines, low, step, first, value, steepness, problem.member, target, normal, right, total, penalty)
 
-    def _factor(self, weight: float) -> tuple[FloatArray, bool]:
-        matrix = self.normal + weight * self.penalty
-        ridge = 1e-12 * np.trace(matrix) / matrix.shape[0]
-        factor: tuple[FloatArray, bool] = cho_factor(matrix + ridge * np.eye(matrix.shape[0]))
-        return factor
+    def _factor(self, weight: float) -> FloatArray:
+        matrix: FloatArray = self.normal + weight * self.penalty
+        spline_system.factorise(matrix)
+        return matrix
 
     def solve(self, weight: float) -> FloatArray:
-        solution: FloatArray = cho_solve(self._factor(weight), self.right)
+        solution: FloatArray = spline_system.solve(self._factor(weight), self.right)
         return solution
 
     def misfit(self, weight: float) -> float:
         """Return the sum of squares with its penalty for the best curve through these shifts."""
         inner = slice(self.splines)
         matrix = self.normal[inner, inner] + weight * self.penalty[inner, inner]
-        matrix[np.diag_indices(self.splines)] += 1e-12 * np.trace(matrix) / self.splines
-        along = float(self.right[inner] @ cho_solve(cho_factor(matrix), self.right[inner]))
-        return float(self.target @ self.target) - along
+        spline_system.factorise(matrix)
+        right = self.right[inner].copy()
+        return self.total - float(right @ spline_system.solve(matrix, right))
 
-    def likeliest_weight(self) -> float:
-        """Return the smoothing weight of largest restricted likelihood."""
-        fixed = self.design.shape[1] - (self.splines - 2)
-        total = float(self.target @ self.target)
-        scores = []
-        for weight in SMOOTHING:
-            factor = self._factor(weight)
-            misfit = max(total - float(self.right @ cho_solve(factor, self.right)), 1e-14 * total + 1e-300)
-            volume = 2 * np.log(np.diag(factor[0])).sum() - (self.splines - 2) * np.log(weight)
-            scores.append(volume + (self.target.size - fixed) * np.log(misfit))
-        return float(SMOOTHING[int(np.argmin(scores))])
+    def _scores(self) -> FloatArray:
+        numbers = self.right, self.total, self.target.size, self.splines - 2, SMOOTHING
+        scores: FloatArray = spline_system.likelihoods(self.normal, self.penalty, *numbers)
+        return scores
 
-    def posterior(self, weight: float) -> tuple[FloatArray, FloatArray, float]:
-        """Return the solution, its covariance (smoothness counted as prior knowledge) and the scatter."""
-        factor = self._factor(weight)
-        inverse = cho_solve(factor, np.eye(self.normal.shape[0]))
+    def likeliest(self) -> _Settled:
+        """Return the smoothing weight of largest restricted likelihood, and the scatter with it."""
+        weight = float(SMOOTHING[int(np.argmin(self._scores()))])
+        return _Settled(weight, max(self.misfit(weight), 0.0) / max(self.target.size - self.right.size, 1))
+
+    def _given(self, weight: float) -> tuple[FloatArray, FloatArray, float, float]:
+        """Return the solution, its covariance, the variance of the scatter and its degrees of freedom."""
+        inverse = spline_system.inverse(self._factor(weight))
         solution = inverse @ self.right
         freedom = max(self.target.size - float(np.sum(inverse * self.normal)), 1.0)
-        variance = float(np.sum((self.target - self.design @ solution) ** 2)) / freedom
-        return solution, variance * inverse, float(np.sqrt(variance))
+        variance = float(np.sum((self.target - self.design() @ solution) ** 2)) / freedom
+        return solution, variance * inverse, variance, freedom
+
+    def posterior(self, weight: float) -> tuple[FloatArray, FloatArray, float, float]:
+        """Return the solution, its covariance, the scatter and its degrees of freedom.
+
+        Smoothness counts as prior knowledge; that it is known only from the data adds to the covariance, by the mean
+        over all smoothing weights with their likelihoods.
+        """
+        best, _, variance, freedom = self._given(weight)
+        scores = self._scores()
+        share = np.exp(-0.5 * (scores - scores.min()))
+        covariance = np.zeros_like(self.normal)
+        for part, other in zip(share / share.sum(), SMOOTHING, strict=True):
+            if part > LEAST_SHARE:
+                solution, spread, _, _ = self._given(float(other))
+                covariance += part * (spread + np.outer(solution - best, solution - best))
+        return best, covariance, float(np.sqrt(variance)), freedom
+
+    def design(self) -> FloatArray:
+        """Return the matrix of the linearised problem, shape (points, unknowns)."""
+        rows = np.arange(self.target.size)
+        design = np.zeros((rows.size, self.right.size))
+        design[rows[:, None], self.first[:, None] + np.arange(DEGREE + 1)] = self.value
+        moved = self.member > 0
+        design[rows[moved], self.splines + self.member[moved] - 1] = self.steepness[moved]
+        curves = int(self.member.max()) + 1
+        if self.right.size > self.splines + curves - 1:
+            design[rows[moved], self.splines + curves - 1 + self.member[moved] - 1] = -1.0
+        return design
+
+    def curve(self, x: FloatArray) -> FloatArray:
+        """Return the rows of the splines at any x within their range, shape (points, splines)."""
+        first, cells = np.empty(x.size, np.intp), self.splines - DEGREE
+        value, slope = np.empty((x.size, DEGREE + 1)), np.empty((x.size, DEGREE + 1))
+        spline_system.spline_rows(x, self.low, self.step, cells, first, value, slope)
+        rows = np.zeros((x.size, self.splines))
+        np.put_along_axis(rows, first[:, None] + np.arange(DEGREE + 1), value, axis=1)
+        return rows
 
     def residuals(self, weight: float) -> tuple[FloatArray, FloatArray]:
         """Return fitted values, and residuals enlarged by their leverage."""
-        inverse = cho_solve(self._factor(weight), np.eye(self.normal.shape[0]))
-        fitted = self.design @ (inverse @ self.right)
-        leverage = np.einsum("ij,jk,ik->i", self.design, inverse, self.design)
+        inverse, design = spline_system.inverse(self._factor(weight)), self.design()
+        fitted = design @ (inverse @ self.right)
+        leverage = np.sum((design @ inverse) * design, axis=1)
         scatter = (self.target - fitted) / np.sqrt(np.maximum(1 - leverage, 0.05))
         return fitted, np.asarray(scatter, dtype=np.float64)
 
 
 def _curvature(size: int) -> FloatArray:
     """Return the matrix of the sum of squared second differences."""
-    second = csr_array(diags_array([1.0, -2.0, 1.0], offsets=[0, 1, 2], shape=(size - 2, size)))
-    return np.asarray(csr_array(second.T @ second).toarray(), dtype=np.float64)
+    second = np.diff(np.eye(size), 2, axis=0)
+    return np.asarray(second.T @ second, dtype=np.float64)
 
 
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:

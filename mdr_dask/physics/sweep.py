@@ -72,12 +72,13 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @njit(nogil=True, cache=True)
 def summit(a: float, b: float, c: float) -> float:
-    """Return where a cubic that rises at 0 and falls at 1 is highest, or `NONE`."""
-    if not (a > 0 and a + 2 * b + 3 * c < 0):
+    """Return where between 0 and 1 a cubic has its maximum, or `NONE`."""
+    discriminant = b * b - 3 * a * c
+    if not discriminant > 0:
         return NONE
-    root = np.sqrt(max(b * b - 3 * a * c, 0.0))
-    place: float = -a / (b - root) if b < 0 else -(b + root) / (3 * c)
-    return place
+    root = math.sqrt(discriminant)
+    place = a / (root - b) if b < 0 else -(b + root) / (3 * c) if c < 0 else NONE
+    return place if 0 < place < 1 else NONE
 
 
 @njit(nogil=True, cache=True)
@@ -85,9 +86,17 @@ def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: Fl
     """Write the depth that keeps each whole cell pressed, w + reach w' > 0, and its maximum over blocks."""
     height, enter, leave = cells.height, cells.enter, cells.leave
     for i in range(barriers.size):
-        first = -(height[i] + reach * enter[i])
+        h0, a, b, c = cubic(height, enter, leave, i)
+        first = -(h0 + reach * a)
         last = -(height[i + 1] + reach * leave[i])
-        barriers[i] = first if first > last else last
+        highest = first if first > last else last
+        # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
+        q, r = a + 2 * reach * b, b + 3 * reach * c
+        x = summit(-q, -r, -c)
+        if x < 1:
+            inside = first - x * (q + x * (r + x * c))
+            highest = inside if inside > highest else highest
+        barriers[i] = highest
     for j in range(block_barriers.size):
         highest = barriers[j * BLOCK]
         for i in range(j * BLOCK + 1, (j + 1) * BLOCK):
@@ -105,36 +114,54 @@ def _lost(x: float) -> float:
 
 @njit(nogil=True, cache=True)
 def _leaving(w0: float, a: float, b: float, c: float, reach: float, start: float) -> float:
-    """Return where w + reach w' falls to 0 between start and 1, or `NONE`."""
-    if w0 + a + b + c + reach * (a + 2 * b + 3 * c) > 0:
-        return NONE
-    # the force is a cubic itself
+    """Return where w + reach w' falls through 0 first between start and 1, or `NONE`."""
+    # the force is a cubic itself, cut into its monotone pieces
     p, q, r = w0 + reach * a, a + 2 * reach * b, b + 3 * reach * c
-    low, high, x = start, 1.0, start
+    low, force = start, p + start * (q + start * (r + start * c))
+    discriminant = r * r - 3 * c * q
+    root = math.sqrt(discriminant) if discriminant > 0 else 0.0
+    lead = -(r + root) if r > 0 else root - r
+    one, other = (lead / (3 * c) if c != 0 else NONE), (q / lead if lead != 0 else NONE)
+    one, other = (one, other) if one < other else (other, one)
+    for piece in range(3):
+        high = 1.0 if piece == 2 else (one if piece == 0 else other)
+        if not low < high <= 1:
+            continue
+        end = p + high * (q + high * (r + high * c))
+        if force > 0 and end <= 0:
+            return _falling(p, q, r, c, low, high)
+        low, force = high, end
+    return NONE
+
+
+@njit(nogil=True, cache=True)
+def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
+    """Return the root of a cubic that falls monotonously from low to high."""
+    x = low + (high - low) * 0.5
     for _ in range(ITERATIONS):
         force = p + x * (q + x * (r + x * c))
         if force > 0:
             low = x
         else:
-            if x == start:
-                return start
             high = x
         slope = q + x * (2 * r + x * 3 * c)
         step = x - force / slope if slope < 0 else high
         if abs(step - x) < CLOSE:
-            return min(max(step, start), 1.0)
+            return min(max(step, low), high)
         x = step if low < step < high else 0.5 * (low + high)
     return x
 
 
 @njit(nogil=True, cache=True)
-def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, end: float) -> float:
-    """Return where w rises to u exp(-x / reach) between 0 and end, where it is known to be above."""
-    if w0 >= u:
-        return 0.0
-    low, high, x = 0.0, end, end
+def _touching(
+    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, high: float
+) -> float:
+    """Return where w rises to u exp(-(x - start) / reach) between low and high, where it is known to be above."""
+    if w0 + low * (a + low * (b + low * c)) >= u - u * _lost((low - start) / reach):
+        return low
+    first, end, x = low, high, high
     for _ in range(ITERATIONS):
-        free = u - u * _lost(x / reach)
+        free = u - u * _lost((x - start) / reach)
         gap = w0 + x * (a + x * (b + x * c)) - free
         if gap > 0:
             high = x
@@ -143,19 +170,30 @@ def _touching(w0: float, a: float, b: float, c: float, reach: float, u: float, e
         slope = a + x * (2 * b + x * 3 * c) + free / reach
         step = x - gap / slope if slope > 0 else low
         if abs(step - x) < CLOSE:
-            return min(max(step, 0.0), end)
+            return min(max(step, first), end)
         x = step if low < step < high else 0.5 * (low + high)
     return x
 
 
 @njit(nogil=True, cache=True)
-def _reached(w0: float, a: float, b: float, c: float, reach: float, u: float, decay: float) -> float:
-    """Return the end of the stretch of a cell where a free element touches, or `NONE`."""
-    if w0 + a + b + c > u * decay:
-        return 1.0
-    x = summit(a, b, c)
-    if x < 1 and w0 + x * (a + x * (b + x * c)) > u - u * _lost(x / reach):
-        return x
+def _touch(
+    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, stop: float
+) -> float:
+    """Return where from low to stop an element that is free from start on, with u there, touches first, or `NONE`.
+
+    The lead of the profile, (w - u_free) exp(x / reach), rises while the force w + reach w' is positive.
+    """
+    for _ in range(3):
+        force = w0 + low * (a + low * (b + low * c)) + reach * (a + low * (2 * b + low * 3 * c))
+        first = low if force > 0 else _leaving(-w0, -a, -b, -c, reach, low)
+        if first >= stop:
+            return NONE
+        high = min(_leaving(w0, a, b, c, reach, first), stop)
+        if w0 + high * (a + high * (b + high * c)) > u - u * _lost((high - start) / reach):
+            return _touching(w0, a, b, c, reach, u, start, first, high)
+        if high >= stop:
+            return NONE
+        low = high + CLOSE
     return NONE
 
 
@@ -226,7 +264,9 @@ def sweep(
         0.0,
         0.0,
     )  # displacement where the contact was left, at the start of this cell; place of leaving
-    while i < n:
+    # the turn ends in a part of a cell that repeats the first, at the highest point again
+    last = n if cells.periodic and start > 0 else n - 1
+    while i <= last:
         if contact and x == 0:
             while i < n and barriers[i] < depth:
                 if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
@@ -253,45 +293,43 @@ def sweep(
                     i += 1
                 # numbers below the normal ones cost a hundred times as much
                 free = free if free > TINY else 0.0
-        if i >= n:
+        if i > last:
             break
+        stop = 1.0 if i < n else start
         h0, c1, c2, c3 = cubic(height, enter, leave, i)
         w0 = depth + h0
-        if contact:
-            place, u, free = _leave(w0, c1, c2, c3, reach, x)
-            part, part_stretch = _pressed(w0, c1, c2, c3, x, min(place, 1.0))
-            area += part
-            stretch += part_stretch
-            length += min(place, 1.0) - x
-            contact = place > 1
-            left = i + place
-            x = 0.0
-            i += 1
-            continue
-        x = _touch(w0, c1, c2, c3, reach, free, decay)
-        contact = x <= 1
-        if contact:
-            flight = _landed(u, i + x - left, reach, c1 + x * (2 * c2 + x * 3 * c3))
+        visits = 0
+        while True:
+            if contact:
+                pressed = w0 + x * (c1 + x * (c2 + x * c3)) + reach * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
+                place = _leaving(w0, c1, c2, c3, reach, x) if pressed else x
+                end = min(place, stop)
+                part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
+                area += part
+                stretch += part_stretch
+                length += end - x
+                visits += 1
+                if place >= stop:
+                    break
+                contact, left, x = False, i + place, place
+                free = u = w0 + place * (c1 + place * (c2 + place * c3))
+            # a force that is a cubic falls through 0 twice at most
+            low = x + CLOSE if visits > 0 else x
+            touch = _touch(w0, c1, c2, c3, reach, free, x, low, stop) if visits < 2 and low < stop else NONE
+            if touch > stop:
+                free -= free * _lost((stop - x) / reach)
+                break
+            flight = _landed(u, i + touch - left, reach, c1 + touch * (2 * c2 + touch * 3 * c3))
             area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
-        else:
-            free *= decay
-            x = 0.0
-            i += 1
-    # the last part of the turn, up to the highest point again; or the last flight, which does not end
-    h0, c1, c2, c3 = cubic(height, enter, leave, n)
-    w0 = depth + h0
-    x = 0.0
+            contact, x = True, touch
+        x = 0.0
+        i += 1
+    # the last flight: to the highest point, or without end
     if not contact:
-        x = _touching(w0, c1, c2, c3, reach, free, start) if cells.periodic and start > 0 else 0.0
-        flown = n + x - left if cells.periodic else np.inf
-        slope = c1 + x * (2 * c2 + x * 3 * c3) if cells.periodic else 0.0
+        flown = n + start - left if cells.periodic else np.inf
+        slope = enter[n] if cells.periodic and start == 0 else 0.0
         flight = _landed(u, flown, reach, slope)
         area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
-    if cells.periodic:
-        part, part_stretch = _pressed(w0, c1, c2, c3, x, start)
-        area += part
-        stretch += part_stretch
-        length += start - x
     sums[DISPLACEMENT] = area
     sums[STIFFNESS] = rate + length
     sums[DRAG] = drag + reach * stretch
@@ -299,22 +337,3 @@ def sweep(
     sums[LENGTH] = length
     sums[STRETCH] = stretch
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
-
-
-@njit(nogil=True, cache=True)
-def _touch(w0: float, a: float, b: float, c: float, reach: float, free: float, decay: float) -> float:
-    """Return where in a cell a free element touches, or `NONE`."""
-    end = _reached(w0, a, b, c, reach, free, decay)
-    return _touching(w0, a, b, c, reach, free, end) if end <= 1 else NONE
-
-
-@njit(nogil=True, cache=True)
-def _leave(w0: float, a: float, b: float, c: float, reach: float, x: float) -> tuple[float, float, float]:
-    """Return where in a cell the contact is left after x, or `NONE`, with u there and at the end of the cell."""
-    place = _leaving(w0, a, b, c, reach, x)
-    if place > 1:
-        return NONE, 0.0, 0.0
-    u = w0 + place * (a + place * (b + place * c))
-    free = u - u * _lost((1 - place) / reach)
-    # a dip within one cell is passed over
-    return (place if w0 + a + b + c <= free else NONE), u, free

@@ -34,8 +34,8 @@ RESOLVED = 0.5
 GRIDS = (1, 2, 4)
 """Every point, every second and every fourth: extrapolation and its error estimate."""
 
-FIRST_ORDER_SHARE = 0.125
-"""Part of the correction that counts as error even where two extrapolations happen to agree."""
+SAFETY = 9.0
+"""Of the error estimate: 96 % of 7068 random solutions need 7.7, and it held in 7047 others; see docs/materials.md."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def steady_viscoelastic_sliding(
             found = _solve(below[::step], step, load, periodic, None)
         solutions.append(found)
     mean = float(heights.mean()) if periodic else 0.0
-    return _extrapolated(solutions, mean - float(heights[top]))
+    return _extrapolated(solutions, mean - float(heights[top]), below.size - 1)
 
 
 @dataclass(frozen=True)
@@ -174,8 +174,13 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     return _Solution(values, unknown, imbalance, status, sweeps)
 
 
-def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady:
-    """Extrapolate the two finest grids by their second order; the coarsest tells how well that works."""
+def _extrapolated(solutions: list[_Solution], mean: float, cells: int) -> ViscoelasticSteady:
+    """Extrapolate the two finest grids by their second order; the coarsest tells how well that works.
+
+    The error is estimated by the geometric mean of the last change of the extrapolation and of the last change of the
+    grids, one of which may be small by accident. Errors of the cells in contact are independent, so that it falls with
+    the root of their number.
+    """
     coarsest, coarse, fine = solutions
     if any(solution.status != CONVERGED for solution in solutions):
         status = fine.status if fine.status != CONVERGED else NOT_CONVERGED
@@ -186,7 +191,8 @@ def _extrapolated(solutions: list[_Solution], mean: float) -> ViscoelasticSteady
     values = np.where(resolved, fine.values + correction, fine.values)
     change = 3 * float(abs(correction[0]))
     if resolved[0]:
-        change = max(float(abs(values[0] - before[0])), FIRST_ORDER_SHARE * change)
+        touching = max(float(fine.values[2]) * cells, 1.0)
+        change = SAFETY * float(np.sqrt(abs(values[0] - before[0]) * change / touching))
     friction, depth, fraction, slope = (float(value) for value in values)
     error = change / abs(friction) if friction else change
     fraction = min(max(fraction, 0.0), 1.0)

@@ -200,6 +200,36 @@ def draw_regimes(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
+def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw the four regimes over Moes' numbers with their names, and in them the films found over their limits."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+
+    from mdr_dask.physics.film import REGIMES, limiting_films, moes_parameters, regime
+
+    columns: list[list[FloatArray]] = []
+    for dataset in _film_maps(groups, "minimum_film").values():
+        W, U, G, minimum = _table(dataset, "minimum_film")
+        columns.append([*moes_parameters(W, U, G), minimum / limiting_films(W, U, G)[regime(W, U, G), range(W.size)]])
+    M, L, ratio = (np.concatenate(column) for column in zip(*columns, strict=True))
+    across = np.geomspace(min(0.1, M.min() / 2), max(1e3, M.max() * 2), 300)
+    up = np.geomspace(min(0.1, L[L > 0].min(initial=0.1) / 2), max(1e2, L.max() * 2), 300)
+    field = regime(across, 0.5, up[:, None])  # with 2 U = 1, M is W and L is G
+    figure = Figure(figsize=(7.5, 5.2), layout="constrained")
+    axes = figure.add_subplot(xscale="log", yscale="log")
+    shades = ListedColormap(["#dbe9f6", "#fde5c8", "#e2f0d9", "#eadcf0"])
+    axes.pcolormesh(across, up, field, cmap=shades, vmin=0, vmax=3, shading="nearest", rasterized=True)
+    for index, name in enumerate(REGIMES):
+        rows, places = np.nonzero(field == index)
+        if rows.size:
+            middle = (across[int(np.median(places))], up[int(np.median(rows))])
+            axes.annotate(name.replace(" ", "\n"), middle, ha="center", va="center", weight="bold", zorder=3)
+    dots = axes.scatter(M, L, c=ratio, cmap="viridis", edgecolor="0.2", linewidth=0.5)
+    figure.colorbar(dots, label="minimum film found over the limit of its regime")
+    axes.set(xlabel="Moes' load $M = W (2U)^{-1/2}$", ylabel="Moes' lubricant parameter $L = G (2U)^{1/4}$")
+    return figure
+
+
 def _draw_along(groups: Mapping[str, xr.Dataset], axis: str, outputs: tuple[str, ...], ylabel: str) -> Figure:
     """Draw outputs along one axis, a curve for each value of the first other axis."""
     from matplotlib.figure import Figure
@@ -246,6 +276,7 @@ PLOTS: tuple[Plot, ...] = (
     Plot("film_profile", MODELS, "film and pressure over the position (thesis figure B.3)", draw_profile),
     Plot("film_formula", MODELS, "film found over the formulas of Pan and Hamrock, against these", draw_formula),
     Plot("film_regimes", MODELS, "minimum film over load in Moes' numbers, with the isoviscous limits", draw_regimes),
+    Plot("regime_map", MODELS, "the four regimes by name over Moes' numbers, and the films in them", draw_regime_map),
     Plot("starvation", MODELS, "central and minimum film over the position of the inlet", draw_starvation),
     Plot("traction", MODELS, "traction coefficient over the slide-roll ratio", draw_traction),
 )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MODELS = ("sliding_friction",)
 BAND = "bands: standard error over realisations"
 MOST_CURVES = 24
-FIT = {fit.name: fit.compute for fit in FITS}
+FIT = {fit.name: fit for fit in FITS}
 
 
 def _figure(xlabel: str, ylabel: str, title: str) -> tuple[Figure, Axes]:
@@ -176,23 +176,20 @@ def _errorbars(axes: Axes, found: xr.Dataset, name: str, label: str, over: str =
     axes.errorbar(found[over].values, found[name].values, bars, fmt="o", ms=4, capsize=2, label=label)
 
 
-def _per_series(found: xr.Dataset) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the fits of every series with a suffix for the legend."""
-    if "series" not in found.dims:
-        yield "", found
-        return
-    for name in found["series"].values:
-        yield f" ({name})", found.sel(series=name)
+def _over_hurst(name: str, series: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Fit every series that varies the Hurst exponent; return the results by a suffix for the legend."""
+    found = {key: fit for key, fit in FIT[name].results(series).items() if "hurst" in fit.dims}
+    if not found:
+        raise DataError("expected a store with an axis hurst, to draw over it")
+    return {f" ({key})" if len(found) > 1 else "": fit for key, fit in found.items()}
 
 
 def _draw_zone_one(series: Mapping[str, xr.Dataset]) -> Figure:
     """Figure 3.10: alpha and beta over the Hurst exponent, with H / (1 + H)."""
-    found = FIT["zone_one"](series)
-    if "hurst" not in found.dims:
-        raise DataError("expected a store with an axis hurst, for alpha and beta over it")
+    found = _over_hurst("zone_one", series)
     figure, axes = _figure("Hurst exponent H", "α", "law of zone 1: μ/slope = β (v τ slope/h) (GhL/F)^α (bars: 95 %)")
     other = axes.twinx()
-    for suffix, part in _per_series(found):
+    for suffix, part in found.items():
         _errorbars(axes, part, "alpha", f"α{suffix}")
         other.errorbar(
             part["hurst"].values,
@@ -217,12 +214,10 @@ def _draw_zone_one(series: Mapping[str, xr.Dataset]) -> Figure:
 
 def _draw_plateau(series: Mapping[str, xr.Dataset]) -> Figure:
     """Figure 3.11: the plateau over the Hurst exponent, one curve for every load."""
-    found = FIT["plateau"](series)
-    if "hurst" not in found.dims:
-        raise DataError("expected a store with an axis hurst, for the plateau over it")
+    found = _over_hurst("plateau", series)
     figure, axes = _figure("Hurst exponent H", "largest μ / rms slope", "plateau of friction (bars: 95 %)")
     curves = []
-    for suffix, part in _per_series(found):
+    for suffix, part in found.items():
         others = [str(dim) for dim in part["plateau"].dims if dim != "hurst"]
         for index in np.ndindex(*(part.sizes[dim] for dim in others)):
             one = part.isel(dict(zip(others, index, strict=True)))

@@ -26,11 +26,15 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
-    left, middle, right = figure.subplots(1, 3)
-    _measured(left, curve)
-    _merged(middle, curve)
-    _factors(right, curve)
+    second = curve.attrs.get("second")
+    panels = 3 if second is None else 4
+    figure = Figure(figsize=(4.4 * panels, 4.2), layout="constrained")
+    axes = figure.subplots(1, panels)
+    _measured(axes[0], curve)
+    _merged(axes[1], curve)
+    _factors(axes[2], curve, str(curve.attrs["group"]), "shift_factor", curve.attrs["reference"])
+    if second is not None:
+        _factors(axes[3], curve, str(second), "second_factor", curve.attrs["second_reference"])
     return figure
 
 
@@ -51,7 +55,7 @@ def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]
     return [
         (
             float(value),
-            curve[["point_abscissa", "point_ordinate"]].isel(
+            curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]].isel(
                 point=np.flatnonzero(curve["point_group"].to_numpy() == value)
             ),
             float(curve["shift_factor"][i]),
@@ -64,8 +68,14 @@ def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]
 def _measured(axes: Axes, curve: xr.Dataset) -> None:
     groups = _by_group(curve)
     for (value, points, shift, rise), colour in zip(groups, _colours(curve), strict=True):
-        x, y = points["point_abscissa"] / 10**shift, points["point_ordinate"] / 10**rise
-        axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}")
+        shifts = points.get("point_shift", shift)
+        x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10**rise
+        if "point_second" not in points:
+            axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}")
+            continue
+        for number, other in enumerate(np.unique(points["point_second"])):
+            one = np.flatnonzero(points["point_second"] == other)
+            axes.loglog(x[one], y[one], ".-", color=colour, label=None if number else f"{value:.3g}")
     axes.set_xlabel(_label(curve.attrs["abscissa"], curve["curve_abscissa"]))
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
     if len(groups) <= 12:
@@ -89,14 +99,13 @@ def _merged(axes: Axes, curve: xr.Dataset) -> None:
     axes.legend(fontsize="small")
 
 
-def _factors(axes: Axes, curve: xr.Dataset) -> None:
-    by = str(curve.attrs["group"])
+def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: float) -> None:
     groups = curve[by].to_numpy()
-    error = BAR * curve["shift_factor_error"]
-    axes.errorbar(groups, curve["shift_factor"], error, fmt="o", color="k", label="factors, standard error")
-    if "power_exponent" in curve:
+    error = BAR * curve[f"{factor}_error"]
+    axes.errorbar(groups, curve[factor], error, fmt="o", color="k", label="factors, 68 %")
+    if "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp"):
         exponent = float(curve["power_exponent"])
-        axes.plot(groups, exponent * np.log10(groups / curve.attrs["reference"]), label=f"slope {exponent:.3g}")
+        axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
         axes.set_xscale("log")
     axes.set_xlabel(_label(by, curve[by]))
     axes.set_ylabel(f"shift of log10 {str(curve.attrs['abscissa']).replace('_', ' ')} (decades)")

@@ -6,6 +6,7 @@ array, ``status`` last. Readers see consolidated metadata, which is replaced in 
 """
 
 from mdr_dask.store.blocks import (
+    Place,
     attempts,
     ledger,
     read_block,
@@ -21,6 +22,7 @@ from mdr_dask.store.layout import lay_out
 from mdr_dask.store.reading import datasets, save
 
 __all__ = [
+    "Place",
     "Stored",
     "attempts",
     "attributes",

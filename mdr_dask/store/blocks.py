@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -11,44 +12,62 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
+from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import names, read_json, write_bytes
+from mdr_dask.store.files import bytes_of, guarded, names, read_json, write_bytes
 
 
-def write_values(url: str, series: str, region: tuple[slice, ...], values: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write a block of every output, each a whole chunk.
+@dataclass(frozen=True)
+class Place:
+    """Where a block stands.
 
     Parameters
     ----------
     url, series : str
         Store and name of the group.
+    index : tuple of int
+        The block's place in the grid of blocks.
     region : tuple of slice
         The block's place over (axes..., realisation).
-    values : mapping of str to array
-        In the shape of the region, further dimensions behind.
+    layout : str
+        Differs whenever the store may have been laid out anew, so that nobody writes into a shape of yesterday.
     """
-    group = _open_group(url, series)
+
+    url: str
+    series: str
+    index: BlockIndex
+    region: tuple[slice, ...]
+    layout: str
+
+
+def write_values(place: Place, values: Mapping[str, NDArray[np.float64]]) -> None:
+    """Write a block of every output, each a whole chunk: its shape is that of the region, further dimensions behind."""
+    arrays = _arrays(place.url, place.series, place.layout)
     for name, array in values.items():
-        group[name][region] = array
+        with guarded(place.url, f"writing {name}"):
+            arrays[name][place.region] = array
 
 
-def write_status(url: str, series: str, region: tuple[slice, ...], status: NDArray[np.int8]) -> None:
+def write_status(place: Place, status: NDArray[np.int8]) -> None:
     """Write a block of the ledger: the last act of a task, and the only proof that it is done."""
-    _open_group(url, series)["status"][region] = status
+    with guarded(place.url, "writing status"):
+        _arrays(place.url, place.series, place.layout)["status"][place.region] = status
 
 
-def read_block(
-    url: str, series: str, region: tuple[slice, ...], outputs: tuple[str, ...]
-) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
+def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
     """Return what stands in a block: its values and its part of the ledger, as arrays that may be changed."""
-    group = _open_group(url, series)
-    return {name: np.array(group[name][region]) for name in outputs}, np.array(group["status"][region])
+    arrays = _arrays(place.url, place.series, place.layout)
+    with guarded(place.url, f"reading block {place.index}"):
+        return {name: np.array(arrays[name][place.region]) for name in outputs}, np.array(
+            arrays["status"][place.region]
+        )
 
 
-def write_record(url: str, series: str, index: BlockIndex, attempt: int, record: Mapping[str, Any]) -> None:
+def write_record(place: Place, attempt: int, record: Mapping[str, Any]) -> None:
     """Write what a block has to tell besides its numbers: times, versions, messages."""
-    name = ".".join(map(str, index))
-    write_bytes(url, f"{_records(series)}{name}-{attempt}.json", json.dumps(record, sort_keys=True).encode())
+    name = ".".join(map(str, place.index))
+    text = json.dumps(record, sort_keys=True)
+    write_bytes(place.url, f"{_records(place.series)}{name}-{attempt}.json", text.encode())
 
 
 def records(url: str, series: str) -> Iterator[dict[str, Any]]:
@@ -73,21 +92,30 @@ def _records(series: str) -> str:
     return f"{series}/status/records/" if series else "status/records/"
 
 
-def ledger(url: str, series: str) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it stands now."""
-    return np.asarray(_open_group(url, series)["status"][...])
+def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
+    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing."""
+    found = np.full(shape, Status.MISSING, dtype=np.int8)
+    if read_json(url, f"{series}/zarr.json" if series else "zarr.json") is None:
+        return found
+    with guarded(url, "reading status"):
+        status = _open(url, series)["status"]
+        found[tuple(map(slice, status.shape))] = status[...]
+    return found
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return one output of a group as it stands now, axes in the order of the store."""
-    return np.asarray(_open_group(url, series)[output][...])
+    with guarded(url, f"reading {output}"):
+        return np.asarray(_open(url, series)[output][...])
 
 
-def forget_open_groups() -> None:
-    """Drop the groups that this process holds open, after their shape has changed."""
-    _open_group.cache_clear()
+def _open(url: str, series: str) -> Any:
+    return zarr.open_group(bytes_of(url), path=series or None, mode="r", use_consolidated=True)
 
 
 @lru_cache(maxsize=64)
-def _open_group(url: str, series: str) -> Any:
-    return zarr.open_group(url, path=series or None, mode="r+", use_consolidated=True)
+def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
+    """Hold the arrays of a group open for as long as its layout stands."""
+    with guarded(url, "opening it"):
+        group = zarr.open_group(bytes_of(url), path=series or None, mode="r+", use_consolidated=True)
+        return dict(group.arrays())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -15,44 +15,105 @@ import zarr
 from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
-from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.errors import MdrDaskError, StoreBusyError, StoreError
 
 #: Raised when the layout changes so that older code cannot read it.
 LAYOUT = 1
 
 
+def local(url: str) -> Path | None:
+    """Return the path of a store on this machine, None for one at a URL."""
+    path = url.removeprefix("file://")
+    return None if "://" in path else Path(path)
+
+
 @lru_cache(maxsize=16)
 def bytes_of(url: str) -> Any:
     """Return the Zarr store, a map from names to bytes, at a path or URL."""
-    return zarr.storage.FsspecStore.from_url(url) if "://" in url else zarr.storage.LocalStore(url)
+    path = local(url)
+    if path is not None:
+        return zarr.storage.LocalStore(path)
+    try:
+        return zarr.storage.FsspecStore.from_url(url)
+    except (ImportError, ValueError) as error:
+        raise StoreError(f"{url}: {error}") from None
+
+
+@contextmanager
+def guarded(url: str, doing: str) -> Iterator[None]:
+    """Turn what the file system or the network has to complain about into one sentence."""
+    try:
+        yield
+    except MdrDaskError:
+        raise
+    except Exception as error:
+        if local(url) is not None and not isinstance(error, OSError | ValueError):
+            raise
+        why = error.strerror if isinstance(error, OSError) and error.strerror else f"{type(error).__name__}: {error}"
+        raise StoreError(f"{url}: {doing} failed: {why}") from None
 
 
 def read_json(url: str, name: str) -> dict[str, Any] | None:
     """Return a JSON document, or None if there is none of that name."""
-    if "://" not in url and not Path(url, name).is_file():
-        return None
-    content = sync(bytes_of(url).get(name, default_buffer_prototype()))
-    return None if content is None else json.loads(content.to_bytes())
+    path = local(url)
+    with guarded(url, f"reading {name}"):
+        if path is None:
+            found = sync(bytes_of(url).get(name, default_buffer_prototype()))
+            content = None if found is None else found.to_bytes()
+        else:
+            content = (path / name).read_bytes() if (path / name).is_file() else None
+        return None if content is None else json.loads(content)
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:
     """Replace what stands under a name, at once."""
-    sync(bytes_of(url).set(name, default_buffer_prototype().buffer.from_bytes(content)))
+    with guarded(url, f"writing {name}"):
+        sync(bytes_of(url).set(name, default_buffer_prototype().buffer.from_bytes(content)))
+
+
+def clear(url: str) -> None:
+    """Remove what a run left that took the place and got no further."""
+
+    async def remove() -> None:
+        for name in [name async for name in bytes_of(url).list_dir("") if name != "zarr.json"]:
+            await bytes_of(url).delete_dir(name)
+
+    with guarded(url, "clearing it"):
+        sync(remove())
 
 
 def names(url: str, prefix: str) -> list[str]:
-    """Return the names of everything below a prefix, in order."""
+    """Return the names of all JSON documents below a prefix, in order."""
 
     async def collect() -> list[str]:
-        return sorted([name async for name in bytes_of(url).list_prefix(prefix)])
+        return sorted([name async for name in bytes_of(url).list_prefix(prefix) if name.endswith(".json")])
 
-    return sync(collect())
+    with guarded(url, f"listing {prefix}"):
+        return sync(collect())
 
 
 def exists(url: str) -> bool:
-    """Say whether there is something at a path or URL that a run has to respect."""
+    """Say whether there is a study at a path or URL, whoever made it.
+
+    Raises
+    ------
+    StoreError
+        If there is something else.
+    """
+    path = local(url)
+    if path is not None and path.is_file():
+        raise StoreError(f"{url}: a file, expected the folder of a store or nothing")
     metadata = read_json(url, "zarr.json")
-    return metadata is not None and list(metadata["attributes"]) != ["mdr_dask_layout"]
+    if metadata is None and path is not None and path.is_dir():
+        others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial")
+        if others:
+            raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
+    return metadata is not None and not only_claimed(metadata["attributes"])
+
+
+def only_claimed(found: Mapping[str, Any]) -> bool:
+    """Say whether a run took the place and was stopped before its arrays were laid out."""
+    return list(found) == ["mdr_dask_layout"]
 
 
 def attributes(url: str) -> dict[str, Any]:
@@ -63,6 +124,9 @@ def attributes(url: str) -> dict[str, Any]:
     StoreError
         If there is no study of mdr_dask at `url`, or one with a newer layout.
     """
+    path = local(url)
+    if path is not None and path.is_file():
+        raise StoreError(f"{url}: a file, expected the folder of a store; 'mdr-dask run {url}' runs a campaign")
     metadata = read_json(url, "zarr.json")
     if metadata is None:
         raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")
@@ -71,7 +135,18 @@ def attributes(url: str) -> dict[str, Any]:
         raise StoreError(f"{url}: a Zarr group, but not one that mdr_dask made")
     if found["mdr_dask_layout"] > LAYOUT:
         raise StoreError(f"{url}: made by a newer mdr_dask (layout {found['mdr_dask_layout']}, known: {LAYOUT})")
+    if only_claimed(found):
+        raise StoreError(f"{url}: still empty, its first run has not come far enough; run the campaign")
     return found
+
+
+def series_names(url: str) -> list[str]:
+    """Return the names of the groups of a study, ``""`` for one without series."""
+    if "axes" in attributes(url):
+        return [""]
+    metadata = read_json(url, "zarr.json") or {}
+    members = metadata["consolidated_metadata"]["metadata"]
+    return [name for name, member in members.items() if member["node_type"] == "group"]
 
 
 @contextmanager
@@ -87,20 +162,28 @@ def lock(url: str) -> Iterator[None]:
     ------
     StoreBusyError
         If another runner holds it; the message names that runner.
+    StoreError
+        If nothing can be written there.
     """
-    if "://" in url:
+    path = local(url)
+    if path is None:
         yield
         return
     from filelock import FileLock, Timeout
 
-    path = Path(url).resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path = path.resolve()
     holder = path.with_name(f".{path.name}.runner")
+    guard = FileLock(path.with_name(f".{path.name}.lock"), timeout=0)
+    with guarded(url, "making it"):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            guard.acquire()
+        except Timeout:
+            who = holder.read_text() if holder.exists() else "another process"
+            raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it") from None
+        holder.write_text(f"process {os.getpid()} on {platform.node()}")
     try:
-        with FileLock(path.with_name(f".{path.name}.lock"), timeout=0):
-            holder.write_text(f"process {os.getpid()} on {platform.node()}")
-            yield
-            holder.unlink(missing_ok=True)
-    except Timeout:
-        who = holder.read_text() if holder.exists() else "another process"
-        raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it") from None
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        guard.release()

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import operator
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import DataFile
-from mdr_dask.store.files import attributes, read_json
+from mdr_dask.store.files import attributes, read_json, series_names
 from mdr_dask.store.layout import plain_values
 
 
 @dataclass(frozen=True)
 class Stored:
-    """What a store holds already of a campaign that is about to run."""
+    """What a store holds already of a campaign that is about to run.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        The campaign with every axis extended to what is stored: stored values first, in their order.
+    chunks : mapping of series name to chunk lengths
+        Layout of the stored groups.
+    realisations : int
+        Number of stored realisations.
+    asked : mapping of series name to bool array
+        For the stored groups, which of the extended cases the campaign itself names.
+    """
 
     campaign: Campaign
     chunks: Mapping[str, Mapping[str, int]]
     realisations: int
+    asked: Mapping[str, NDArray[np.bool_]]
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
@@ -34,45 +52,32 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     campaign : Campaign
         The campaign to run.
 
-    Returns
-    -------
-    Stored
-        The campaign with every axis extended to what is stored (stored values first, in their order), the chunk
-        lengths of the stored groups and the number of stored realisations.
-
     Raises
     ------
     StoreError
         If the store was made from another campaign; every difference is named, and nothing was touched.
     """
-    root = attributes(url)
-    version_now = models.load(campaign.model).version
-    differences = [
-        f"{what}: {root[key]!r} in the store, {now!r} in the campaign"
-        for what, key, now in (
-            ("model", "model", campaign.model),
-            ("model version", "model_version", version_now),
-            ("seed", "seed", campaign.seed),
-            ("accuracy", "accuracy", campaign.accuracy),
-        )
-        if root[key] != now
-    ]
-    series, chunks, realisations = [], {}, 0
-    for wanted in campaign.series:
-        held = _group_attributes(url, wanted.name)
-        if held is None:
-            series.append(wanted)
-            continue
-        found = _series_differences(wanted, held, campaign)
-        differences += [f"{wanted.name}.{line}" if wanted.name else line for line in found]
-        if not found:
-            series.append(_extend(wanted, held))
-        chunks[wanted.name] = held["blocks"]
-        realisations = max(realisations, held["realisations"])
+    groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
+    held = {name: found for name, found in groups.items() if found is not None}
+    differences = _study_differences(url, campaign)
+    for series in campaign.series:
+        found = _series_differences(series, held[series.name], campaign.outputs) if series.name in held else []
+        differences += [f"{series.name}.{line}" if series.name else line for line in found]
     if differences:
-        lines = "\n  ".join(differences)
+        lines = "\n  ".join(dict.fromkeys(differences))
         raise StoreError(f"{url}: made from another campaign; name another store, or remove this one:\n  {lines}")
-    return Stored(replace(campaign, series=tuple(series)), chunks, realisations)
+    extended, asked = [], {}
+    for series in campaign.series:
+        if series.name in held:
+            series, asked[series.name] = _extend(series, held[series.name])
+        extended.append(series)
+    outputs = tuple(next(iter(held.values()))["outputs"]) if held else campaign.outputs
+    return Stored(
+        campaign=replace(campaign, series=tuple(extended), outputs=outputs),
+        chunks={name: found["blocks"] for name, found in held.items()},
+        realisations=max((found["realisations"] for found in held.values()), default=0),
+        asked=asked,
+    )
 
 
 def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
@@ -83,28 +88,50 @@ def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
     return {**metadata["attributes"], "realisations": shape[-1]}
 
 
-def _series_differences(series: Series, held: Mapping[str, Any], campaign: Campaign) -> list[str]:
-    axes = [(axis.path, axis.dim) for axis in series.axes]
-    held_axes = [(axis["path"], axis["dim"]) for axis in held["axes"]]
+def _study_differences(url: str, campaign: Campaign) -> list[str]:
+    root = attributes(url)
+    now = {
+        "model": campaign.model,
+        "model_version": models.load(campaign.model).version,
+        "seed": campaign.seed,
+        "accuracy": campaign.accuracy,
+    }
+    found = [_difference(key.replace("_", " "), root[key], value) for key, value in now.items() if root[key] != value]
+    names, names_now = series_names(url), [series.name for series in campaign.series]
+    if ("" in names) != ("" in names_now):
+        found.append(_difference("series", *(" ".join(known) or "none" for known in (names, names_now))))
+    return found
+
+
+def _difference(what: str, stored: Any, now: Any) -> str:
+    return f"{what}: {stored!r} in the store, {now!r} in the campaign"
+
+
+def _series_differences(series: Series, held: Mapping[str, Any], outputs: tuple[str, ...]) -> list[str]:
+    axes = {axis.path: axis for axis in series.axes}
+    held_axes = {axis["path"]: axis for axis in held["axes"]}
     found = []
-    if sorted(axes) != sorted(held_axes) or [dim for _, dim in axes] != [dim for _, dim in held_axes]:
-        found.append(
-            f"axes: {[path for path, _ in held_axes]} in the store, {[path for path, _ in axes]} in the campaign"
-        )
-    if held["outputs"] != list(campaign.outputs):
-        found.append(f"outputs: {held['outputs']} in the store, {list(campaign.outputs)} in the campaign")
-    varied = {path for path, _ in axes} | {path for path, _ in held_axes}
+    if {path: axis.dim for path, axis in axes.items()} != {path: axis["dim"] for path, axis in held_axes.items()}:
+        found.append(_difference("axes", list(held_axes), list(axes)))
+    found += [
+        f"axis {path}: numbers in the store, names in the campaign"
+        for path in axes.keys() & held_axes.keys()
+        if axes[path].labels is not None and held_axes[path]["labels"] is None
+    ]
+    lacking = [name for name in outputs if name not in held["outputs"]]
+    if lacking:
+        found.append(f"outputs: the store lacks {', '.join(lacking)}, for which every case would be computed again")
     before = _leaves(json.loads(held["parameters"]), "")
     now = _leaves(series.parameters.model_dump(mode="json"), "")
-    fixed = [path for path in sorted(before.keys() | now.keys()) if not _below_any(path, varied)]
+    fixed = [
+        path for path in sorted(before.keys() | now.keys()) if not _below_any(path, axes.keys() | held_axes.keys())
+    ]
     return found + [
-        f"{path}: {before.get(path)!r} in the store, {now.get(path)!r} in the campaign"
-        for path in fixed
-        if before.get(path) != now.get(path)
+        _difference(path, before.get(path), now.get(path)) for path in fixed if before.get(path) != now.get(path)
     ]
 
 
-def _below_any(path: str, axes: set[str]) -> bool:
+def _below_any(path: str, axes: Set[str]) -> bool:
     return any(path == axis or path.startswith(axis + ".") for axis in axes)
 
 
@@ -121,32 +148,48 @@ def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     return found
 
 
-def _extend(series: Series, held: Mapping[str, Any]) -> Series:
-    """Put the stored entries of every dimension first and the new ones behind them."""
-    stored = {axis["path"]: axis["values"] for axis in held["axes"]}
-    extended: dict[str, Axis] = {}
-    for dim in series.sizes:
-        axes = [axis for axis in series.axes if axis.dim == dim]
-        old = list(zip(*(stored[axis.path] for axis in axes), strict=True))
-        plain = list(zip(*(plain_values(axis.values) for axis in axes), strict=True))
-        new = [position for position, entry in enumerate(plain) if entry not in old]
-        for column, axis in enumerate(axes):
-            kept = [_restore(axis, entry[column], [entry[column] for entry in plain]) for entry in old]
-            values = tuple(kept) + tuple(axis.values[position] for position in new)
-            extended[axis.path] = replace(axis, values=values, labels=_extend_labels(axis, values))
-    return replace(series, axes=tuple(extended[axis.path] for axis in series.axes))
+def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, NDArray[np.bool_]]:
+    """Put the stored entries of every dimension first and the new ones behind them; say which are asked for."""
+    asked = np.ones((), dtype=bool)
+    axes = []
+    for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
+        stored = [axis for axis in held["axes"] if axis["dim"] == dim]
+        now = [_axis(series, axis["path"]) for axis in stored]
+        old = _entries([axis["values"] for axis in stored])
+        wanted = _entries([plain_values(axis.values) for axis in now])
+        new = [position for entry, position in wanted.items() if entry not in old]
+        asked = np.multiply.outer(asked, [entry in wanted for entry in old] + [True] * len(new))
+        axes += [_longer(series, axis, before, new) for axis, before in zip(now, stored, strict=True)]
+    return replace(series, axes=tuple(axes)), asked
 
 
-def _restore(axis: Axis, plain: Any, plain_now: list[Any]) -> Any:
-    if not isinstance(plain, Mapping):
+def _axis(series: Series, path: str) -> Axis:
+    return next(axis for axis in series.axes if axis.path == path)
+
+
+def _entries(columns: list[list[Any]]) -> dict[str, int]:
+    """Return the position of every entry of a dimension, by the text of its values."""
+    return {json.dumps(entry, sort_keys=True): position for position, entry in enumerate(zip(*columns, strict=True))}
+
+
+def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int]) -> Axis:
+    values = [_restore(series, axis.path, plain) for plain in stored["values"]]
+    labels = stored["labels"]
+    if labels is not None:
+        labels = tuple(labels) + tuple(axis.labels[i] if axis.labels else str(axis.values[i]) for i in new)
+    return replace(
+        axis,
+        values=tuple(values) + tuple(axis.values[i] for i in new),
+        labels=labels,
+        unit=None if labels else axis.unit,
+    )
+
+
+def _restore(series: Series, path: str, plain: Any) -> Any:
+    """Return a value as it was before it was stored; one with structure by way of the model's own parameter set."""
+    if not isinstance(plain, Mapping | list):
         return plain
-    if plain not in plain_now:
-        raise StoreError(f"axis {axis.path}: the campaign lacks the stored value {plain}; keep it in the file")
-    return axis.values[plain_now.index(plain)]
-
-
-def _extend_labels(axis: Axis, values: tuple[Any, ...]) -> tuple[str, ...] | None:
-    if axis.labels is None:
-        return None
-    known = dict(zip(map(repr, axis.values), axis.labels, strict=True))
-    return tuple(known.get(repr(value), str(value)) for value in values)
+    tree = series.parameters.model_dump(mode="json")
+    *above, last = path.split(".")
+    reduce(operator.getitem, above, tree)[last] = plain
+    return reduce(getattr, [*above, last], type(series.parameters).model_validate_json(json.dumps(tree)))

@@ -20,8 +20,7 @@ from mdr_dask import __version__, models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import DataFile, Status, unit_of
 from mdr_dask.plan import Template
-from mdr_dask.store.blocks import forget_open_groups
-from mdr_dask.store.files import LAYOUT, read_json, write_bytes
+from mdr_dask.store.files import LAYOUT, clear, only_claimed, read_json, write_bytes
 
 _COORDINATE_CHUNK = 4096
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
@@ -30,69 +29,87 @@ _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 def lay_out(url: str, layout: Sequence[Template]) -> None:
     """Create the arrays of every template, or grow the ones that exist; readers see the old shape or the new one.
 
+    Everything is laid out in memory first. Then arrays and coordinates are written, behind them each group, and last
+    of all the root: whoever opens a group sees what its one document says, however far the writing got.
+
     Parameters
     ----------
     url : str
         Path or URL of the store.
     layout : sequence of Template
         All groups; existing ones only ever grow, at the end of a dimension.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be written.
     """
     if all(_is_laid_out(url, template) for template in layout):
         return
-    root = _open_plainly(url, "")
-    earlier = dict(root.attrs)
-    shared = _study_attributes(layout[0].campaign, earlier)
+    held = read_json(url, "zarr.json")
+    if held is None:
+        write_bytes(url, "zarr.json", _group_document({}, {"mdr_dask_layout": LAYOUT}))
+    elif only_claimed(held["attributes"]):
+        clear(url)
+    members: dict[str, Any] = held["consolidated_metadata"]["metadata"] if held else {}
+    study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
+    groups: dict[str, bytes] = {}
     for template in layout:
         name = template.series.name
-        group = _open_plainly(url, name)
-        _lay_out_group(group, template)
-        own = shared | _series_attributes(template)
+        path = f"{name}/" if name else ""
+        files = _arrays_in_memory(template)
+        for file, content in files.items():
+            write_bytes(url, f"{path}{file}", content)
+        arrays = {file.removesuffix("/zarr.json"): json.loads(files[file]) for file in files if "zarr.json" in file}
+        members |= {f"{path}{array}": document for array, document in arrays.items()}
+        own = study | _series_attributes(template)
         if name:
-            _publish(url, name, _members(group, ""), own)
+            groups[f"{path}zarr.json"] = _group_document(arrays, own)
+            members[name] = {"zarr_format": 3, "node_type": "group", "attributes": own}
         else:
-            shared = own
-    members = _members(root, "")
-    for name in sorted(root.group_keys()):
-        members |= _members(_open_plainly(url, name), f"{name}/")
-    _publish(url, "", members, shared)
-    forget_open_groups()
-
-
-def _open_plainly(url: str, series: str) -> zarr.Group:
-    """Open or make a group by what its members say of themselves, not by consolidated metadata of an earlier shape."""
-    marker: dict[str, Any] = {"mdr_dask_layout": LAYOUT}
-    return zarr.open_group(url, path=series or None, mode="a", use_consolidated=False, attributes=marker)
+            study = own
+    for path, content in groups.items():
+        write_bytes(url, path, content)
+    write_bytes(url, "zarr.json", _group_document(members, study))
 
 
 def _is_laid_out(url: str, template: Template) -> bool:
-    metadata = read_json(url, f"{template.series.name}/zarr.json" if template.series.name else "zarr.json")
-    if metadata is None or "axes" not in metadata["attributes"]:
+    held = read_json(url, f"{template.series.name}/zarr.json" if template.series.name else "zarr.json")
+    root = read_json(url, "zarr.json")
+    if held is None or root is None or "axes" not in held["attributes"]:
         return False
-    wanted = json.loads(json.dumps(_series_attributes(template), default=_json_default))
-    shape = metadata["consolidated_metadata"]["metadata"]["status"]["shape"]
-    return bool(shape == list(template.shape) and wanted.items() <= metadata["attributes"].items())
+    wanted = json.loads(json.dumps(_series_attributes(template)))
+    status = f"{template.series.name}/status" if template.series.name else "status"
+    shown = root["consolidated_metadata"]["metadata"].get(status, {"shape": None})
+    return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
 
-def _lay_out_group(group: zarr.Group, template: Template) -> None:
+def _arrays_in_memory(template: Template) -> dict[str, bytes]:
+    """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
+    files: dict[str, Any] = {}
+    group = zarr.create_group(zarr.storage.MemoryStore(files))
     coordinates = _coordinates(template)
     for name, coordinate in coordinates.items():
-        _require_coordinate(group, name, *coordinate)
+        _create_coordinate(group, name, *coordinate)
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
     for output in template.outputs:
         dims = (*template.dims, *output.dims)
         attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
-        extra = template.extra_shape(output)
-        _require_array(group, output.name, template, dims, extra, "float64", attrs)
-    flags: dict[str, Any] = {"long_name": "state of the case", "units": "1", "coordinates": along}
-    flags |= {
+        _create_array(group, output.name, template, dims, template.extra_shape(output), "float64", attrs)
+    flags: dict[str, Any] = {
+        "long_name": "state of the case",
+        "units": "1",
+        "coordinates": along,
         "flag_values": [int(status) for status in Status],
-        "flag_meanings": " ".join(s.name.lower() for s in Status),
+        "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
-    _require_array(group, "status", template, template.dims, (), "int8", flags)
+    _create_array(group, "status", template, template.dims, (), "int8", flags)
+    del files["zarr.json"]
+    return {name: content.to_bytes() for name, content in files.items()}
 
 
-def _require_array(
-    group: Any,
+def _create_array(
+    group: zarr.Group,
     name: str,
     template: Template,
     dims: tuple[str, ...],
@@ -100,42 +117,29 @@ def _require_array(
     dtype: str,
     attrs: dict[str, Any],
 ) -> None:
-    shape = (*template.shape, *extra)
-    if name in group:
-        array = group[name]
-        if array.shape != shape:
-            array.resize(shape)
-        return
     group.create_array(
         name,
-        shape=shape,
+        shape=(*template.shape, *extra),
         chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
         dtype=dtype,
         fill_value=np.nan if dtype == "float64" else int(Status.MISSING),
         compressors=[ZstdCodec(level=1), Crc32cCodec()],
         dimension_names=dims,
         attributes=attrs,
-        config={"write_empty_chunks": True},
     )
 
 
-def _require_coordinate(
-    group: Any, name: str, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]
+def _create_coordinate(
+    group: zarr.Group, name: str, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]
 ) -> None:
-    if name in group:
-        array = group[name]
-        if array.shape != values.shape:
-            array.resize(values.shape)
-    else:
-        array = group.create_array(
-            name,
-            shape=values.shape,
-            chunks=(_COORDINATE_CHUNK,) * values.ndim,
-            dtype="str" if values.dtype == object else values.dtype,
-            dimension_names=dims,
-            attributes=attrs,
-            config={"write_empty_chunks": True},
-        )
+    array = group.create_array(
+        name,
+        shape=values.shape,
+        chunks=(_COORDINATE_CHUNK,) * values.ndim,
+        dtype="str" if values.dtype == object else values.dtype,
+        dimension_names=dims,
+        attributes=attrs,
+    )
     array[...] = values
 
 
@@ -199,7 +203,13 @@ def _series_attributes(template: Template) -> dict[str, Any]:
         "series": template.series.name,
         "parameters": json.dumps(template.series.parameters.model_dump(mode="json"), sort_keys=True),
         "axes": [
-            {"path": axis.path, "name": axis.name, "dim": axis.dim, "values": plain_values(axis.values)}
+            {
+                "path": axis.path,
+                "name": axis.name,
+                "dim": axis.dim,
+                "values": plain_values(axis.values),
+                "labels": axis.labels and list(axis.labels),
+            }
             for axis in template.series.axes
         ],
         "outputs": [output.name for output in template.outputs],
@@ -209,33 +219,16 @@ def _series_attributes(template: Template) -> dict[str, Any]:
 
 def plain_values(values: tuple[Any, ...]) -> list[Any]:
     """Return axis values as JSON holds them."""
-    return [value.model_dump(mode="json") if isinstance(value, BaseModel) else value for value in values]
+    plain = [value.model_dump(mode="json") if isinstance(value, BaseModel) else value for value in values]
+    return [list(value) if isinstance(value, tuple) else value for value in plain]
 
 
-def _members(group: Any, prefix: str) -> dict[str, Any]:
-    """Return the metadata of a group's direct members, as they stand inside consolidated metadata."""
-    found = {}
-    for name, member in group.members():
-        metadata = member.metadata.to_dict()
-        metadata.pop("consolidated_metadata", None)
-        found[prefix + name] = metadata
-    return found
-
-
-def _publish(url: str, path: str, members: dict[str, Any], attrs: dict[str, Any]) -> None:
-    """Replace a group's metadata, attributes and all, in one write: the moment at which readers see a new shape."""
+def _group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
+    """Return the metadata of a group, attributes and all: written at once, it is what makes a new shape visible."""
     document = {
         "zarr_format": 3,
         "node_type": "group",
         "attributes": attrs,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": members},
     }
-    text = json.dumps(document, indent=1, default=_json_default)
-    write_bytes(url, f"{path}/zarr.json" if path else "zarr.json", text.encode())
-
-
-def _json_default(value: Any) -> Any:
-    """Turn what zarr keeps in metadata (codecs, grids, enums) into plain JSON."""
-    if hasattr(value, "to_dict"):
-        return value.to_dict()
-    return value.value if hasattr(value, "value") else value.item()
+    return json.dumps(document, indent=1).encode()

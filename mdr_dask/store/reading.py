@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import warnings
+from functools import partial
 from pathlib import Path
 
 import xarray as xr
 
-from mdr_dask.store.files import attributes, read_json
+from mdr_dask.store.files import bytes_of, series_names
+
+#: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
+LAZY_BYTES = 2**30
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
@@ -22,26 +26,22 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by series name (``""`` for a study without series), lazily loaded, numeric axes in ascending order.
+        Every group by series name (``""`` for a study without series), numeric axes in ascending order. Arrays are
+        loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays, reduced chunk by chunk.
 
     Raises
     ------
     StoreError
         If there is no study of mdr_dask at `url`.
     """
-    root = attributes(url)
-    names = [""] if "axes" in root else _series_names(url)
-    return {name: _open_sorted(url, name) for name in names}
-
-
-def _series_names(url: str) -> list[str]:
-    metadata = read_json(url, "zarr.json") or {}
-    members = metadata["consolidated_metadata"]["metadata"]
-    return [name for name, member in members.items() if member["node_type"] == "group"]
+    return {name: _open_sorted(url, name) for name in series_names(url)}
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
-    dataset: xr.Dataset = xr.open_zarr(url, group=series or None, chunks=None, consolidated=True)
+    opened = partial(xr.open_zarr, bytes_of(url), group=series or None, consolidated=True)
+    dataset: xr.Dataset = opened(chunks=None)
+    if dataset.nbytes > LAZY_BYTES:
+        dataset = opened(chunks={})
     for dim in dataset.dims:
         if (
             dim in dataset.indexes

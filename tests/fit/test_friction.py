@@ -7,6 +7,7 @@ from mdr_dask.fit.friction import FITS
 from mdr_dask.physics import laws
 
 FIT = {fit.name: fit.compute for fit in FITS}
+ZONE_ONE = FITS[0]
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +59,8 @@ def test_plateau_lies_near_root_two(forces):
 
 def test_series_are_fitted_one_by_one(forces):
     two = {"force": forces, "spacing": forces.isel(normal_force=0, drop=False)}
-    assert "series" not in FIT["zone_one"](two).dims
-    both = FIT["zone_one"]({"a": forces, "b": forces})
-    assert both["series"].values.tolist() == ["a", "b"]
+    assert list(ZONE_ONE.results(two)) == ["force"]
+    assert list(ZONE_ONE.results({"a": forces, "b": forces})) == ["a", "b"]
 
 
 @pytest.mark.parametrize("shape", [{"shape": "cone", "angle": 0.17}, {"shape": "parabola", "radius": 0.01}])

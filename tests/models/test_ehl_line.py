@@ -57,6 +57,29 @@ def test_units_change_nothing() -> None:
     assert not there.messages
 
 
+@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+def test_scaling_lengths_at_the_same_stress_scales_the_films(factor: float) -> None:
+    """Radius, line load and velocity by a power of two: every pure number keeps its bits, every length scales."""
+    names = ("central_film", "minimum_film", "pressure", "traction_coefficient", "central_film_thickness")
+    given = DIMENSIONAL | {"slide_roll_ratio": 0.01}
+    scaled = given | {name: factor * given[name] for name in ("radius", "line_load", "mean_velocity")}
+    here, there = compute(block(names, **given)).values, compute(block(names, **scaled)).values
+    for name in names[:4]:
+        np.testing.assert_array_equal(there[name], here[name])
+    np.testing.assert_array_equal(there["central_film_thickness"], factor * here["central_film_thickness"])
+
+
+def test_scaling_stress_and_viscosity_keeps_the_incompressible_film() -> None:
+    """Contact modulus, load and viscosity by f, alpha by 1/f: W, U, G and the film stay, pressures scale."""
+    names = ("central_film", "minimum_film", "pressure")
+    given = DIMENSIONAL | {"compressible": False, "contact_modulus": STEEL}
+    scaled = given | {name: 4 * given[name] for name in ("contact_modulus", "line_load", "viscosity")}
+    scaled["pressure_viscosity"] = given["pressure_viscosity"] / 4
+    here, there = compute(block(names, **given)).values, compute(block(names, **scaled)).values
+    for name, factor in zip(names, (1, 1, 4), strict=True):
+        np.testing.assert_array_equal(there[name], factor * here[name])
+
+
 def test_profiles_lie_on_the_positions() -> None:
     result = compute(block(("film", "pressure", "minimum_film", "minimum_position", "spike_position")))
     position = coordinates(EhlLineParameters(**CHECKED))["position"].values

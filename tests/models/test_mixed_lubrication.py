@@ -238,8 +238,9 @@ def test_film_formula_out_of_range_is_a_warning():
     assert "film formula Pan-Hamrock (central): W = " in result.messages[0, 0]
 
 
-def test_thin_films_and_loaded_asperities_are_warned_of():
-    result = MODEL.compute(block(film_thickness=1e-8, rms_roughness=2e-5))
+@pytest.mark.parametrize("outputs", [ALL, ["breakthrough_probability"]])
+def test_thin_films_and_loaded_asperities_are_warned_of_whatever_is_wanted(outputs):
+    result = MODEL.compute(block(outputs, film_thickness=1e-8, rms_roughness=2e-5))
     assert "overlaps merge into clusters" in result.messages[0, 0]
     assert "asperities carry" in result.messages[0, 0]
 

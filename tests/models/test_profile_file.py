@@ -2,6 +2,7 @@ import sys
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.profile_file import ProfileFile, line_of
@@ -66,3 +67,31 @@ def test_other_formats_name_the_extra(tmp_path, monkeypatch):
     (tmp_path / "line.al3d").write_bytes(b"\x00")
     with pytest.raises(DataError, match=r"pip install mdr_dask\[formats\]"):
         line_of(ProfileFile.model_validate(str(tmp_path / "line.al3d")))
+
+
+CONTEXT = {"to_si": lambda value, unit: float(value)}
+
+
+def test_a_campaign_refuses_a_bad_file_before_it_runs(tmp_path):
+    (tmp_path / "line.csv").write_text("x,z\n1,2\n3,nothing\n")
+    with pytest.raises(ValidationError, match=r"line.csv:3: expected 2 numbers, got \['3', 'nothing'\]"):
+        ProfileFile.model_validate(str(tmp_path / "line.csv"), context=CONTEXT | {"directory": tmp_path})
+
+
+def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
+    topography = pytest.importorskip("SurfaceTopography")
+    place = np.arange(64)
+    height = np.sin(2 * np.pi * place / 64)
+    topography.UniformLineScan(height, 64.0, unit="um").to_netcdf(str(tmp_path / "line.nc"))
+    line = line_of(ProfileFile.model_validate(str(tmp_path / "line.nc")))
+    assert line.length == pytest.approx(64e-6)
+    np.testing.assert_allclose(line.height, 1e-6 * height, atol=1e-15)
+    topography.UniformLineScan(height, 64.0).to_netcdf(str(tmp_path / "bare.nc"))
+    bare = line_of(ProfileFile.model_validate({"file": str(tmp_path / "bare.nc"), "unit": "mm"}))
+    assert bare.length == pytest.approx(64e-3)
+    topography.Topography(np.outer(height, height), (64.0, 64.0), unit="um").to_netcdf(str(tmp_path / "map.nc"))
+    with pytest.raises(DataError, match="expected a line scan, got a map of 64 x 64 points: save one of its lines"):
+        line_of(ProfileFile.model_validate(str(tmp_path / "map.nc")))
+    (tmp_path / "noise.nc").write_bytes(b"nothing" * 10)
+    with pytest.raises(DataError, match=r"noise.nc: SurfaceTopography cannot read it"):
+        line_of(ProfileFile.model_validate(str(tmp_path / "noise.nc")))

@@ -46,3 +46,13 @@ def test_rolloff_makes_the_spectrum_flat():
     amplitude = roughness.amplitudes(100, 0.8, rolloff=10)
     assert amplitude[:10] == pytest.approx(amplitude[9])
     assert amplitude[19] / amplitude[39] == pytest.approx(2**1.3)
+
+
+def test_turns_are_those_of_the_phases():
+    turned, phase = roughness.turns(7, 3, 1000), roughness.phases(7, 3, 1000)
+    assert np.abs(turned - np.exp(1j * phase)).max() < 2e-15  # rounding
+    assert np.array_equal(roughness.turns(7, 3, 300), turned[:300])
+    amplitude = roughness.amplitudes(1000, 0.5)
+    assert np.allclose(
+        roughness.turned_line(amplitude, turned, 2000), roughness.line(amplitude, phase, 2000), atol=1e-13
+    )

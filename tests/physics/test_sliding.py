@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics import roughness, sliding
+from mdr_dask.physics import profile, roughness, sliding
 
 SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
 EXACT = SCHEMES[:2]
@@ -140,3 +140,25 @@ def test_friction_is_the_energy_lost(load, reach):
     # the running maximum at the nodes is first order where u turns: 12000 nodes
     assert steady.drag[0] == pytest.approx(lost, rel=5e-3)
     assert np.mean(u[n:]) == pytest.approx(load, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
+    # such a line is not band-limited: its cells are integrated one by one
+    monkeypatch.setattr(profile, "_resummed", lambda stretch, slope, first: stretch)
+    # cubic cells with a will of their own, against straight cells 4000 times as fine
+    generator = np.random.default_rng(seed)
+    n, fine = 8, 4000
+    height, rise = generator.normal(size=n), 8 * generator.normal(size=n)
+    x = (np.arange(n * fine) % fine) / fine
+    h0, t0 = np.repeat(height, fine), np.repeat(rise, fine)
+    h1, t1 = np.repeat(np.roll(height, -1), fine), np.repeat(np.roll(rise, -1), fine)
+    dense = h0 * (1 + 2 * x) * (1 - x) ** 2 + h1 * x**2 * (3 - 2 * x) + t0 * x * (1 - x) ** 2 - t1 * x**2 * (1 - x)
+    reaches, loads = (grid.ravel() for grid in np.meshgrid(10.0 ** np.arange(-3, 2), [0.05, 0.5, 2.0, 5.0]))
+    ours = sliding.steady_sliding(height, rise * n, reaches, loads)
+    reference = sliding.steady_sliding(dense, None, reaches, loads, "piecewise_linear")
+    assert np.all(ours.status == 0)
+    # second order of the reference, and its shorter contacts at light loads
+    assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
+    assert ours.contact_fraction == pytest.approx(reference.contact_fraction, abs=1e-3)
+    assert ours.drag == pytest.approx(reference.drag, rel=1e-4)

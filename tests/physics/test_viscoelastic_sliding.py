@@ -97,22 +97,33 @@ def test_friction_falls_with_velocity_without_a_floor():
 
 
 def test_energy_lost_is_the_work_of_friction():
-    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight: here by time stepping the exact
-    state."""
+    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight.
+
+    Here on the straight line between points with e = u - a exact in every cell, its square by Simpson's rule;
+    only the cells in which contact begins or ends are left to second order.
+    """
     solid, velocity = standard_solid(1e7, 4e7, 1e-2), 0.05
     height, spacing, _ = line(64)
     state = steady_viscoelastic_sliding(height, spacing, solid, velocity, 0.3)
-    (modulus,), (time,) = solid.moduli, solid.times
-    decay, arm, lost = np.exp(-spacing / velocity / time), 0.0, 0.0
-    for turn in range(2):
+    (modulus,), (time,), static, parts = solid.moduli, solid.times, solid.static_modulus, 8
+    fine = np.interp(np.arange(height.size * parts) / parts, np.arange(height.size + 1), np.append(height, height[0]))
+    step = spacing / parts
+    ratio = step / (velocity * time)
+    half, recovery = np.exp(-ratio / 2), np.exp(-ratio * static / solid.glass_modulus)
+    lost = u = e = 0.0
+    for _ in range(2):  # the second turn starts from the periodic state
         lost = 0.0
-        for h in height:
-            u = max(state.depth + h, modulus * arm / solid.glass_modulus)
-            lost += modulus / time / velocity * (u - arm) ** 2
-            arm = u + (arm - u) * decay
-        assert turn < 2
-    drag = 4 * spacing * lost
-    assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=0.02)  # first-order sum
+        for w in state.depth + fine:
+            rate = (w - u) / ratio
+            middle, end = rate + (e - rate) * half, rate + (e - rate) * half**2
+            after = w
+            if static * w + modulus * end < 0:
+                e = -static * u / modulus
+                middle, end, after = e * np.sqrt(recovery), e * recovery, u * recovery
+            lost += step * (e**2 + 4 * middle**2 + end**2) / 6
+            u, e = after, end
+    drag = 4 * modulus / time / velocity * lost
+    assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=1e-3)
 
 
 @pytest.mark.parametrize("velocity", [1e-9, 1e-3, 1e3])
@@ -140,9 +151,12 @@ def test_arms_slower_than_anything_share_one_limit():
 
 
 def test_error_estimate_covers_the_true_error():
-    """Sixty random cases on coarse grids: at least 90 % within the estimate (measured 96 % of 250)."""
-    random, within = np.random.default_rng(5), []
-    for realisation in range(60):
+    """200 random cases on coarse grids, none that it was tuned on: 95 % within, not 10 times too large.
+
+    The standard error of the part is 1.5 %, hence 92 %; 97 % were measured of 7047.
+    """
+    random, within, excess, failed = np.random.default_rng(5), [], [], 0
+    for realisation in range(200):
         arms = random.integers(0, 5)
         solid = prony(
             1e7, 10 ** random.uniform(5, 9, arms), 10 ** random.uniform(-6, 3, arms), 1e7 * 10 ** random.uniform(-6, 0)
@@ -151,10 +165,16 @@ def test_error_estimate_covers_the_true_error():
         grid = int(2 ** random.integers(2, 5))
         coarse = steady_viscoelastic_sliding(*line(grid, hurst, realisation)[:2], solid, velocity, force)
         fine = steady_viscoelastic_sliding(*line(64, hurst, realisation)[:2], solid, velocity, force)
-        assert coarse.status == fine.status == sliding.CONVERGED
+        assert fine.status == sliding.CONVERGED
+        if coarse.status != sliding.CONVERGED:  # a contact of a few nodes: `auto` goes on to finer grids
+            failed += 1
+            continue
         miss = abs(coarse.friction_coefficient / fine.friction_coefficient - 1)
-        within.append(miss <= coarse.error + fine.error)
-    assert np.mean(within) >= 0.9
+        within.append(miss <= coarse.error)
+        excess.append(coarse.error / max(miss, 1e-12))
+    assert failed <= 4
+    assert np.mean(within) >= 0.92
+    assert np.median(excess) <= 10
 
 
 def parabola(velocity, radius, modulus, time, force):

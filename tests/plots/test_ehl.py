@@ -11,6 +11,7 @@ import xarray as xr
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block
 from mdr_dask.models.ehl_line import MODEL, STEEL, EhlLineParameters, compute, coordinates
+from mdr_dask.physics.film import REGIMES
 from mdr_dask.plots.ehl import PLOTS
 
 CONTACT = {"load_parameter": 2.0452e-5, "speed_parameter": 1e-11, "material_parameter": 5007.0}
@@ -99,3 +100,14 @@ def test_starvation_and_traction_follow_their_axes() -> None:
 def test_what_is_missing_is_said(name: str) -> None:
     with pytest.raises(DataError, match="expected a series with"):
         DRAW[name]({"other": xr.Dataset()})
+
+
+def test_regime_map_names_all_regimes_and_places_the_films_in_them() -> None:
+    """Points deep inside each regime lie under its name: the film found is that of the limit, to what a limit is."""
+    points = {"load_parameter": np.array([1e-8, 2e-4]), "material_parameter": np.array([1.0, 5000.0])}
+    axes = DRAW["regime_map"]({"": series(("minimum_film",), points)}).axes[0]
+    assert {text.get_text().replace("\n", " ") for text in axes.texts} == set(REGIMES)
+    dots = axes.collections[-1]
+    ratio = np.asarray(dots.get_array())
+    assert np.all((ratio > 0.7) & (ratio < 2))
+    assert np.asarray(dots.get_offsets()).shape == (4, 2)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Status
-from mdr_dask.models.mixed_lubrication.lines import Source, problem_of
+from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 from mdr_dask.models.mixed_lubrication.turn import POSITIONS, Turn, creeping, profiles, rolling, trace, turn_values
@@ -63,7 +63,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
     groups: dict[Source, list[tuple[int, Operation]]] = {}
     for index in range(block.cases):
         case = block.case(index)
-        problem = problem_of(case)
+        problem = case.problem()
         if problem:
             _refuse(result, index, Status.FAILED, problem)
             continue
@@ -73,15 +73,17 @@ def compute(block: Block[MixedLubrication]) -> Result:
             continue
         groups.setdefault(operation.source, []).append((index, operation))
         _store(result, block, index, slice(None), fixed_values(operation))
+    shares: dict[int, float] = {}
     if set(block.outputs) - _UNROUGH:
         for source, members in groups.items():
             members.sort(key=lambda member: member[1].level)
-            for position in range(len(block.realisations)):
-                _realise(result, block, source, members, position)
+            for position, realisation in enumerate(block.realisations):
+                carried = _realise(result, block, source, members, position)
+                shares |= carried if realisation == 0 else {}
     for members in groups.values():
         for index, operation in members:
             result.status[index] = Status.DONE
-            _warn(result, block, index, operation)
+            _warn(result, block, index, operation, shares.get(index, 0.0))
     return replace(result, solves=sum(map(len, groups.values())) * len(block.realisations))
 
 
@@ -113,12 +115,17 @@ def _realise(
     source: Source,
     members: list[tuple[int, Operation]],
     position: int,
-) -> None:
-    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest."""
+) -> dict[int, float]:
+    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest.
+
+    Returns the share of the load on asperities of each case.
+    """
     from mdr_dask.physics import breakthrough
 
     lines = source.lines(block.seed, block.realisations[position])
     above: Excursions | None = None
+    shares = {}
+    wanted = {"load_share", *block.outputs}
     for index, operation in members:
         solve: Callable[..., Turn] = partial(creeping, operation, lines)
         if operation.case.slide_roll_ratio == 0:
@@ -126,15 +133,18 @@ def _realise(
             above = breakthrough.excursions(lines[0] + lines[1], level) if above is None else above.above(level)
             solve = partial(rolling, operation, above)
         turn = solve()
-        _store(result, block, index, position, turn_values(operation, turn, partial(solve, coarser=2), block.outputs))
+        found = turn_values(operation, turn, partial(solve, coarser=2), wanted)
+        shares[index] = found["load_share"]
+        _store(result, block, index, position, found)
         if "contact_length_trace" in block.outputs:
             _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
         if _PROFILES & set(block.outputs):
             _store(result, block, index, position, profiles(operation, turn, lines))
+    return shares
 
 
-def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
-    """Say once a case, at realisation 0, where an assumption behind it fails."""
+def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation, share: float) -> None:
+    """Say once a case, at realisation 0, where an assumption behind it fails, whatever outputs are wanted."""
     if 0 not in block.realisations:
         return
     position = block.realisations.index(0)
@@ -145,7 +155,6 @@ def _warn(result: Result, block: Block[MixedLubrication], index: int, operation:
             f"film ratio {ratio:.2g} is below {FILM_RATIO_WARNING}: overlaps merge into clusters that do not break, "
             "the probability is too low"
         )
-    share = result.values["load_share"][index, position] if "load_share" in result.values else 0.0
     if share > LOAD_SHARE_WARNING:
         warnings.append(
             f"asperities carry {share:.1%} of the load, more than {LOAD_SHARE_WARNING:.0%}: the film is no longer that "

@@ -1,18 +1,13 @@
-"""The two rough lines of a case, generated or measured, and why a case may have none."""
+"""The two rough lines of a case, generated or measured, and why there may be none."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdr_dask.errors import DataError
 from mdr_dask.models.base import FloatArray
 from mdr_dask.models.profile_file import ProfileFile, line_of
-
-if TYPE_CHECKING:
-    from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 
 
 @dataclass(frozen=True)
@@ -24,9 +19,23 @@ class Generated:
     longest: float  # harmonic number of the longest wavelength
     modes: int  # harmonic number of the shortest wavelength
 
-    def spacing(self, case: MixedLubrication) -> float:
-        """Return the distance of the points in m."""
-        return 2 * np.pi * case.roller_radius / self.points
+    def spacing(self, perimeter: float) -> float:
+        """Return the distance of the points in m on a roller of a perimeter in m."""
+        return perimeter / self.points
+
+    def problem(self, perimeter: float) -> str:
+        """Say why there are no such lines around a roller of a perimeter in m; an empty string if there are."""
+        if self.longest > self.modes:
+            return (
+                f"expected the longest wavelength above the shortest, got {perimeter / self.longest:.4g} m and "
+                f"{perimeter / max(self.modes, 1):.4g} m"
+            )
+        if 2 * self.modes > self.points:
+            return (
+                f"expected a shortest wavelength of at least two spacings, {2 * perimeter / self.points:.4g} m, "
+                f"got {perimeter / self.modes:.4g} m; raise points"
+            )
+        return ""
 
     def combined_rms(self) -> float:
         """Return the rms height of both lines together."""
@@ -57,9 +66,16 @@ class Measured:
         """Number of points of the shorter file; the longer one is cut."""
         return min(line_of(file).height.size for file in (self.file_1, self.file_2))
 
-    def spacing(self, case: MixedLubrication) -> float:
-        """Return the distance of the points in m, as in the files."""
+    def spacing(self, _: float) -> float:
+        """Return the distance of the points in m, as in the files, whatever the perimeter."""
         return line_of(self.file_1).spacing
+
+    def problem(self, _: float) -> str:
+        """Say why the lines do not fit each other; an empty string if they do."""
+        one, two = (line_of(file).spacing for file in (self.file_1, self.file_2))
+        if abs(one - two) > 1e-3 * one:
+            return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
+        return ""
 
     def combined_rms(self) -> float:
         """Return the rms height of both lines together, in m unless scaled."""
@@ -81,62 +97,3 @@ class Measured:
 
 
 Source = Generated | Measured
-
-
-def source_of(case: MixedLubrication) -> Source:
-    """Return where the lines of a case come from; equal for cases that can share them."""
-    if case.profile_1 is not None and case.profile_2 is not None:
-        return Measured(case.profile_1, case.profile_2, case.rms_roughness is not None)
-    perimeter = 2 * np.pi * case.roller_radius
-    longest = case.longest_wavelength
-    if longest == "auto":
-        longest = 2 * float(case.dry_contact(case.cutoff_force).half_width)
-    shortest = 10 * perimeter / case.points if case.shortest_wavelength == "auto" else case.shortest_wavelength
-    return Generated(case.points, case.hurst, perimeter / longest, int(perimeter / shortest * (1 + 1e-12)))
-
-
-def problem_of(case: MixedLubrication) -> str:
-    """Say why a case cannot be computed, in one sentence; an empty string if it can."""
-    if (case.profile_1 is None) != (case.profile_2 is None):
-        return "expected the profiles of both rollers or of none, got one"
-    if case.profile_1 is None and case.rms_roughness is None:
-        return "expected rms_roughness, or the measured profiles of both rollers, got neither"
-    outside = case.oil_data().outside(case.temperature)
-    if outside:
-        return outside
-    try:
-        source = source_of(case)
-        problem = _problem_of_waves(case, source) if isinstance(source, Generated) else _problem_of_profiles(source)
-        return problem or _problem_of_width(case, source)
-    except DataError as error:
-        return str(error)
-
-
-def _problem_of_waves(case: MixedLubrication, source: Generated) -> str:
-    perimeter = 2 * np.pi * case.roller_radius
-    if source.longest > source.modes:
-        return (
-            f"expected the longest wavelength above the shortest, got {perimeter / source.longest:.4g} m and "
-            f"{perimeter / max(source.modes, 1):.4g} m"
-        )
-    if 2 * source.modes > case.points:
-        return (
-            f"expected a shortest wavelength of at least two spacings, {2 * perimeter / case.points:.4g} m, "
-            f"got {perimeter / source.modes:.4g} m; raise points"
-        )
-    return ""
-
-
-def _problem_of_profiles(source: Measured) -> str:
-    one, two = (line_of(file).spacing for file in (source.file_1, source.file_2))
-    if abs(one - two) > 1e-3 * one:
-        return f"expected profiles of the same spacing, got {one:.6g} m and {two:.6g} m; resample one of them"
-    return ""
-
-
-def _problem_of_width(case: MixedLubrication, source: Source) -> str:
-    length = source.points * source.spacing(case)
-    width = 2 * float(case.dry_contact(case.normal_force).half_width)
-    if width > length:
-        return f"the contact is wider than the line: expected 2a of at most {length:.4g} m, got {width:.4g} m"
-    return ""

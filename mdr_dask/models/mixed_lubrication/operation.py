@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mdr_dask.models.mixed_lubrication.lines import Source, source_of
+from mdr_dask.models.mixed_lubrication.lines import Source
+from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 
 if TYPE_CHECKING:
-    from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
     from mdr_dask.physics.film import Groups, HertzLine
     from mdr_dask.physics.line_contact import LineContact
 
@@ -52,7 +52,7 @@ def operation_of(case: MixedLubrication) -> Operation:
     """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours."""
     from mdr_dask.physics import breakthrough, film, oil
 
-    data, source = case.oil_data(), source_of(case)
+    data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
     alpha = case.pressure_viscosity
     if isinstance(alpha, str):
@@ -65,7 +65,7 @@ def operation_of(case: MixedLubrication) -> Operation:
     groups = film.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
     smooth = Film(case.film_thickness / radius) if case.film_thickness else _film(case, groups, E_star, viscosity)
     contact = case.dry_contact(case.normal_force)
-    spacing = source.spacing(case)
+    spacing = source.spacing(case.perimeter)
     scale = case.rms_roughness or 1.0
     return Operation(
         case=case,

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
 from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
@@ -96,12 +99,50 @@ class MixedLubrication(Parameters):
 
     @model_validator(mode="after")
     def _holds_together(self) -> Self:
-        from mdr_dask.models.mixed_lubrication.lines import problem_of
-
-        problem = problem_of(self)
+        problem = self.problem()
         if problem:
             raise ValueError(problem)
         return self
+
+    @property
+    def perimeter(self) -> float:
+        """Length around a roller in m."""
+        return 2 * float(np.pi) * self.roller_radius
+
+    def source(self) -> Source:
+        """Return where the lines come from; equal for cases that can share them."""
+        if self.profile_1 is not None and self.profile_2 is not None:
+            return Measured(self.profile_1, self.profile_2, self.rms_roughness is not None)
+        longest = self.longest_wavelength
+        if longest == "auto":
+            longest = 2 * float(self.dry_contact(self.cutoff_force).half_width)
+        shortest = self.shortest_wavelength
+        if shortest == "auto":
+            shortest = 10 * self.perimeter / self.points
+        modes = int(self.perimeter / shortest * (1 + 1e-12))
+        return Generated(self.points, self.hurst, self.perimeter / longest, modes)
+
+    def problem(self) -> str:
+        """Say why the case cannot be computed, in one sentence; an empty string if it can."""
+        if (self.profile_1 is None) != (self.profile_2 is None):
+            return "expected the profiles of both rollers or of none, got one"
+        if self.profile_1 is None and self.rms_roughness is None:
+            return "expected rms_roughness, or the measured profiles of both rollers, got neither"
+        outside = self.oil_data().outside(self.temperature)
+        if outside:
+            return outside
+        try:
+            source = self.source()
+            return source.problem(self.perimeter) or self._problem_of_width(source)
+        except DataError as error:
+            return str(error)
+
+    def _problem_of_width(self, source: Source) -> str:
+        length = source.points * source.spacing(self.perimeter)
+        width = 2 * float(self.dry_contact(self.normal_force).half_width)
+        if width > length:
+            return f"the contact is wider than the line: expected 2a of at most {length:.4g} m, got {width:.4g} m"
+        return ""
 
     def oil_data(self) -> Oil:
         """Return the oil, whether named or given."""

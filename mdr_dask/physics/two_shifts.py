@@ -1,0 +1,137 @@
+"""Shift factors that are the sum of two: one of velocity and one of temperature, say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import chi2
+
+from mdr_dask.errors import DataError
+from mdr_dask.physics.superposition import Superposition, superpose
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TwoShifts:
+    """Factors ``h(v, T) = a(v) + b(T)`` and the curve they make.
+
+    Parameters
+    ----------
+    first, second : Superposition
+        The same merged points and curve twice, once with the factors a and the groups v, once with b and T; `member`
+        counts the groups of each.
+    chi_squared : float
+        Squared distance of the factors of all pairs from the sum, in their covariance, for every degree of freedom; the
+        errors are enlarged by its root where it is above one.
+    probability : float
+        Of a chi-squared that large if the sum held; 1 where nothing is left over to test it.
+    """
+
+    first: Superposition
+    second: Superposition
+    chi_squared: float
+    probability: float
+
+
+def superpose_twice(
+    first: ArrayLike,
+    second: ArrayLike,
+    curves: Sequence[tuple[ArrayLike, ArrayLike]],
+    references: tuple[float, float] | None = None,
+) -> TwoShifts:
+    """Shift curves that differ in two things into one, and split the factors into a sum of two.
+
+    All curves are superposed freely; a and b follow by least squares in the covariance of all factors, which is what a
+    joint fit does to first order, and tells whether the sum holds.
+
+    Parameters
+    ----------
+    first, second : array_like, shape (curves,)
+        What each curve belongs to, two or more values of each; not every pair is needed.
+    curves : sequence of (x, y)
+        log10 of abscissa and ordinate.
+    references : pair of float, optional
+        Groups whose factors are zero; the middle ones if not given.
+
+    Raises
+    ------
+    DataError
+        If a group has one value only, or the pairs fall into parts that share no value.
+    """
+    values = [np.asarray(a, dtype=np.float64).reshape(-1) for a in (first, second)]
+    groups, places = zip(*(np.unique(a, return_inverse=True) for a in values), strict=True)
+    if min(group.size for group in groups) < 2:
+        raise DataError("two shifts need two or more values of each group")
+    order = _serpentine(places[0], places[1])
+    free = superpose(np.arange(order.size), [curves[k] for k in order], reference=0.0)
+    zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
+    return _split(free, groups, [place[order] for place in places], zeros)
+
+
+def _split(
+    free: Superposition, groups: Sequence[FloatArray], places: Sequence[NDArray[np.intp]], zeros: Sequence[int]
+) -> TwoShifts:
+    """Fit the sum to free factors, which are zero for the first curve, in the covariance of the others."""
+    size = groups[0].size
+    columns = np.delete(np.arange(size + groups[1].size), [zeros[0], size + zeros[1]])
+    design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, places, strict=True)])
+    rows = (design - design[0])[1:, columns]
+    if np.linalg.matrix_rank(rows) < columns.size:
+        raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
+    whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[1 : len(places[0]), 1 : len(places[0])]))
+    projected, target = whiten @ rows, whiten @ free.horizontal[1:]
+    spread = np.linalg.inv(projected.T @ projected)
+    found = spread @ (projected.T @ target)
+    freedom = rows.shape[0] - columns.size
+    misfit = float(np.sum((target - projected @ found) ** 2))
+    reduced = misfit / freedom if freedom else 0.0
+    both, covariance = np.zeros(design.shape[1]), np.zeros((design.shape[1], design.shape[1]))
+    both[columns] = found
+    covariance[np.ix_(columns, columns)] = spread * max(reduced, 1.0)
+    sums, offset = design @ both, float(design[0] @ both)
+    x = free.x + (sums - free.horizontal)[free.member]
+    own = x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
+    own = own if own.size else x[places[0][free.member] == zeros[0]]
+    moved = replace(free, x=x, curve_x=free.curve_x + offset, measured=(float(own.min()), float(own.max())))
+    parts = slice(size), slice(size, None)
+    one, other = (
+        _one(moved, groups[i], zeros[i], both[part], covariance[part, part], places[i]) for i, part in enumerate(parts)
+    )
+    return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
+
+
+def _one(
+    moved: Superposition,
+    groups: FloatArray,
+    zero: int,
+    factors: FloatArray,
+    covariance: FloatArray,
+    place: NDArray[np.intp],
+) -> Superposition:
+    """Return the superposition as seen by one of the groups."""
+    full = np.zeros((2 * groups.size, 2 * groups.size))
+    full[: groups.size, : groups.size] = covariance
+    return replace(
+        moved,
+        groups=groups,
+        horizontal=factors,
+        vertical=np.zeros(groups.size),
+        covariance=full,
+        reference=float(groups[zero]),
+        member=place[moved.member],
+        draws=np.empty((0, 2 * groups.size)),
+    )
+
+
+def _serpentine(first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return an order in which curves that follow each other are neighbours in one of the groups."""
+    along = np.where(second % 2 == 0, first, first.max() - first)
+    return np.lexsort((along, second))
+
+
+def _nearest(group: FloatArray, wanted: float | None) -> int:
+    return group.size // 2 if wanted is None else int(np.argmin(np.abs(group - wanted)))

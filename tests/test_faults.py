@@ -1,0 +1,134 @@
+"""What is left behind by every write that fails, and by every write that was the last one."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from test_execute import digests
+from zarr.storage import LocalStore
+
+from mdr_dask import execute
+from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.errors import StoreError
+from mdr_dask.execute import Resources
+
+
+def run(campaign, url, **options):
+    return execute.run(campaign, url, Resources(threads=1), lambda _: None, **options)
+
+
+class Disk:
+    """Counts what is written to local stores; one write fails, or that one and all behind it."""
+
+    def __init__(self, monkeypatch) -> None:
+        self.writes = 0
+        self.fails = lambda number: False
+        write = LocalStore.set
+
+        async def counted(store, key, value):
+            self.writes += 1
+            if self.fails(self.writes):
+                raise OSError(28, "No space left on device")
+            await write(store, key, value)
+
+        async def refused(*_):
+            raise AssertionError("only set is expected to write")
+
+        monkeypatch.setattr(LocalStore, "set", counted)
+        monkeypatch.setattr(LocalStore, "set_if_not_exists", refused)
+
+
+@pytest.fixture
+def disk(monkeypatch):
+    return Disk(monkeypatch)
+
+
+def small(toy, **options):
+    return replace(toy.campaign(toy.axis("position", [1.0, 4.0]), **options), blocks={"realisation": 4, "position": 1})
+
+
+def grown(toy, **options):
+    axes = toy.axis("position", [1.0, 2.0, 4.0])
+    return toy.campaign(axes, realisations=Replication(9, 9, {}), **options)
+
+
+def two_series(campaign, positions=(1.0, 2.0)):
+    axes = (replace(campaign.series[0].axes[0], values=tuple(positions)),)
+    far = tuple(10.0 * position for position in positions)
+    return replace(
+        campaign,
+        series=(
+            replace(campaign.series[0], name="near", axes=axes),
+            replace(campaign.series[0], name="far", axes=(replace(axes[0], values=far),)),
+        ),
+    )
+
+
+def adaptive(toy):
+    axis = toy.axis("noise", [0.01, 0.4])
+    return toy.campaign(axis, realisations=Replication(3, 9, {"height": Tolerance(relative=0.05)}))
+
+
+#: Steps of a study by name, each a list of campaigns run one after the other, the last one with faults.
+SCENES = {
+    "first layout and blocks": lambda toy: [small(toy)],
+    "growth of axes and realisations": lambda toy: [small(toy), grown(toy)],
+    "growth of series": lambda toy: [two_series(small(toy), (1.0,)), two_series(small(toy), (1.0, 1.5))],
+    "two outputs": lambda toy: [small(toy, outputs=("height", "trace"))],
+    "rounds": lambda toy: [adaptive(toy)],
+    "retry": lambda toy: [small(toy, fail_above=2.0), small(toy, fail_above=2.0)],
+}
+
+
+def look(url: Path | str) -> list[dict[str, int]]:
+    """Open a store as a stranger would, group by group, and read all of it; what is shown has one shape."""
+    if not Path(url, "zarr.json").exists():
+        return []
+    tree = xr.open_datatree(url, engine="zarr", consolidated=True)
+    assert all("status" in node or not node.variables for node in tree.subtree)
+    seen = []
+    for path in ("", *tree.children):
+        dataset = xr.open_zarr(url, group=path or None, chunks=None, consolidated=True).load()
+        if "status" in dataset:
+            done = dataset.status.to_numpy() == 1
+            assert np.isfinite(dataset.height.to_numpy()[done]).all()
+            assert all(np.isfinite(dataset[dim]).all() for dim in dataset.sizes)
+        else:
+            assert not dataset.variables or path == ""
+        seen.append(dict(dataset.sizes))
+    return seen
+
+
+@pytest.mark.parametrize("lasting", [False, True], ids=["one write fails", "the last write before a kill"])
+@pytest.mark.parametrize("scene", SCENES)
+def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_path, disk, scene, lasting):
+    *before, last = SCENES[scene](toy)
+    options = {"retry_failed": scene == "retry"}
+    old, whole = tmp_path / "old.zarr", tmp_path / "whole.zarr"
+    for campaign in before:
+        run(campaign, str(old))
+    if before:
+        shutil.copytree(old, whole)
+    first = disk.writes
+    run(last, str(whole), **options)
+    expected, count = digests(whole), disk.writes - first
+    shapes = look(old) + look(whole)
+    assert count > 3
+    for broken_write in range(1, count + 1):
+        url = str(tmp_path / "broken.zarr")
+        if before:
+            shutil.copytree(old, url)
+        start = disk.writes + broken_write
+        disk.fails = lambda number, start=start: number == start or (lasting and number > start)
+        with pytest.raises(StoreError, match=r"\.zarr: writing .* failed: No space left on device"):
+            run(last, url, **options)
+        disk.fails = lambda number: False
+        if scene != "rounds":
+            assert all(sizes in shapes for sizes in look(url) if sizes)
+        assert not list(tmp_path.glob(".*.runner"))
+        run(last, url, **options)
+        assert digests(url) == expected
+        shutil.rmtree(url)

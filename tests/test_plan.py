@@ -1,0 +1,142 @@
+"""Templates and blocks: everything once, blocks of a sensible size, estimates that add up, and what is too large."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mdr_dask import plan
+from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.errors import CampaignError
+
+SLOW_CASE = 0.05
+
+
+@pytest.fixture
+def costs(toy, monkeypatch):
+    """Give every result of the toy model a cost, and whole axes if asked."""
+
+    def set_costs(seconds: float, **changes: object) -> None:
+        import sys
+
+        model = replace(toy.MODEL, seconds=lambda block: seconds * block.cases * len(block.realisations), **changes)
+        monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", model)
+
+    return set_costs
+
+
+def study(toy, sizes, realisations, **changes):
+    positions, slopes = sizes
+    axes = toy.axis("position", np.arange(1.0, positions + 1)), toy.axis("slope", np.arange(1.0, slopes + 1))
+    return replace(toy.campaign(*axes, realisations=Replication(realisations, realisations, {})), **changes)
+
+
+lengths = st.integers(1, 12)
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=60)
+@given(
+    sizes=st.tuples(lengths, lengths),
+    realisations=lengths,
+    asked=st.dictionaries(st.sampled_from(["position", "slope", "realisation"]), st.integers(1, 20)),
+    cost=st.floats(-6, 1),
+)
+def test_blocks_cover_every_result_exactly_once(toy, costs, sizes, realisations, asked, cost):
+    costs(10.0**cost)
+    (template,) = plan.templates(study(toy, sizes, realisations, blocks=asked), realisations)
+    seen = np.zeros(template.shape, dtype=int)
+    for index in template.block_indices():
+        region, block = template.region(index), template.block(index)
+        seen[region] += 1
+        inside = seen[region].shape
+        assert (block.cases, len(block.realisations)) == (math.prod(inside[:-1]), inside[-1])
+        positions, slopes = np.meshgrid(*(np.arange(part.start, part.stop) + 1.0 for part in region[:2]), indexing="ij")
+        np.testing.assert_array_equal(block.columns["position"], positions.ravel())
+        np.testing.assert_array_equal(block.columns["slope"], slopes.ravel())
+        assert block.realisations == tuple(range(region[2].start, region[2].stop))
+    assert (seen == 1).all()
+    assert all(template.chunks[dim] == min(length, template.sizes[dim]) for dim, length in asked.items())
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=40)
+@given(sizes=st.tuples(lengths, lengths), realisations=st.integers(1, 200), cost=st.floats(-5, 1))
+def test_blocks_hold_no_more_than_the_work_aimed_at_unless_one_result_does(toy, costs, sizes, realisations, cost):
+    costs(10.0**cost)
+    (template,) = plan.templates(study(toy, sizes, realisations), realisations)
+    block = 10.0**cost * math.prod(template.chunks.values())
+    assert block <= max(plan.BLOCK_SECONDS, 10.0**cost) * (1 + 1e-9)
+
+
+def test_a_large_study_is_cut_into_blocks_of_about_the_work_aimed_at(toy, costs):
+    costs(SLOW_CASE)
+    (template,) = plan.templates(study(toy, (40, 25), 100), 100)
+    assert 0.5 * plan.BLOCK_SECONDS <= SLOW_CASE * math.prod(template.chunks.values()) <= plan.BLOCK_SECONDS
+
+
+def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):
+    costs(1e-3, whole=("slope",))
+    (template,) = plan.templates(study(toy, (30, 50), 20), 20)
+    assert template.chunks["slope"] == 50
+    costs(1.0, whole=("slope",))
+    (template,) = plan.templates(study(toy, (30, 50), 20), 20)
+    assert template.chunks["slope"] <= 4
+
+
+def test_rounds_fill_whole_blocks(toy, costs):
+    costs(SLOW_CASE)
+    until = {"height": Tolerance(relative=0.01)}
+    campaign = study(toy, (3, 3), 1, replication=Replication(12, 100, until))
+    (template,) = plan.templates(campaign, 12)
+    assert 12 % template.chunks["realisation"] == 0
+
+
+def test_stored_chunks_are_kept(toy):
+    campaign = study(toy, (3, 4), 5)
+    chunks = {"position": 2, "slope": 3, "realisation": 4}
+    (template,) = plan.templates(campaign, 5, {"": chunks})
+    assert template.chunks == chunks
+    assert template.grid == (2, 2, 2)
+
+
+@settings(deadline=None, suppress_health_check=list(HealthCheck), max_examples=25)
+@given(sizes=st.tuples(lengths, lengths), realisations=lengths, cost=st.floats(-5, 1))
+def test_estimates_add_up(toy, costs, sizes, realisations, cost):
+    """A constant cost a result: edge blocks along realisations are the only thing that is extrapolated."""
+    costs(10.0**cost)
+    estimate = plan.estimate(study(toy, sizes, realisations))
+    results = math.prod(sizes) * realisations
+    assert (estimate.cases, estimate.results, estimate.solves) == (math.prod(sizes), results, results)
+    assert estimate.bytes == 9 * results
+    assert estimate.seconds == pytest.approx(10.0**cost * results, rel=1e-9)
+
+
+def test_shared_solutions_are_counted(toy, costs):
+    costs(1e-3, distinct=lambda block: len(set(block.column("slope").tolist())), whole=("slope", "position"))
+    assert plan.estimate(study(toy, (10, 4), 6)).solves == 4 * 6
+
+
+def test_huge_studies_are_refused_series_by_series(toy):
+    campaign = study(toy, (100, 100), 10**6)
+    near, far = (replace(campaign.series[0], name=name) for name in ("near", "far"))
+    with pytest.raises(
+        CampaignError, match=r"series\.near: expected at most 1e\+09 results, got 100 position x 100"
+    ) as e:
+        plan.templates(replace(campaign, series=(near, far)), 10**6)
+    assert len(e.value.args) == 2
+
+
+def test_a_case_too_large_for_the_memory_is_refused(toy, costs, monkeypatch):
+    costs(1.0, memory=lambda block: 3 * 2.0**30)
+    monkeypatch.setattr(plan, "available_memory", lambda: 2.0**30)
+    with pytest.raises(CampaignError, match="one case needs about 3 GiB of memory, expected at most the 1 GiB"):
+        plan.templates(study(toy, (2, 2), 2), 2)
+
+
+def test_chunks_stay_below_the_largest_chunk(toy, costs):
+    costs(1e-12)
+    campaign = study(toy, (2000, 100), 100)
+    (template,) = plan.templates(campaign, 100)
+    assert 8 * math.prod(template.chunks.values()) <= plan.CHUNK_BYTES
