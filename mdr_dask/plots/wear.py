@@ -211,6 +211,8 @@ def _axis_text(what: str, unit: str, symbol: str, data: xr.Dataset) -> str:
 
 
 def _dimensionless(data: xr.Dataset) -> bool:
+    if "wear_volume" in data and data.wear_volume.attrs.get("units") == "1":
+        return True
     return "stick_radius" in data.coords and bool(np.all(np.isfinite(np.ravel(data.stick_radius).astype(float))))
 
 

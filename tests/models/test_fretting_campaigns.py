@@ -106,7 +106,7 @@ def test_sliding_from_a_campaign(write):
     )
     assert np.all(np.diff(force.block_depth.isel(block=0).transpose("shape", "path")) > 0)
     assert np.all(data.stick_border == 0)
-    assert np.all(data.discretisation_error < 4e-3)
+    assert np.all(data.discretisation_error < 6e-3)  # the apex of the cone and the edge
 
 
 def test_sliding_in_physical_units_obeys_the_wear_law(write):

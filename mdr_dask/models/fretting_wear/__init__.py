@@ -177,7 +177,7 @@ OUTPUTS = (
 
 MODEL = Model(
     name="fretting_wear",
-    version=1,
+    version=2,
     summary="fretting wear of bodies of revolution: limit, fast, exact and literal",
     parameters=FrettingWear,
     outputs=OUTPUTS,
