@@ -162,3 +162,20 @@ def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
     assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
     assert ours.contact_fraction == pytest.approx(reference.contact_fraction, abs=1e-3)
     assert ours.drag == pytest.approx(reference.drag, rel=1e-4)
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.8])
+def test_time_steps_by_blocks_are_those_node_by_node(hurst):
+    n = 1100  # four blocks and a rest
+    height = roughness.line(roughness.amplitudes(n // 2, hurst), roughness.phases(3, 0, n // 2), n)
+    reaches, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
+    found = sliding.steady_sliding(height, None, reaches, loads, "backward_euler")
+    assert np.all(found.status == 0)
+    line = np.roll(height, -1 - int(np.argmax(height)))
+    decay = reaches * n / (1 + reaches * n)
+    u, total, drag = line[-1] + found.depth, 0.0, 0.0
+    for before, here in zip(np.roll(line, 1), line, strict=True):
+        now = np.maximum(here + found.depth, decay * u)
+        total, drag, u = total + now, drag + (now - decay * u) * (here - before) / (1 - decay), now
+    assert total / n == pytest.approx(loads, rel=1e-8)  # the last step is taken from the tangent
+    assert found.drag == pytest.approx(drag, rel=1e-6)  # and the secant
