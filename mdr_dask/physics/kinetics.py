@@ -140,7 +140,21 @@ def _settle(
     moment, at, rate = np.array([np.inf]), np.array([depth]), np.zeros(1)
     converged, found = False, 0
     for _ in range(60):
-        found = touch(profile, runs, floor, least, none, Course(moment, at, rate, 1), np.inf, reach, start, end, sums, places, spreads)
+        found = touch(
+            profile,
+            runs,
+            floor,
+            least,
+            none,
+            Course(moment, at, rate, 1),
+            np.inf,
+            reach,
+            start,
+            end,
+            sums,
+            places,
+            spreads,
+        )
         if found < 0:
             break
         if abs(sums[LOAD] - load) <= 1e-12 * load:
