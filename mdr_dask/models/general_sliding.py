@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -20,12 +21,13 @@ if TYPE_CHECKING:
 COARSEST, FINEST = 4, 64  # points for every Nyquist point that `auto` begins and ends with
 CELLS = 4  # the solver compares grids of every, every second and every fourth point
 NODE_ARM, NODE_LINE = 1e-8, 1e-7  # seconds for every point and arm of a solve, and for every point of a line
+CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 SOLVE = 3e-4  # seconds for the recovery modes of three grids
 
 
 @dataclass(frozen=True)
 class Case:
-    """What decides one solution; equal cases are solved once.
+    """A case as the campaign states it.
 
     Parameters
     ----------
@@ -55,53 +57,120 @@ class Case:
     oversampling: int | str
 
     @property
+    def period(self) -> float:
+        """Length of the line, m."""
+        return self.length if self.profile is None else line_of(self.profile).length
+
+    @property
+    def height(self) -> float:
+        """Unit of heights, m: the rms roughness, the period where there is none, one metre for a measured line."""
+        return 1.0 if self.profile is not None else self.rms or self.length
+
+    def numbers(self) -> Numbers:
+        """Return the case without units; raises as `solid_of` and `line_of` do."""
+        solid, period, height = solid_of(self.material), self.period, self.height
+        static, (coefficient, exponent) = solid.static_modulus, self.body
+        pace = self.velocity / period
+        return Numbers(
+            profile=self.profile,
+            points=self.points,
+            hurst=self.hurst,
+            is_rough=self.rms > 0,
+            rolloff=self.rolloff,
+            longest=self.longest,
+            body=(_canonical(coefficient * period**exponent / height), exponent),
+            moduli=tuple(_canonical(modulus / static) for modulus in solid.moduli.tolist()),
+            reaches=tuple(_canonical(time * pace) for time in solid.times.tolist()),
+            viscosity=_canonical(solid.viscosity * pace / static),
+            load=_canonical(self.force / (static * period * height)),
+            oversampling=self.oversampling,
+        )
+
+
+def _canonical(number: float) -> float:
+    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
+    mantissa, exponent = math.frexp(number)
+    return math.ldexp(round(math.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """What alone decides a solution, in units of period, height and static modulus; equal ones are solved once.
+
+    Parameters
+    ----------
+    profile, points, hurst, rolloff, longest, oversampling
+        See `Case`.
+    is_rough : bool
+        Whether a generated line has roughness.
+    body : tuple of float
+        c L^n / h and n.
+    moduli, reaches, viscosity
+        G_m / G_inf, tau_m v / L and eta v / (G_inf L).
+    load : float
+        F_N / (G_inf L h).
+    """
+
+    profile: ProfileFile | None
+    points: int
+    hurst: float
+    is_rough: bool
+    rolloff: float
+    longest: float
+    body: tuple[float, float]
+    moduli: tuple[float, ...]
+    reaches: tuple[float, ...]
+    viscosity: float
+    load: float
+    oversampling: int | str
+
+    @property
     def is_the_same_everywhere(self) -> bool:
         """Whether every realisation gives the same result."""
-        return self.profile is not None or self.rms == 0
+        return self.profile is not None or not self.is_rough
 
-    def line(self, phases: Callable[[int], FloatArray], oversampling: int) -> tuple[FloatArray, float]:
-        """Return heights at the nodes and their distance."""
+    def line(self, phases: Callable[[int], FloatArray], oversampling: int) -> FloatArray:
+        """Return heights at the nodes."""
         from mdr_dask.physics import measured, roughness
 
         if self.profile is not None:
             line = line_of(self.profile)
             count = -(-line.height.size // CELLS) * CELLS * oversampling
-            height, length = measured.resampled(line.height, count), line.length
+            height = measured.resampled(line.height, count)
         else:
-            count, length = self.points * oversampling, self.length
+            count = self.points * oversampling
             height = np.zeros(count)
-            if self.rms > 0:
+            if self.is_rough:
                 amplitude = roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
-                height = self.rms * roughness.line(amplitude, phases(self.points // 2), count)
+                height = roughness.line(amplitude, phases(self.points // 2), count)
         coefficient, exponent = self.body
         if coefficient:
-            place = (np.arange(count + 1) - count // 2) * (length / count)
+            place = (np.arange(count + 1) - count // 2) / count
             height = np.append(height, height[0]) - coefficient * np.abs(place) ** exponent
-        return height, length / count
+        return height
 
     def slope(self) -> float:
         """Return the spectral rms slope of the roughness."""
         from mdr_dask.physics import measured, roughness
 
         if self.profile is not None:
-            line = line_of(self.profile)
-            return measured.rms_slope(line.height, line.length)
-        if self.rms == 0:
+            return measured.rms_slope(line_of(self.profile).height, 1.0)
+        if not self.is_rough:
             return 0.0
-        amplitude = roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
-        return roughness.spectral_slope(amplitude) * self.rms / self.length
+        return roughness.spectral_slope(roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest))
 
     def solve(self, phases: Callable[[int], FloatArray], accuracy: float) -> ViscoelasticSteady:
         """Solve on the grid given, or on the coarsest that meets the accuracy."""
+        from mdr_dask.physics.rheology import prony
         from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED
         from mdr_dask.physics.viscoelastic_sliding import steady_viscoelastic_sliding
 
+        solid = prony(1.0, self.moduli, self.reaches, self.viscosity)
         oversampling = COARSEST if self.oversampling == "auto" else int(self.oversampling)
         while True:
-            height, spacing = self.line(phases, oversampling)
-            found = steady_viscoelastic_sliding(
-                height, spacing, solid_of(self.material), self.velocity, self.force, self.body[0] == 0
-            )
+            height = self.line(phases, oversampling)
+            cells = height.size - (1 if self.body[0] else 0)
+            found = steady_viscoelastic_sliding(height, 1 / cells, solid, 1.0, self.load, self.body[0] == 0)
             enough = found.error <= accuracy or found.status not in (CONVERGED, NOT_CONVERGED)
             if self.oversampling != "auto" or enough or oversampling >= FINEST:
                 return found
@@ -113,8 +182,11 @@ def kelvin_material(shear_modulus: float, relaxation_time: float) -> Material:
     return Material(kelvin=Kelvin(shear_modulus=shear_modulus, relaxation_time=relaxation_time))
 
 
-def solve_case(case: Case, phases: Callable[[int], FloatArray], accuracy: float) -> tuple[dict[str, float], int, str]:
-    """Return the outputs of one case, its status and a sentence where there is something to say."""
+Solved = tuple[dict[str, float], int, str]
+
+
+def solve_numbers(case: Numbers, phases: Callable[[int], FloatArray], accuracy: float) -> Solved:
+    """Return the outputs without units, the status and a sentence where there is something to say."""
     from mdr_dask.physics.sliding import CONVERGED, MESSAGES, NOT_CONVERGED
 
     try:
@@ -138,31 +210,46 @@ def solve_case(case: Case, phases: Callable[[int], FloatArray], accuracy: float)
 
 
 def compute(block: Block[Any], cases: list[Case], accuracy: float) -> Result:
-    """Solve the cases of a block, each different one once; a measured line is the same in every realisation."""
+    """Solve the cases of a block, those of equal numbers once; a measured line is the same in every realisation."""
     from mdr_dask.physics import roughness
 
     shape = (block.cases, len(block.realisations))
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     status = np.full(shape, Status.FAILED, np.int8)
     messages: dict[tuple[int, int], str] = {}
-    solved: dict[tuple[Case, int], tuple[dict[str, float], int, str]] = {}
+    solved: dict[tuple[Numbers, int], Solved] = {}
     for j, case in enumerate(cases):
+        numbers, problem = _numbers(case)
+        if numbers is None:
+            messages.update({(j, r): problem for r in range(len(block.realisations))})
+            continue
+        scale = case.height / case.period
+        units = {"friction_coefficient": scale, "contact_slope": scale, "rms_slope": scale}
+        units["indentation_depth"] = case.height
         for r, realisation in enumerate(block.realisations):
-            key = case, -1 if case.is_the_same_everywhere else realisation
+            key = numbers, -1 if numbers.is_the_same_everywhere else realisation
             if key not in solved:
-                phases = partial(roughness.phases, block.seed, realisation)
-                solved[key] = solve_case(case, phases, accuracy)
+                solved[key] = solve_numbers(numbers, partial(roughness.phases, block.seed, realisation), accuracy)
             found, status[j, r], sentence = solved[key]
             if sentence:
                 messages[j, r] = sentence
             for name in block.outputs:
-                values[name][j, r] = found.get(name, np.nan)
+                values[name][j, r] = found.get(name, np.nan) * units.get(name, 1.0)
     return Result(values, status, messages, len(solved))
 
 
+def _numbers(case: Case) -> tuple[Numbers | None, str]:
+    """Return the numbers of a case, or why it has none."""
+    try:
+        return case.numbers(), ""
+    except (DataError, ValueError) as problem:
+        return None, str(problem)
+
+
 def distinct(cases: list[Case], realisations: int) -> int:
-    """Return how many different cases there are, over all realisations."""
-    return sum(1 if case.is_the_same_everywhere else realisations for case in dict.fromkeys(cases))
+    """Return how many different solutions there are, over all realisations."""
+    different = dict.fromkeys(_numbers(case)[0] for case in dict.fromkeys(cases))
+    return sum(1 if case is None or case.is_the_same_everywhere else realisations for case in different)
 
 
 def seconds(case: Case) -> float:

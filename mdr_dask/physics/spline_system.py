@@ -163,9 +163,9 @@ def likelihoods(
     for i in range(weights.size):
         matrix = normal + weights[i] * penalty
         factorise(matrix)
-        misfit = total - np.sum(right * solve(matrix, right))
+        misfit = total - float(np.sum(right * solve(matrix, right)))
         misfit = max(misfit, 1e-14 * total + 1e-300)
-        volume = -rank * np.log(weights[i])
+        volume = -float(rank * np.log(weights[i]))
         for j in range(right.size):
             volume += 2 * np.log(matrix[j, j])
         found[i] = volume + (points - fixed) * np.log(misfit)

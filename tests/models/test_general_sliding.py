@@ -115,3 +115,29 @@ def test_time_estimate_grows_with_the_work():
     material = {"material": {"standard_solid": SOLID}}
     small, large = (block(LINE | LOAD | material | {"points": n}, {"velocity": [0.1, 1.0]}) for n in (200, 20000))
     assert MODEL.seconds(small) < MODEL.seconds(large)
+
+
+def test_cases_of_equal_numbers_are_solved_once():
+    """Twice the modulus and the load, or a tenth of the velocity and ten times the time: the same, bit by bit."""
+    solids = np.empty(4, dtype=object)
+    numbers = [(1.0, 1.0), (2.0, 1.0), (1.0, 10.0), (1.0, 1.0)]
+    for index, (stiff, slow) in enumerate(numbers):
+        solid = {
+            "static_modulus": 1e7 * stiff,
+            "glass_modulus": 5e7 * stiff,
+            "relaxation_time": 1e-3 * slow,
+        }
+        solids[index] = Material.model_validate({"standard_solid": solid})
+    columns = {
+        "material": solids,
+        "normal_force": [0.2, 0.4, 0.2, 0.6],
+        "velocity": [0.1, 0.1, 0.01, 0.1],
+        "rms_roughness": [5e-7, 5e-7, 5e-7, 15e-7],
+    }
+    parameters = LINE | LOAD | {"material": solids[0]}
+    result = MODEL.compute(block(parameters, columns))
+    assert result.solves == MODEL.distinct(block(parameters, columns)) == 2
+    friction = result.values["friction_coefficient"]
+    assert np.array_equal(friction[0], friction[1])
+    assert np.array_equal(friction[0], friction[2])
+    np.testing.assert_allclose(friction[3], 3 * friction[0], rtol=1e-14)
