@@ -163,8 +163,7 @@ def likelihoods(
     for i in range(weights.size):
         matrix = normal + weights[i] * penalty
         factorise(matrix)
-        misfit = total - float(np.sum(right * solve(matrix, right)))
-        misfit = max(misfit, 1e-14 * total + 1e-300)
+        misfit = max(total - float(np.sum(right * solve(matrix, right))), 1e-14 * total + 1e-300)
         volume = -float(rank * np.log(weights[i]))
         for j in range(right.size):
             volume += 2 * np.log(matrix[j, j])
