@@ -164,7 +164,7 @@ def test_measured_rollers_roll_and_creep_from_one_file(capsys):
     np.testing.assert_allclose(data.film_ratio, 0.45 / (0.2 * np.sqrt(2)), rtol=0.1)
     # without a formula nothing is out of range
     capsys.readouterr()
-    assert main(["status", "results/mixed.zarr", "--failures"]) == 0
+    assert main(["status", "results/mixed.zarr", "--messages"]) == 0
     assert "film formula" not in capsys.readouterr().out
 
 
@@ -187,7 +187,7 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
     told = {}
     capsys.readouterr()
     for name in ("mixed", "loaded", "line"):
-        assert main(["status", f"results/{name}.zarr", "--failures"]) == 0
+        assert main(["status", f"results/{name}.zarr", "--messages"]) == 0
         told[name] = capsys.readouterr().out
     assert "film formula Pan-Hamrock (central): W = " in told["mixed"]
     assert "film ratio" in told["mixed"]

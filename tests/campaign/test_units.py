@@ -92,7 +92,7 @@ def test_registry_is_read_once():
     assert registry() is registry()
 
 
-COHERENT = {"m", "s", "kg", "N", "Pa", "K", "rad", "J", "W", "S", "ohm", "mol"}
+COHERENT = {"m", "s", "kg", "N", "Pa", "K", "rad", "J", "W", "S", "ohm", "mol", "Hz"}
 
 
 @pytest.mark.parametrize("name", models.NAMES)
