@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from mdr_dask.physics.protocol_kernels import Line
 
 CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
-SECONDS_NODE, SECONDS_MOMENT = 8e-8, 3.5e-8  # for every node of a line, and of a moment
+SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
 SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of the line
 
