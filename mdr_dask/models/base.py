@@ -91,12 +91,17 @@ class DataFile(BaseModel):
         Raises
         ------
         DataError
-            If the file has changed since the campaign was read.
+            If the file has changed since the campaign was read, or is no text in UTF-8.
         """
         content = Path(self.path).read_bytes()
         if hashlib.sha256(content).hexdigest() != self.sha256:
             raise DataError(f"{self.path}: changed since the campaign was read")
-        return content.decode("utf-8-sig")
+        try:
+            return content.decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise DataError(
+                f"{self.path}: expected text in UTF-8, got byte {content[error.start]:#x} at {error.start}"
+            ) from None
 
 
 def _find_file(value: Any, info: ValidationInfo) -> Any:
