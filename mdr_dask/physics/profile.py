@@ -100,25 +100,23 @@ def cut(profile: Profile) -> tuple[Cells, float]:
     nodes = np.append(profile.height, profile.height[0]) if profile.periodic else profile.height
     peaks, best, place = _peaks(nodes, enter, leave)
     top = float(peaks[best])
-    rise = np.diff(nodes)
-    mean = 0.5 * (nodes[1:] + nodes[:-1]) + (enter - leave) / 12 - top
-    stretch = (36 * rise**2 - 6 * rise * (enter + leave) + 4 * (enter**2 + leave**2) - 2 * enter * leave) / 30
+    mean, stretch = _integrals(nodes, enter, leave, top)
     if profile.smooth:
         stretch = _resummed(stretch, enter, best)
-    roll = best if profile.periodic else 0
+    first = best if profile.periodic else 0
     height, enter, leave, peaks, mean, stretch = (
-        np.roll(array, -roll) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
+        _closed(array, first) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
     )
     after = height[:2] if profile.periodic else np.full(2, nodes[-1] - top)
     blocks = n // BLOCK
     whole = blocks * BLOCK
     return Cells(
-        np.append(height, after),
-        np.append(enter, enter[0]),
-        np.append(leave, leave[0]),
-        np.append(peaks, peaks[0]),
-        np.append(mean, mean[0]),
-        np.append(stretch, stretch[0]),
+        np.append(height[:n], after),
+        enter,
+        leave,
+        peaks,
+        mean,
+        stretch,
         peaks[:whole].reshape(blocks, BLOCK).max(axis=1),
         mean[:whole].reshape(blocks, BLOCK).sum(axis=1),
         stretch[:whole].reshape(blocks, BLOCK).sum(axis=1),
@@ -127,14 +125,43 @@ def cut(profile: Profile) -> tuple[Cells, float]:
     ), top
 
 
+@njit(nogil=True, cache=True)
+def _closed(array: FloatArray, first: int) -> FloatArray:
+    """Return an array turned to begin at a place, with that place once more at the end."""
+    n = array.size
+    turned = np.empty(n + 1)
+    turned[: n - first] = array[first:]
+    turned[n - first : n] = array[:first]
+    turned[n] = turned[0]
+    return turned
+
+
+@njit(nogil=True, cache=True)
+def _integrals(nodes: FloatArray, enter: FloatArray, leave: FloatArray, top: float) -> tuple[FloatArray, FloatArray]:
+    """Return the integrals over every cell of the height, from the top, and of the slope squared."""
+    mean, stretch = np.empty(enter.size), np.empty(enter.size)
+    for i in range(enter.size):
+        rise, e, f = nodes[i + 1] - nodes[i], enter[i], leave[i]
+        mean[i] = 0.5 * (nodes[i + 1] + nodes[i]) + (e - f) / 12 - top
+        stretch[i] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
+    return mean, stretch
+
+
+@njit(nogil=True, cache=True)
 def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
     """Return the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
 
     The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
     """
-    square = slope**2
-    correction = (np.roll(square, -1) - np.roll(square, 1)) / 24
-    summed = 0.5 * (square + np.roll(square, -1)) + correction - np.roll(correction, -1)
-    summed += (summed[first] - stretch[first]) / max(slope.size - 1, 1)
+    n = slope.size
+    square = slope * slope
+    correction = np.empty(n)
+    for i in range(n):
+        correction[i] = (square[(i + 1) % n] - square[i - 1]) / 24
+    summed = np.empty(n)
+    for i in range(n):
+        after = (i + 1) % n
+        summed[i] = 0.5 * (square[i] + square[after]) + correction[i] - correction[after]
+    summed += (summed[first] - stretch[first]) / max(n - 1, 1)
     summed[first] = stretch[first]
     return summed
