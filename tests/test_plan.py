@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mdr_dask import plan
-from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.campaign import Replication, Tolerance, load
 from mdr_dask.errors import CampaignError
 
 SLOW_CASE = 0.05
@@ -140,3 +141,14 @@ def test_chunks_stay_below_the_largest_chunk(toy, costs):
     campaign = study(toy, (2000, 100), 100)
     (template,) = plan.templates(campaign, 100)
     assert 8 * math.prod(template.chunks.values()) <= plan.CHUNK_BYTES
+
+
+TOO_LARGE = sorted((Path(__file__).parent / "campaign/invalid_plans").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", TOO_LARGE, ids=lambda path: path.stem)
+def test_campaigns_too_large_to_run_are_refused_with_their_message(path, monkeypatch):
+    monkeypatch.setattr(plan, "available_memory", lambda: 8 * 2.0**30)
+    with pytest.raises(CampaignError, match=r"expected at most") as caught:
+        plan.estimate(load(path))
+    assert str(caught.value).replace(str(path), path.name) == path.with_suffix(".txt").read_text().strip()

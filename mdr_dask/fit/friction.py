@@ -22,6 +22,7 @@ RESAMPLES = 400
 INTERVAL = (0.025, 0.975)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
+FLAT = 0.05  # of the largest friction that still counts as plateau
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
 
@@ -171,9 +172,11 @@ def _plateau(data: xr.Dataset) -> dict[str, xr.Variable]:
     best = np.nanmax(means, axis=1)
     at = int(np.nanargmax(means[0]))
     inside = 0 < np.argsort(np.argsort(velocity))[at] < velocity.size - 1
+    flat = velocity[means[0] > (1 - FLAT) * best[0]]
     return {
         **_interval("plateau", best, "largest friction coefficient over rms slope"),
         **_measure("plateau_velocity", float(velocity[at]), "v tau slope / (sqrt 2 h) of the largest friction"),
+        **_measure("decades", float(np.log10(flat.max() / flat.min())), f"decades of velocity within {FLAT:.0%} of it"),
         **_measure("bracketed", float(inside), "1 if the largest friction is not at an end of the velocities"),
     }
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from mdr_dask.errors import DataError
@@ -116,6 +116,16 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
 
 #: A parameter that names a file, relative to the campaign file.
 NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]
+
+#: Dimensionless numbers that agree to 6e-14 are the same case.
+CANONICAL_BITS = 44
+
+
+def canonical(number: ArrayLike) -> Any:
+    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
+    mantissa, exponent = np.frexp(number)
+    return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
+
 
 P = TypeVar("P", bound=Parameters)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, FloatArray, Result, Status
+from mdr_dask.models.base import Block, FloatArray, Result, Status, canonical
 from mdr_dask.models.material import Kelvin, Material, solid_of
 from mdr_dask.models.profile_file import ProfileFile, line_of
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 COARSEST, FINEST = 4, 64  # points for every Nyquist point that `auto` begins and ends with
 CELLS = 4  # the solver compares grids of every, every second and every fourth point
 NODE_ARM, NODE_LINE = 1e-8, 1e-7  # seconds for every point and arm of a solve, and for every point of a line
-CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 SOLVE = 3e-4  # seconds for the recovery modes of three grids
 
 
@@ -78,19 +76,13 @@ class Case:
             is_rough=self.rms > 0,
             rolloff=self.rolloff,
             longest=self.longest,
-            body=(_canonical(coefficient * period**exponent / height), exponent),
-            moduli=tuple(_canonical(modulus / static) for modulus in solid.moduli.tolist()),
-            reaches=tuple(_canonical(time * pace) for time in solid.times.tolist()),
-            viscosity=_canonical(solid.viscosity * pace / static),
-            load=_canonical(self.force / (static * period * height)),
+            body=(canonical(coefficient * period**exponent / height), exponent),
+            moduli=tuple(canonical(modulus / static) for modulus in solid.moduli.tolist()),
+            reaches=tuple(canonical(time * pace) for time in solid.times.tolist()),
+            viscosity=canonical(solid.viscosity * pace / static),
+            load=canonical(self.force / (static * period * height)),
             oversampling=self.oversampling,
         )
-
-
-def _canonical(number: float) -> float:
-    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
-    mantissa, exponent = math.frexp(number)
-    return math.ldexp(round(math.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mdr_dask.models import general_sliding
-from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, canonical, quantity
 from mdr_dask.models.indenter import Indenter, Plane
 from mdr_dask.models.material import Material
 from mdr_dask.models.profile_file import ProfileFile
@@ -30,7 +30,6 @@ SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
 ARRAYS = 30  # arrays of the length of the line that a solution holds
-CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 
 
 class SlidingFriction(Parameters):
@@ -209,13 +208,6 @@ def _difference(one: Steady, other: Steady) -> FloatArray:
     return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
 
 
-def _canonical(number: FloatArray) -> FloatArray:
-    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
-    mantissa, exponent = np.frexp(number)
-    rounded: FloatArray = np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
-    return rounded
-
-
 def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
     return np.asarray(block.column(path), dtype=np.float64)
 
@@ -223,7 +215,7 @@ def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
 def _harmonic(block: Block[SlidingFriction], path: str) -> FloatArray:
     """Return length / wavelength for every case, 0 where no wavelength is given."""
     wavelengths = [np.inf if value is None else float(value) for value in block.column(path)]
-    return _canonical(_number(block, "length") / np.array(wavelengths))
+    return np.asarray(canonical(_number(block, "length") / np.array(wavelengths)))
 
 
 @dataclass(frozen=True)
@@ -270,12 +262,12 @@ def _cases(block: Block[SlidingFriction]) -> _Cases:
         block.column("points").tolist(),
         _harmonic(block, "rolloff_wavelength").tolist(),
         _harmonic(block, "longest_wavelength").tolist(),
-        _canonical(coefficient).tolist(),
+        canonical(coefficient).tolist(),
         exponent.tolist(),
     )
     lines = [_Line(*numbers) for numbers in zip(*columns, strict=True)]
     keys = list(zip(lines, block.column("oversampling").tolist(), block.column("scheme").tolist(), strict=True))
-    return _Cases(_canonical(loads), _canonical(reaches), height, length, keys)
+    return _Cases(canonical(loads), canonical(reaches), height, length, keys)
 
 
 @dataclass

@@ -10,7 +10,18 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.models.base import (
+    Block,
+    Coordinate,
+    FloatArray,
+    Model,
+    Output,
+    Parameters,
+    Result,
+    Status,
+    canonical,
+    quantity,
+)
 from mdr_dask.models.indenter import Indenter, Plane
 from mdr_dask.models.material import Material, solid_of
 from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
@@ -19,7 +30,6 @@ if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
     from mdr_dask.physics.protocol_kernels import Line
 
-CANONICAL_BITS = 44  # dimensionless numbers that agree to 6e-14 are the same case
 SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
 SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of the line
@@ -120,24 +130,18 @@ class _Case:
         return roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
 
 
-def _canonical(number: float) -> float:
-    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
-    mantissa, exponent = np.frexp(number)
-    return float(np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS))
-
-
 def _case(case: VelocityJump) -> _Case:
     assert case.shear_modulus is not None
     assert case.relaxation_time is not None
     return _Case(
         case.hurst,
         case.points,
-        _canonical(case.length / case.rolloff_wavelength) if case.rolloff_wavelength else 0.0,
-        _canonical(case.length / case.longest_wavelength) if case.longest_wavelength else 0.0,
+        canonical(case.length / case.rolloff_wavelength) if case.rolloff_wavelength else 0.0,
+        canonical(case.length / case.longest_wavelength) if case.longest_wavelength else 0.0,
         case.oversampling,
         case.steps_per_decade,
-        _canonical(case.normal_force / (4 * case.shear_modulus * case.length * case.rms_roughness)),
-        _canonical(case.velocity * case.relaxation_time / case.length),
+        canonical(case.normal_force / (4 * case.shear_modulus * case.length * case.rms_roughness)),
+        canonical(case.velocity * case.relaxation_time / case.length),
         case.velocity_change,
         case.relaxation_times,
     )
