@@ -28,7 +28,7 @@ from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
-    from mdr_dask.physics.protocol_kernels import Line
+    from mdr_dask.physics.protocol_forces import Line
 
 SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
@@ -378,7 +378,7 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="velocity_jump",
-    version=1,
+    version=2,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,
