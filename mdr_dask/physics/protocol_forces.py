@@ -82,7 +82,7 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
 def _whole(values: FloatArray, j: int) -> float:
     """Return the integral over the cell before node j of the cubic through four nodes."""
     n = values.size
-    return (13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24
+    return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
 @njit(nogil=True, cache=True)
