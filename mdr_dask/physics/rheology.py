@@ -308,14 +308,11 @@ class Recovery:
         tau_m / (tau_m - lambda_k).
     amplitude : array, shape (arms, arms)
         Rows that give c_k = amplitude[k] @ (u - a) for a state of zero stress.
-    memory : array, shape (arms, arms)
-        a_m in mode k: lambda_k / (lambda_k - tau_m).
     """
 
     times: FloatArray
     stretch: FloatArray
     amplitude: FloatArray
-    memory: FloatArray
 
 
 def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
@@ -339,16 +336,18 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     stretch = times[:, None] / distance
     norm = np.sum((moduli * times)[:, None] / distance**2, axis=0)
     amplitude = (moduli[:, None] / distance / norm).T.copy()
-    return Recovery(zeros, stretch, amplitude, -zeros / distance)
+    return Recovery(zeros, stretch, amplitude)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`."""
-    total = 1.0
+def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
+    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
+    total, rate = 1.0, 0.0
     for m in range(times.size):
-        total += weight[m] / ((times[m] - times[k]) - offset)
-    return total
+        inverse = 1 / ((times[m] - times[k]) - offset)
+        total += weight[m] * inverse
+        rate += weight[m] * inverse * inverse
+    return total, rate
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -359,18 +358,32 @@ def _zeros_between(moduli: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     for k in range(arms):
         last = k == arms - 1
         gap = 2 * times[k] * moduli.sum() if last else times[k + 1] - times[k]
-        left = last or _imbalance(k, gap / 2, weight, times) >= 0
+        left = last or _imbalance(k, gap / 2, weight, times)[0] >= 0
         pole, sign = (k, 1.0) if left else (k + 1, -1.0)
-        high = np.log(gap)
-        low = high - 80.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if sign * _imbalance(pole, sign * np.exp(middle), weight, times) > 0:
-                high = middle
-            else:
-                low = middle
-        offset = sign * np.exp(0.5 * (low + high))
+        offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
         zeros[k] = times[pole] + offset
         for m in range(arms):
             distance[m, k] = (times[m] - times[pole]) - offset
     return zeros, distance
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
+    """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
+    high = np.log(gap)
+    low = high - 80.0
+    place = 0.5 * (low + high)
+    for _ in range(80):
+        offset = np.exp(place)
+        total, rate = _imbalance(pole, sign * offset, weight, times)
+        if sign * total > 0:
+            high = place
+        else:
+            low = place
+        following = place - sign * total / (rate * offset)
+        if not low < following < high or high - low > 1.0:
+            following = 0.5 * (low + high)
+        if abs(following - place) <= 1e-15:
+            break
+        place = following
+    return float(np.exp(place))
