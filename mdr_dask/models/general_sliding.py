@@ -11,7 +11,7 @@ import numpy as np
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, FloatArray, Result, Status, canonical
-from mdr_dask.models.material import Kelvin, Material, solid_of
+from mdr_dask.models.material import Kelvin, Material, fit_error, solid_of
 from mdr_dask.models.profile_file import ProfileFile, line_of
 
 if TYPE_CHECKING:
@@ -223,6 +223,7 @@ def compute(block: Block[Any], cases: list[Case], accuracy: float) -> Result:
             if key not in solved:
                 solved[key] = solve_numbers(numbers, partial(roughness.phases, block.seed, realisation), accuracy)
             found, status[j, r], sentence = solved[key]
+            found = {**found, "material_error": fit_error(case.material)} if found else found
             if sentence:
                 messages[j, r] = sentence
             for name in block.outputs:

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from mdr_dask.models import general_sliding
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, canonical, quantity
 from mdr_dask.models.indenter import Indenter, Plane
-from mdr_dask.models.material import Material
+from mdr_dask.models.material import Material, fit_notes
 from mdr_dask.models.profile_file import ProfileFile
 
 if TYPE_CHECKING:
@@ -89,6 +89,9 @@ OUTPUTS = (
     Output("contact_slope", "1", "rms slope of the line over the contact"),
     Output("rms_slope", "1", "spectral rms slope of the line"),
     Output("discretisation_error", "1", "estimated relative error of the friction coefficient"),
+    Output(
+        "material_error", "1", "rms relative error of the material's Prony series, 0 where none is fitted", (), False
+    ),
 )
 
 
@@ -395,6 +398,7 @@ class _Group:
             "contact_slope": steady.contact_slope[which] * self.scale,
             "rms_slope": self.line.slope() * self.scale,
             "discretisation_error": error[which],
+            "material_error": 0.0,
         }
         answer.put(self.members, r, found, steady.status[which])
         if self.oversampling == "auto":
@@ -476,7 +480,7 @@ def memory(block: Block[SlidingFriction]) -> float:
 
 MODEL = Model(
     name="sliding_friction",
-    version=1,
+    version=2,
     summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
     parameters=SlidingFriction,
     outputs=OUTPUTS,
@@ -485,4 +489,5 @@ MODEL = Model(
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=distinct,
     memory=memory,
+    notes=lambda parameters: fit_notes(parameters.material),
 )

@@ -126,6 +126,8 @@ class SeriesFit:
         Root mean square of the relative error of G' and G''; NaN for one that was not given.
     largest_error : float
         Largest relative error of either.
+    worst_frequency : float
+        Angular frequency of the largest error, rad/s.
     range : tuple of float
         Lowest and highest angular frequency of the data, rad/s.
     """
@@ -134,7 +136,13 @@ class SeriesFit:
     storage_error: float
     loss_error: float
     largest_error: float
+    worst_frequency: float
     range: tuple[float, float]
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the relative errors of the moduli that were given."""
+        return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
 
 
 def power_law_series(
@@ -177,7 +185,8 @@ def power_law_series(
     moduli, _ = nnls(_loss_columns(omega, times) / wanted[:, None], np.ones_like(omega), maxiter=100 * times.size)
     solid = prony(static_modulus, moduli, times)
     error = complex_modulus(solid, omega).imag / wanted - 1
-    return SeriesFit(solid, np.nan, _rms(error), float(np.abs(error).max()), (lowest, highest))
+    worst = int(np.abs(error).argmax())
+    return SeriesFit(solid, np.nan, _rms(error), abs(float(error[worst])), float(omega[worst]), (lowest, highest))
 
 
 def fit_series(
@@ -219,8 +228,10 @@ def fit_series(
     solid = prony(static, moduli, times, weights[-1] if dashpot else 0.0)
     modulus = complex_modulus(solid, omega)
     errors = modulus.real / stored - 1, modulus.imag / lost - 1
-    largest = float(max(np.abs(error).max() for error in errors))
-    return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), largest, (float(omega.min()), float(omega.max())))
+    larger = np.maximum(*np.abs(errors))
+    worst = int(larger.argmax())
+    covered = float(omega.min()), float(omega.max())
+    return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), float(larger[worst]), float(omega[worst]), covered)
 
 
 def _times_covering(omega: FloatArray, arms_per_decade: float) -> FloatArray:
