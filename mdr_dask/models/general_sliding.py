@@ -65,7 +65,11 @@ class Case:
         return 1.0 if self.profile is not None else self.rms or self.length
 
     def numbers(self) -> Numbers:
-        """Return the case without units; raises as `solid_of` and `line_of` do."""
+        """Return the case without units; ValueError for a number that is none, others as `solid_of`, `line_of`."""
+        given = {"load": self.force, "velocity": self.velocity, "height": self.height, "length": self.period}
+        for name, value in given.items():
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"the {name} must be positive and finite, got {value!r}")
         solid, period, height = solid_of(self.material), self.period, self.height
         static, (coefficient, exponent) = solid.static_modulus, self.body
         pace = self.velocity / period

@@ -218,7 +218,8 @@ def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
 def _harmonic(block: Block[SlidingFriction], path: str) -> FloatArray:
     """Return length / wavelength for every case, 0 where no wavelength is given."""
     wavelengths = [np.inf if value is None else float(value) for value in block.column(path)]
-    return np.asarray(canonical(_number(block, "length") / np.array(wavelengths)))
+    with np.errstate(all="ignore"):
+        return np.asarray(canonical(_number(block, "length") / np.array(wavelengths)))
 
 
 @dataclass(frozen=True)
@@ -255,6 +256,7 @@ def _shapes(block: Block[SlidingFriction]) -> list[tuple[float, float]]:
 
 def _cases(block: Block[SlidingFriction]) -> _Cases:
     length, height = _number(block, "length"), _number(block, "rms_roughness")
+    height = np.where(np.isfinite(length) & (length > 0), height, np.nan)  # so that it is not solved
     coefficient, exponent = np.array(_shapes(block)).T
     with np.errstate(all="ignore"):
         loads = _number(block, "normal_force") / (4 * _number(block, "shear_modulus") * length * height)
@@ -335,6 +337,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
     cases = _cases(block)
+    answer.warn(np.flatnonzero(~(cases.height >= 0)), "the length must be positive, the rms roughness not negative")
     _smooth(cases, answer)
     groups = []
     for (line, oversampling, scheme), members in cases.groups():
