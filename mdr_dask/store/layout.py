@@ -217,6 +217,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
         ],
         "outputs": [output.name for output in template.outputs],
         "blocks": dict(template.chunks),
+        **({"notes": list(template.notes)} if template.notes else {}),
     }
 
 
