@@ -12,7 +12,14 @@ from mdr_dask.errors import FitError
 from mdr_dask.fit import bootstrap
 from mdr_dask.fit.base import Fit
 from mdr_dask.fit.kinetic_cases import LEVELS, Cases, law_rate
-from mdr_dask.fit.relaxation import AMPLITUDE_FIELDS, GOODNESS_FIELDS, RATE_FIELDS, SHAPE_FIELDS, relaxation_of
+from mdr_dask.fit.relaxation import (
+    AMPLITUDE_FIELDS,
+    GOODNESS_FIELDS,
+    RATE_FIELDS,
+    SHAPE_FIELDS,
+    one_is_enough,
+    relaxation_of,
+)
 
 FloatArray = NDArray[np.float64]
 Series = Mapping[str, xr.Dataset]
@@ -63,7 +70,7 @@ def _numbers(cases: Cases) -> dict[str, FloatArray]:
     }
 
 
-def _relaxations(cases: Cases) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+def _relaxations(cases: Cases, shaped: bool = False) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Fit the relaxation of every case: samples of its constants, and goodness of fit."""
     time = np.concatenate([[0.0], cases.data["relaxation_times"].values])
     expected, slope = law_rate(cases.passing, cases.column("hurst")), cases.slope
@@ -77,7 +84,7 @@ def _relaxations(cases: Cases) -> tuple[dict[str, FloatArray], dict[str, FloatAr
         if not np.nanmax(np.abs(traces[0]), initial=0.0) > INSTANT * slope[k]:
             continue
         error = good.std(axis=0, ddof=1) / np.sqrt(len(good))
-        found, measures = relaxation_of(time, traces, error, float(expected[k]))
+        found, measures = relaxation_of(time, traces, error, float(expected[k]), shaped)
         for name, values in found.items():
             samples[name][: len(values), k] = values
         for name, value in measures.items():
@@ -117,8 +124,8 @@ def _relaxation(series: Series) -> xr.Dataset:
     result["law_rate"] = cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12")
     for name in ("window", "unexplained", "probability"):
         result[name] = cases.found(goodness[name], *GOODNESS_FIELDS[name])
-    enough = np.where(np.isnan(goodness["unexplained"]), "nothing relaxes", "yes").astype("<U15")
-    enough[np.isfinite(goodness["two_unexplained"])] = "no"
+    left, probability = goodness["unexplained"], goodness["probability"]
+    enough = np.where(one_is_enough(left, probability), "yes", np.where(np.isnan(left), "nothing relaxes", "no"))
     result["one_is_enough"] = cases.found(enough, "1", "whether one exponential is enough")
     result.attrs["window"] = WINDOW_TEXT
     return result
@@ -127,7 +134,7 @@ def _relaxation(series: Series) -> xr.Dataset:
 def _shape(series: Series) -> xr.Dataset:
     """Return a stretched exponential and two exponentials where one is not enough."""
     cases = Cases.of(series, *_needed())
-    samples, goodness = _relaxations(cases)
+    samples, goodness = _relaxations(cases, shaped=True)
     if np.all(np.isnan(goodness["two_unexplained"])):
         raise FitError("one exponential is enough in every case")
     result = xr.Dataset(cases.constants(samples, SHAPE_FIELDS, POSITIVE))
@@ -140,7 +147,7 @@ def _shape(series: Series) -> xr.Dataset:
 def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
     """Return the laws fitted to the only case of a series, over rms slope, over t within the window, with a band."""
     cases = Cases.of({"": data}, *_needed())
-    samples, goodness = _relaxations(cases)
+    samples, goodness = _relaxations(cases, shaped=True)
     t = np.append(0.0, np.geomspace(1e-4, 1, 200)) * goodness["window"][0]
     found = {name: values[:, 0] for name, values in samples.items()}
     one = found["amplitude"][:, None] * np.exp(-found["rate"][:, None] * t) / cases.slope[0]

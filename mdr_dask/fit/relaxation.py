@@ -199,8 +199,14 @@ def _probability(traces: FloatArray, curves: FloatArray, weights: FloatArray) ->
     return float(np.mean(by_scatter >= residual[0] ** 2 @ weights))
 
 
+def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> NDArray[np.bool_]:
+    """Return where what one exponential leaves may be chance, or the grid's."""
+    enough: NDArray[np.bool_] = (unexplained < ENOUGH) | (np.asarray(probability) >= DOUBTFUL)
+    return enough
+
+
 def relaxation_of(
-    time: FloatArray, traces: FloatArray, error: FloatArray, expected: float
+    time: FloatArray, traces: FloatArray, error: FloatArray, expected: float, shaped: bool = False
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
     """Fit the relaxation of a mean trace and of its resamples.
 
@@ -214,6 +220,8 @@ def relaxation_of(
         Standard error of the mean.
     expected : float
         Rate of the law, which fixes the window of the fit, 8 / expected.
+    shaped : bool
+        Whether to fit more than one exponential where one is not enough.
 
     Returns
     -------
@@ -237,7 +245,7 @@ def relaxation_of(
     }
     probability = _probability(y, amplitude[:, None] * np.exp(-rate[:, None] * t), weights)
     goodness = {"window": float(t[-1]), "unexplained": float(left[0]), "probability": probability}
-    if left[0] < ENOUGH or probability >= DOUBTFUL:
+    if not shaped or one_is_enough(left[0], probability):
         return samples, goodness
     shapes, shares = _shapes(t, y, weights, float(rate[0]))
     return samples | shapes, goodness | shares

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+INTERVALS = "bars: 95 % intervals, bootstrap over the realisations"
+
+
 def _fitted(series: Mapping[str, xr.Dataset], name: str) -> xr.Dataset:
     from mdr_dask.fit.kinetics import FITS
 
@@ -37,9 +40,18 @@ def _colours(values: np.ndarray) -> list[Any]:
     return [colormaps["viridis"](place) for place in places]
 
 
+def _bars(found: xr.Dataset, name: str) -> np.ndarray:
+    """Return the lengths of error bars down and up to the ends of the intervals."""
+    value = found[name].values
+    bars: np.ndarray = np.clip([value - found[f"{name}_low"].values, found[f"{name}_high"].values - value], 0, None)
+    return bars
+
+
 def draw_jump(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw mu_1 and d_mu_0 v_1 / dv over the velocity for every load (Fig. 4.4)."""
+    """Draw mu_1 and d_mu_0 v_1 / dv over the velocity for every load, with eq. 4.11 (Fig. 4.4)."""
     from matplotlib.figure import Figure
+
+    from mdr_dask.fit.kinetics import LAW, jump_law
 
     data = next(
         (data for data in series.values() if {"velocity", "normal_force"} <= set(data.dims)),
@@ -47,31 +59,24 @@ def draw_jump(series: Mapping[str, xr.Dataset]) -> Figure:
     )
     spare = set(data["friction_coefficient_before"].dims) - {"realisation", "velocity", "normal_force"}
     data = data.isel(dict.fromkeys(spare, 0))
-    data = data if "normal_force" in data.dims else data.expand_dims("normal_force")
-    figure = Figure(figsize=(9.5, 3.8), layout="constrained")
-    before = data["friction_coefficient_before"] / data["rms_slope"]
-    jump = data["friction_coefficient_jump"] / data["rms_slope"] / data["velocity_change"]
+    for axis in ("normal_force", "velocity"):
+        data = data if axis in data.dims else data.expand_dims(axis)
+    found = _fitted({"": data}, "kinetics")
+    figure = Figure(figsize=(9.5, 4), layout="constrained")
     labels = r"$\mu_1/\nabla z$", r"$\Delta\mu_0\,v_1/(\Delta v\,\nabla z)$"
-    loads = np.atleast_1d(data["normal_force"].values)
-    for axes, array, label in zip(figure.subplots(1, 2, sharey=True), (before, jump), labels, strict=True):
+    loads, speed = found["normal_force"].values, found["velocity"].values
+    names = "before_over_slope", "jump_over_slope"
+    for axes, name, label in zip(figure.subplots(1, 2, sharey=True), names, labels, strict=True):
         for k, colour in enumerate(_colours(loads)):
-            line = array.isel(normal_force=k)
-            error = line.std("realisation", ddof=1) / np.sqrt(line.sizes["realisation"])
-            speed = np.atleast_1d(data["velocity"].values)
-            mean, half = np.atleast_1d(line.mean("realisation")), np.atleast_1d(error)
-            axes.errorbar(speed, mean, yerr=half, color=colour, lw=1, marker=".", ms=3)
+            line = found.isel(normal_force=k).transpose("velocity")
+            axes.errorbar(speed, line[name].values, _bars(line, name), color=colour, lw=1, marker=".", ms=3)
+            if name == names[1]:
+                axes.plot(speed, jump_law(line[names[0]].values, LAW), ":", color=colour, lw=1)
         axes.set(xscale="log", yscale="log", xlabel=r"$v_1$ (m/s)", ylabel=label)
-    figure.suptitle(
-        f"$F_N$ from {loads.min():.2g} (dark) to {loads.max():.2g} N (light); mean $\\pm$ standard error", fontsize=10
-    )
+    figure.axes[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
+    figure.axes[1].legend(frameon=False, fontsize=8)
+    figure.suptitle(f"$F_N$ from {loads.min():.2g} (dark) to {loads.max():.2g} N (light); {INTERVALS}", fontsize=10)
     return figure
-
-
-def _bars(found: xr.Dataset, name: str) -> np.ndarray:
-    """Return the lengths of error bars down and up to the ends of the intervals."""
-    value = found[name].values
-    bars: np.ndarray = np.clip([value - found[f"{name}_low"].values, found[f"{name}_high"].values - value], 0, None)
-    return bars
 
 
 def _by_hurst(found: xr.Dataset) -> Iterator[tuple[float, Any, xr.Dataset]]:
@@ -143,9 +148,6 @@ def draw_rate(series: Mapping[str, xr.Dataset]) -> Figure:
     axes.set_title(f"{INTERVALS}; rates known to a factor of 1.6", fontsize=9)
     axes.legend(frameon=False, fontsize=7, ncols=2)
     return figure
-
-
-INTERVALS = "bars: 95 % intervals, bootstrap over the realisations"
 
 
 def draw_power(series: Mapping[str, xr.Dataset]) -> Figure:
