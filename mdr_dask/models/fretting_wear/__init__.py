@@ -145,7 +145,10 @@ def _seconds(block: Block[FrettingWear]) -> float:
     cells = block.parameters.cells
     if on_grid(block.parameters):
         return 0.01 + (3e-7 if method == "literal" else 1e-7) * cells**3 * size
-    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * (1e-3 / tolerance) ** 0.6}[method]
+    accurate = (1e-3 / tolerance) ** 0.6
+    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * accurate}[method]
+    if block.parameters.hold == "force":
+        each = {"limit": 0.5 * accurate, "fast": 0.03, "exact": accurate}[method]
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
     solves = moments if method == "fast" else _count(numbers.exponent, numbers.level)
