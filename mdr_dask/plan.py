@@ -23,6 +23,10 @@ BLOCK_SECONDS = 1.0
 FEW_BLOCKS = 16
 #: ... but never into blocks of less work than this.
 LEAST_SECONDS = 0.1
+#: Blocks whose cases share work are cut freely when they are longer than this,
+SHARED_SECONDS = 30.0
+#: and below it where halving them makes the work of a study this much larger at most.
+REPEATED_WORK = 1.15
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
 #: Values of an axis that are asked for notes.
@@ -266,13 +270,13 @@ def available_memory() -> float:
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Fill a block with work: shared axes whole, then realisations, then the other axes."""
-    whole = {axis.dim for axis in template.series.axes if _is_whole(axis, model.whole)}
+    whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
     goal = _block_seconds(template, model, chunks)
-    for dim in sorted(whole, key=lambda dim: -template.sizes[dim]):
+    for dim in reversed(whole):
         while chunks[dim] > 1 and (
-            math.prod(chunks.values()) > limit or _mean_seconds(template, model, chunks) > 4 * goal
+            math.prod(chunks.values()) > limit or _is_cut(template, model, chunks, dim, 4 * goal)
         ):
             chunks[dim] = math.ceil(chunks[dim] / 2)
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
@@ -284,14 +288,33 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     }
 
 
+def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
+    """Return the dimensions that cases share work along, in the order in which the model names their parameters."""
+    dims = [axis.dim for path in model.whole for axis in template.series.axes if _is_whole(axis, path)]
+    return list(dict.fromkeys(dims))
+
+
+def _is_cut(template: Template, model: Model[Any], chunks: Mapping[str, int], dim: str, most: float) -> bool:
+    """Return whether blocks of more than `most` seconds are halved along a dimension.
+
+    Not where the halves would repeat much of each other's work, unless a block lasts very long.
+    """
+    now = _mean_seconds(template, model, chunks)
+    if now <= most or now > SHARED_SECONDS:
+        return now > most
+    half = math.ceil(chunks[dim] / 2)
+    growth = _mean_seconds(template, model, {**chunks, dim: half}) / now * chunks[dim] / half
+    return growth < REPEATED_WORK
+
+
 def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
     parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
     total = parts * _mean_seconds(template, model, chunks)
     return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
 
 
-def _is_whole(axis: Axis, whole: tuple[str, ...]) -> bool:
-    return any(axis.path == path or axis.path.startswith(path + ".") for path in whole)
+def _is_whole(axis: Axis, path: str) -> bool:
+    return axis.path == path or axis.path.startswith(path + ".")
 
 
 def _part(template: Template, dim: str, most: int) -> int:

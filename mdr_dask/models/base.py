@@ -267,13 +267,14 @@ class Model(Generic[P]):
     seconds : callable, Block -> float
         Estimated time of `compute`; cheap, vectorised over the cases.
     whole : tuple of str
-        Parameters whose axes stay whole inside a block, because cases share work along them.
+        Parameters whose axes stay whole inside a block, because cases share work along them; those named last are cut
+        first where a block becomes too large.
     coordinates : callable, Parameters -> dict of str to Coordinate
         Coordinates of the dimensions that outputs have beyond case and realisation.
     distinct : callable, Block -> int, optional
         Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
     units : callable, Parameters -> dict of str to str
-        Units of outputs that differ from the declared ones, as in a campaign of dimensionless numbers.
+        Units of outputs and parameters that differ from the declared ones, as in a campaign of dimensionless numbers.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, beyond its outputs.
     notes : callable, Parameters -> tuple of str
