@@ -15,7 +15,8 @@ from mdr_dask.models.base import FloatArray, NamedFile, Parameters, quantity
 from mdr_dask.models.tables import parse_table
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.protocol_kernels import Foundation, Line
+    from mdr_dask.physics.element import Foundation
+    from mdr_dask.physics.protocol_forces import Line
 
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 MOST_STEPS = 400_000

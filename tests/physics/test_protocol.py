@@ -4,6 +4,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mdr_dask.physics import rheology, roughness
+from mdr_dask.physics.element import Foundation
 from mdr_dask.physics.protocol import (
     KELVIN,
     Response,
@@ -13,7 +14,8 @@ from mdr_dask.physics.protocol import (
     indented_line,
     steady_start,
 )
-from mdr_dask.physics.protocol_kernels import CONVERGED, OUTSIDE_LINE, Foundation, Line
+from mdr_dask.physics.protocol_forces import Line
+from mdr_dask.physics.protocol_kernels import CONVERGED, OUTSIDE_LINE
 from mdr_dask.physics.sliding import steady_sliding
 from mdr_dask.physics.viscoelastic_sliding import steady_viscoelastic_sliding
 
