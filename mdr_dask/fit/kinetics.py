@@ -178,8 +178,8 @@ def _jump_law(series: Series) -> xr.Dataset:
     numbers = _numbers(cases)
     before, jump = numbers["before_over_slope"], numbers["jump_over_slope"]
     known = np.isfinite(before[0]) & np.all(before > 0, axis=0) & np.all(jump > 0, axis=0)
-    if np.count_nonzero(known) < 2:
-        raise FitError(f"expected at least two cases whose friction jumps, got {np.count_nonzero(known)}")
+    if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
+        raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
     rows = _rows_of(cases.column("hurst"))
     table: dict[str, list[float]] = {}
     for _, chosen in rows:
@@ -209,8 +209,11 @@ def _deviation(before: FloatArray, jump: FloatArray, constant: float) -> float:
 
 
 def _constants(before: FloatArray, jump: FloatArray) -> FloatArray:
-    """Return samples of the constant c that fits log d_mu_0 best, by Gauss and Newton's steps in ln c."""
-    if before.shape[1] < 1:
+    """Return samples of the constant c that fits log d_mu_0 best, by Gauss and Newton's steps in ln c.
+
+    In region I the law does not depend on it: NaN where all cases lie there.
+    """
+    if not np.any(before[0] > REGION_ONE):
         return np.full(len(before), np.nan)
     constant = np.full((len(before), 1), LAW)
     for _ in range(30):

@@ -294,27 +294,39 @@ def forces_now(
     reach: float,
     load: float,
     first: int,
-) -> tuple[float, float, float]:
-    """Return the rate of the depth that carries the load, drag and fraction in contact; note the edges."""
+) -> tuple[float, float, float, float]:
+    """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
+
+    Without a dashpot the depth is that of the load; the one for the mean displacement of the elements is not more exact
+    than a sum over a line with kinks.
+    """
     plain = solid.times.size == 0
     for j in range(room.under.size):
         w = depth + room.under[j]
         room.pulls[j] = w if plain else pull(solid, w, state.arms[j])
         room.gaps[j] = w - state.free[j] if solid.viscosity > 0 else room.pulls[j]
-    return balance(
-        solid.viscosity,
-        room.gaps,
-        room.pulls,
-        room.slope,
-        state.touching,
-        state.edges,
-        rate,
-        reach,
-        load,
-        first,
-        room.force,
-        room.power,
+    edges, force, power = state.edges, room.force, room.power
+    if solid.viscosity > 0:
+        rate, drag, length = balance(
+            solid.viscosity,
+            room.gaps,
+            room.pulls,
+            room.slope,
+            state.touching,
+            edges,
+            rate,
+            reach,
+            load,
+            first,
+            force,
+            power,
+        )
+        return depth, rate, drag, length
+    glass = 1 + solid.moduli.sum()
+    more, drag, length = balance(
+        glass, room.gaps, room.pulls, room.slope, state.touching, edges, 0.0, 0.0, load, first, force, power
     )
+    return depth + more, rate, drag, length
 
 
 @njit(nogil=True, cache=True)
@@ -361,8 +373,8 @@ def follow_elements(
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return OUTSIDE_LINE
-        rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
-        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, depth, rate, length
+        exact, rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
+        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
     return CONVERGED
 

@@ -24,12 +24,11 @@ def _fitted(series: Mapping[str, xr.Dataset], name: str) -> xr.Dataset:
 
 
 def _meant(series: Mapping[str, xr.Dataset]) -> Mapping[str, xr.Dataset]:
-    """Return the series over velocity and Hurst exponent, as in Figs. 4.5-4.7, else over velocity, else the first."""
-    for wanted in ({"velocity", "hurst"}, {"velocity"}, set[str]()):
-        for name, data in series.items():
-            if wanted <= {str(dim) for dim in data.dims}:
-                return {name: data}
-    raise DataError("expected a store with at least one series, got none")
+    """Return the series of most velocities and, of those, most Hurst exponents, as in Figs. 4.5-4.7."""
+    if not series:
+        raise DataError("expected a store with at least one series, got none")
+    both = {name: data for name, data in series.items() if {"velocity", "hurst"} <= set(data.dims)} or series
+    return dict([max(both.items(), key=lambda item: [item[1].sizes.get(dim, 1) for dim in ("velocity", "hurst")])])
 
 
 def _colours(values: np.ndarray) -> list[Any]:
