@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from mdr_dask.models import general_sliding
 from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, Result, Status, canonical, quantity
 from mdr_dask.models.indenter import Indenter, Plane
-from mdr_dask.models.material import Material
+from mdr_dask.models.material import Material, fit_notes
 from mdr_dask.models.profile_file import ProfileFile
 from mdr_dask.models.rough_line import FINEST, Line, Task
 
@@ -85,6 +85,9 @@ OUTPUTS = (
     Output("contact_slope", "1", "rms slope of the line over the contact"),
     Output("rms_slope", "1", "spectral rms slope of the line"),
     Output("discretisation_error", "1", "estimated relative error of the friction coefficient"),
+    Output(
+        "material_error", "1", "rms relative error of the material's Prony series, 0 where none is fitted", (), False
+    ),
 )
 
 
@@ -95,7 +98,8 @@ def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
 def _harmonic(block: Block[SlidingFriction], path: str) -> FloatArray:
     """Return length / wavelength for every case, 0 where no wavelength is given."""
     wavelengths = [np.inf if value is None else float(value) for value in block.column(path)]
-    return np.asarray(canonical(_number(block, "length") / np.array(wavelengths)))
+    with np.errstate(all="ignore"):
+        return np.asarray(canonical(_number(block, "length") / np.array(wavelengths)))
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,7 @@ def _shapes(block: Block[SlidingFriction]) -> list[tuple[float, float]]:
 
 def _cases(block: Block[SlidingFriction]) -> _Cases:
     length, height = _number(block, "length"), _number(block, "rms_roughness")
+    height = np.where(np.isfinite(length) & (length > 0), height, np.nan)  # so that it is not solved
     coefficient, exponent = np.array(_shapes(block)).T
     with np.errstate(all="ignore"):
         loads = _number(block, "normal_force") / (4 * _number(block, "shear_modulus") * length * height)
@@ -212,6 +217,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     answer = _Answer(block, values, np.full(shape, Status.FAILED, np.int8), {})
     cases = _cases(block)
+    answer.warn(np.flatnonzero(~(cases.height >= 0)), "the length must be positive, the rms roughness not negative")
     _smooth(cases, answer)
     groups = []
     for (line, oversampling, scheme), members in cases.groups():
@@ -275,6 +281,7 @@ class _Group:
             "contact_slope": steady.contact_slope[which] * self.scale,
             "rms_slope": self.line.slope() * self.scale,
             "discretisation_error": error[which],
+            "material_error": 0.0,
         }
         answer.put(self.members, r, found, steady.status[which])
         if self.oversampling == "auto":
@@ -365,4 +372,5 @@ MODEL = Model(
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=distinct,
     memory=memory,
+    notes=lambda parameters: fit_notes(parameters.material),
 )
