@@ -41,6 +41,10 @@ class Line:
         """Return the amplitudes of its harmonics."""
         return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
 
+    def sampled(self, accuracy: float) -> bool:
+        """Return whether the cubic cells of `auto` are left to the cases that are too hard from node to node."""
+        return self.coefficient == 0 and accuracy >= QUICKEST
+
     def slope(self) -> float:
         """Return the spectral rms slope."""
         return _slope(self)
@@ -113,7 +117,7 @@ class Task:
         """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
         if self.scheme != "hermite":
             return self._swept(accuracy, 1)
-        if self.line.coefficient > 0 or accuracy < QUICKEST:
+        if not self.line.sampled(accuracy):
             return self._swept(accuracy, 2)
         steady, error = self._sampled(accuracy)
         wanting = ~(error <= accuracy)

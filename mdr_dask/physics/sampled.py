@@ -203,26 +203,26 @@ def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, room: Flo
             u, fade, was = room[U * LANES + k], room[FADE * LANES + k], room[CONTACT * LANES + k] > 0
             w0, w1 = d + h0, d + h1
             f0, f1 = w0 + r * s0, w1 + r * s1
-            # it leaves where the force falls to 0, or touches where the gap, a parabola, does with the slope `steep`:
-            # one quotient for both, which exclude each other
+            # it leaves where the force falls to 0
             falls = f1 < 0
             peaked = (f0 > 0) & falls
-            below, q = u - w0, s0 + u * inverse
-            curve = 0.5 * bend if falls else w1 - decay * u + below - q
-            square_of = q * q + 4 * below * curve
-            steep = math.sqrt(square_of if square_of > 0 else 0.0)
-            place = (f0 if falls else 2 * below) / (f0 - f1 if falls else q + steep + SMALL)
-            lead = w0 + (0.5 * place * f0 * inverse if peaked else 0.0)
+            leaves = f0 / (f0 - f1)
+            lead = w0 + (0.5 * leaves * f0 * inverse if peaked else 0.0)
             higher = lead - u
             top = lead if higher > 0 else u
             free = decay * top
             now = (w1 >= free) & (f1 > 0)
             whole, lifted = was & now, (higher > 0) & (not was)
             then = w1 if w1 > free else free
-            touches = place if place > 0 else 0.0
+            # it touches where the gap, a parabola, does, with the slope `steep`
+            below, q = u - w0, s0 + u * inverse
+            curve = 0.5 * bend if falls else w1 - decay * u + below - q
+            steep = math.sqrt(abs(q * q + 4 * below * curve))
+            touches = 2 * below / (q + steep + SMALL)
+            touches = touches if touches > 0 else 0.0
             touches = touches if touches < 1 else 1.0
             start = touches if now & (not was) else 0.0
-            stays = place if peaked else 1.0
+            stays = leaves if peaked else 1.0
             stays = stays if was & (f0 > 0) else 0.0
             stop = 1.0 if now else stays
             lost = 1 - decay
