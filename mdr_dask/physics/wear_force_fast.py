@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics.revolution import Profile, bisect
 from mdr_dask.physics.transforms import gauss
-from mdr_dask.physics.wear_force_evolution import virgin_areas
 from mdr_dask.physics.wear import THESIS_XI, Worn, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear_force_evolution import virgin_areas
 
 FloatArray = NDArray[np.float64]
 
