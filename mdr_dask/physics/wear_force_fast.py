@@ -76,7 +76,7 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     force = 2.0 * (c - area + slipping)
     volume = worn_volume(change, c, scar, breaks)
     depth = 1.0 + eta * rise
-    return Worn(profile, c, scar, edge, volume, force, 1e-4, change, change_slope, breaks, depth=depth, border=border)
+    return Worn(profile, c, scar, edge, volume, force, 1e-5, change, change_slope, breaks, depth=depth, border=border)
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray]:
