@@ -28,7 +28,7 @@ from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
-    from mdr_dask.physics.protocol_kernels import Line
+    from mdr_dask.physics.protocol_forces import Line
 
 SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
@@ -276,7 +276,7 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
         amplitude = _amplitudes(case)
         static, moduli, relaxation, viscosity = _solid(case)
         course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
-        unit = max([viscosity / static, *relaxation])
+        unit = time_unit(case)
         solid = foundation(np.array(moduli) / static, np.array(relaxation) / unit, viscosity / static / unit)
     except (DataError, ValueError) as problem:
         return {}, Status.FAILED, str(problem)
@@ -325,6 +325,12 @@ def _solid(case: VelocityJump) -> tuple[float, tuple[float, ...], tuple[float, .
         return case.shear_modulus, (), (), case.shear_modulus * case.relaxation_time
     solid = solid_of(case.material)
     return solid.static_modulus, tuple(solid.moduli), tuple(solid.times), solid.viscosity
+
+
+def time_unit(case: VelocityJump) -> float:
+    """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
+    static, _, relaxation, viscosity = _solid(case)
+    return max([viscosity / static, *relaxation])
 
 
 def _under(case: VelocityJump, height: FloatArray, slope: FloatArray) -> Line:
@@ -378,7 +384,7 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="velocity_jump",
-    version=1,
+    version=2,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

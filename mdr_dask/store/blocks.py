@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import bytes_of, guarded, names, read_json, write_bytes
+from mdr_dask.store.files import bytes_of, group_name, guarded, names, read_json, write_bytes
 
 
 @dataclass(frozen=True)
@@ -89,13 +89,13 @@ def attempts(url: str, series: str) -> dict[BlockIndex, int]:
 
 
 def _records(series: str) -> str:
-    return f"{series}/status/records/" if series else "status/records/"
+    return group_name(series, "status/records/")
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing."""
     found = np.full(shape, Status.MISSING, dtype=np.int8)
-    if read_json(url, f"{series}/zarr.json" if series else "zarr.json") is None:
+    if read_json(url, group_name(series, "zarr.json")) is None:
         return found
     with guarded(url, "reading status"):
         status = _open(url, series)["status"]
@@ -110,12 +110,12 @@ def values(url: str, series: str, output: str) -> NDArray[np.float64]:
 
 
 def _open(url: str, series: str) -> Any:
-    return zarr.open_group(bytes_of(url), path=series or None, mode="r", use_consolidated=True)
+    return zarr.open_group(bytes_of(url), path=group_name(series) or None, mode="r", use_consolidated=True)
 
 
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Hold the arrays of a group open for as long as its layout stands."""
     with guarded(url, "opening it"):
-        group = zarr.open_group(bytes_of(url), path=series or None, mode="r+", use_consolidated=True)
+        group = zarr.open_group(bytes_of(url), path=group_name(series) or None, mode="r+", use_consolidated=True)
         return dict(group.arrays())

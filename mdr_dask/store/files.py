@@ -17,6 +17,9 @@ from zarr.core.sync import sync
 
 from mdr_dask.errors import MdrDaskError, StoreBusyError, StoreError
 
+#: How the study of a campaign without series is called where series stand beside it.
+ROOT = "-"
+
 #: Raised when the layout changes so that older code cannot read it.
 LAYOUT = 1
 
@@ -141,12 +144,17 @@ def attributes(url: str) -> dict[str, Any]:
 
 
 def series_names(url: str) -> list[str]:
-    """Return the names of the groups of a study, ``""`` for one without series."""
-    if "axes" in attributes(url):
-        return [""]
+    """Return the names of the groups of a study, ``""`` for one without series and `ROOT` if series stand beside it."""
+    root = "axes" in attributes(url)
     metadata = read_json(url, "zarr.json") or {}
     members = metadata["consolidated_metadata"]["metadata"]
-    return [name for name, member in members.items() if member["node_type"] == "group"]
+    names = [name for name, member in members.items() if member["node_type"] == "group"]
+    return ([ROOT] if names else [""]) * root + names
+
+
+def group_name(series: str, member: str = "") -> str:
+    """Return the path of a member of a series' group, or of the group itself; arrays without series are at the root."""
+    return "/".join(part for part in ("" if series == ROOT else series, member) if part)
 
 
 @contextmanager

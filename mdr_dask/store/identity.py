@@ -16,7 +16,7 @@ from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import DataFile
-from mdr_dask.store.files import attributes, read_json, series_names
+from mdr_dask.store.files import ROOT, attributes, group_name, read_json, series_names
 from mdr_dask.store.layout import plain_values
 
 
@@ -45,6 +45,9 @@ class Stored:
 def reconcile(url: str, campaign: Campaign) -> Stored:
     """Compare a campaign with the store it wants to go on with.
 
+    A study made without series stays at the root, and series are put beside it; the one that is that study goes on
+    there.
+
     Parameters
     ----------
     url : str
@@ -57,6 +60,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     StoreError
         If the store was made from another campaign; every difference is named, and nothing was touched.
     """
+    campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
     held = {name: found for name, found in groups.items() if found is not None}
     differences = _study_differences(url, campaign)
@@ -81,7 +85,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
-    metadata = read_json(url, f"{name}/zarr.json" if name else "zarr.json")
+    metadata = read_json(url, group_name(name, "zarr.json"))
     if metadata is None or "axes" not in metadata["attributes"]:
         return None
     shape = metadata["consolidated_metadata"]["metadata"]["status"]["shape"]
@@ -98,9 +102,29 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
     }
     found = [_difference(key.replace("_", " "), root[key], value) for key, value in now.items() if root[key] != value]
     names, names_now = series_names(url), [series.name for series in campaign.series]
-    if ("" in names) != ("" in names_now):
-        found.append(_difference("series", *(" ".join(known) or "none" for known in (names, names_now))))
+    if "" in names_now and not {"", ROOT} & set(names):
+        found.append(f"series: {' '.join(names)} in the store, none in the campaign: name this one as well")
+    arrays = _arrays_at_root(url)
+    found += [f"series {name}: an array of the store has that name" for name in names_now if name in arrays]
     return found
+
+
+def _arrays_at_root(url: str) -> set[str]:
+    members = (read_json(url, "zarr.json") or {})["consolidated_metadata"]["metadata"]
+    return {name for name, member in members.items() if member["node_type"] == "array"}
+
+
+def _with_root(url: str, campaign: Campaign) -> Campaign:
+    """Return the campaign with the series that is the study at the root, if one is, without a name."""
+    root = _group_attributes(url, "")
+    if root is None or any(not series.name for series in campaign.series):
+        return campaign
+    for i, series in enumerate(campaign.series):
+        known = _group_attributes(url, series.name) is not None
+        if not known and not _series_differences(series, root, campaign.outputs):
+            moved = (*campaign.series[:i], replace(series, name=""), *campaign.series[i + 1 :])
+            return replace(campaign, series=moved)
+    return campaign
 
 
 def _difference(what: str, stored: Any, now: Any) -> str:

@@ -20,9 +20,11 @@ from mdr_dask import __version__, models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import DataFile, Status, unit_of
 from mdr_dask.plan import Template
-from mdr_dask.store.files import LAYOUT, clear, only_claimed, read_json, write_bytes
+from mdr_dask.store.files import LAYOUT, clear, group_name, only_claimed, read_json, write_bytes
 
 _COORDINATE_CHUNK = 4096
+#: What `_series_attributes` writes; at the root it outlasts campaigns of which that study is no part.
+_OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
@@ -53,10 +55,11 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
         clear(url)
     members: dict[str, Any] = held["consolidated_metadata"]["metadata"] if held else {}
     study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
+    root = {name: held["attributes"][name] for name in _OF_SERIES if name in held["attributes"]} if held else {}
     groups: dict[str, bytes] = {}
     for template in layout:
         name = template.series.name
-        path = f"{name}/" if name else ""
+        path = group_name(name, "zarr.json").removesuffix("zarr.json")
         files = _arrays_in_memory(template)
         for file, content in files.items():
             write_bytes(url, f"{path}{file}", content)
@@ -67,19 +70,19 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
             groups[f"{path}zarr.json"] = _group_document(arrays, own)
             members[name] = {"zarr_format": 3, "node_type": "group", "attributes": own}
         else:
-            study = own
+            root = _series_attributes(template)
     for path, content in groups.items():
         write_bytes(url, path, content)
-    write_bytes(url, "zarr.json", _group_document(members, study))
+    write_bytes(url, "zarr.json", _group_document(members, study | root))
 
 
 def _is_laid_out(url: str, template: Template) -> bool:
-    held = read_json(url, f"{template.series.name}/zarr.json" if template.series.name else "zarr.json")
+    held = read_json(url, group_name(template.series.name, "zarr.json"))
     root = read_json(url, "zarr.json")
     if held is None or root is None or "axes" not in held["attributes"]:
         return False
     wanted = json.loads(json.dumps(_series_attributes(template)))
-    status = f"{template.series.name}/status" if template.series.name else "status"
+    status = group_name(template.series.name, "status")
     shown = root["consolidated_metadata"]["metadata"].get(status, {"shape": None})
     return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
@@ -156,6 +159,9 @@ def _coordinates(template: Template) -> dict[str, _Coordinate]:
     for name, (value, unit, meaning) in _numbers(template.series.parameters, "").items():
         if name not in found and name not in template.sizes:
             found[name] = ((), np.array(value), _attrs(unit, meaning))
+    for name, unit in models.load(template.campaign.model).units(template.series.parameters).items():
+        if name in found:
+            found[name][2]["units"] = unit
     return found
 
 
@@ -214,6 +220,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
         ],
         "outputs": [output.name for output in template.outputs],
         "blocks": dict(template.chunks),
+        **({"notes": list(template.notes)} if template.notes else {}),
     }
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from mdr_dask.store.files import bytes_of, series_names
+from mdr_dask.store.files import bytes_of, group_name, series_names
 
 #: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
 LAZY_BYTES = 2**30
@@ -26,7 +26,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by series name (``""`` for a study without series), numeric axes in ascending order. Arrays are
+        Every group by series name (``""`` for a study without series, ``"-"`` if series were added to it), numeric axes in
+        ascending order. Arrays are
         loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays, reduced chunk by chunk.
 
     Raises
@@ -38,7 +39,7 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
-    opened = partial(xr.open_zarr, bytes_of(url), group=series or None, consolidated=True)
+    opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
