@@ -13,6 +13,7 @@ import numpy as np
 
 from mdr_dask.physics import ehl_grid, line_contact
 from mdr_dask.physics.deformation import influence_matrix
+from mdr_dask.physics.ehl_levels import expected_film
 from mdr_dask.physics.ehl_newton import CONVERGED, newton
 
 E_STAR = 115.385e9
@@ -44,7 +45,7 @@ def finest_grid(case, accuracy):
 
 def uniform(case, count):
     """Equal spacing from the first guess of the pressure: what the literature's Newton solvers do."""
-    guess = 1.5 * line_contact.expected_film(case.M, case.L)
+    guess = 1.5 * expected_film(case.M, case.L)
     start, end = max(ehl_grid.inlet_position(guess), -20 * np.sqrt(2 * guess) - 1), 1.5
     nodes = np.linspace(start, end, count)
     weights = np.full(count, nodes[1] - nodes[0])

@@ -22,7 +22,7 @@ from mdr_dask import store
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Status
-from mdr_dask.plan import Template, templates
+from mdr_dask.plan import BlockIndex, Template, templates
 from mdr_dask.replication import needs_more, rounds
 from mdr_dask.store import Place
 from mdr_dask.task import Outcome, Work, run_block, versions, write_off
@@ -71,6 +71,8 @@ class Progress:
         All results of the campaign so far, those found in the store, and those of this run.
     blocks, solves : int
         Blocks run and solutions really computed in this run.
+    estimated, finished : float
+        Seconds of work by the model's estimate: that of all rounds so far, and that of the blocks run.
     compute_seconds, write_seconds, wall_seconds : float
         Time in models and in writing, summed over threads, and time since the start.
     """
@@ -82,6 +84,8 @@ class Progress:
     not_needed: int = 0
     blocks: int = 0
     solves: int = 0
+    estimated: float = 0.0
+    finished: float = 0.0
     compute_seconds: float = 0.0
     write_seconds: float = 0.0
     wall_seconds: float = 0.0
@@ -90,6 +94,13 @@ class Progress:
     def to_do(self) -> int:
         """Results still to come in this round."""
         return self.total - self.kept - self.done - self.failed - self.not_needed
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Time until the end of this round at the pace so far, each block weighted by its estimate; None before any."""
+        if not self.finished > 0:
+            return None
+        return self.wall_seconds * max(self.estimated / self.finished - 1, 0.0)
 
 
 def run(
@@ -147,7 +158,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
     layout, asked = _plan(campaign, url)
     first = (0, next(rounds(campaign.replication)))
     found = [_cells(url, t, mask, mask, first, retry_failed=False) for t, mask in zip(layout, asked, strict=True)]
-    return _begin_round(Progress(), found)
+    return _begin_round(Progress(), layout, found)
 
 
 def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDArray[np.bool_]]]:
@@ -195,7 +206,7 @@ def _run_rounds(
             _cells(url, template, asked_here, needed_here, (before, count), retry_failed)
             for template, asked_here, needed_here in zip(layout, asked, needed, strict=True)
         ]
-        progress = _begin_round(progress, found)
+        progress = _begin_round(progress, layout, found)
         report(progress)
         execute(_work(url, layout, found), account)
         before = count
@@ -242,10 +253,24 @@ def _cells(
     return _Cells(wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
 
 
-def _begin_round(progress: Progress, found: list[_Cells]) -> Progress:
+def _begin_round(progress: Progress, layout: tuple[Template, ...], found: list[_Cells]) -> Progress:
     kept = sum(cells.kept for cells in found)
     new = sum(int(np.count_nonzero(cells.wanted) + np.count_nonzero(cells.spared)) for cells in found)
-    return replace(progress, total=progress.total + kept + new, kept=progress.kept + kept)
+    work = sum(
+        _estimate(template, index, cells)
+        for template, cells in zip(layout, found, strict=True)
+        for index in template.block_indices()
+    )
+    return replace(
+        progress, total=progress.total + kept + new, kept=progress.kept + kept, estimated=progress.estimated + work
+    )
+
+
+def _estimate(template: Template, index: BlockIndex, cells: _Cells) -> float:
+    """Return the seconds that a block should take, in proportion to what is wanted of it."""
+    wanted = cells.wanted[template.region(index)]
+    part = float(np.mean(wanted))
+    return part * template.seconds(index) if part else 0.0
 
 
 def _work(url: str, layout: tuple[Template, ...], found: list[_Cells]) -> Iterator[Work]:
@@ -265,6 +290,7 @@ def _work(url: str, layout: tuple[Template, ...], found: list[_Cells]) -> Iterat
                     wanted=wanted,
                     spared=spared,
                     attempt=attempts.get(index, 0) + 1,
+                    estimate=_estimate(template, index, cells),
                 )
 
 
@@ -276,6 +302,7 @@ def _add(progress: Progress, outcome: Outcome, wall_seconds: float) -> Progress:
         not_needed=progress.not_needed + outcome.counts[Status.NOT_NEEDED],
         blocks=progress.blocks + 1,
         solves=progress.solves + outcome.solves,
+        finished=progress.finished + outcome.estimate,
         compute_seconds=progress.compute_seconds + outcome.compute_seconds,
         write_seconds=progress.write_seconds + outcome.write_seconds,
         wall_seconds=wall_seconds,

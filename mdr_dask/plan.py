@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import CampaignError
-from mdr_dask.models.base import Block, Coordinate, Model, Output
+from mdr_dask.models.base import Block, Coordinate, Model, Output, replaced
 
 #: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
 BLOCK_SECONDS = 1.0
@@ -23,8 +23,14 @@ BLOCK_SECONDS = 1.0
 FEW_BLOCKS = 16
 #: ... but never into blocks of less work than this.
 LEAST_SECONDS = 0.1
+#: Blocks whose cases share work are cut freely when they are longer than this,
+SHARED_SECONDS = 30.0
+#: and below it where halving them makes the work of a study this much larger at most.
+REPEATED_WORK = 1.15
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
+#: Values of an axis that are asked for notes.
+NOTED = 64
 #: More cases than this are a mistake in the file, not a study.
 MOST_CASES = 10**9
 
@@ -82,6 +88,13 @@ class Template:
         """Shape that an output has beyond case and realisation."""
         return tuple(self.extra[dim].values.size for dim in output.dims)
 
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the model says of the parameters, each sentence once, every axis by itself."""
+        notes, base = models.load(self.campaign.model).notes, self.series.parameters
+        sets = [replaced(base, axis.path, value) for axis in self.series.axes for value in axis.values[:NOTED]]
+        return tuple(dict.fromkeys(note for parameters in (base, *sets) for note in notes(parameters)))
+
     @property
     def bytes(self) -> int:
         """Size of all arrays, uncompressed."""
@@ -105,6 +118,24 @@ class Template:
     def block(self, index: BlockIndex) -> Block[Any]:
         """Return the work of a block: its cases in C order of their dimensions."""
         return self._block(dict(zip(self.dims, self.region(index), strict=True)))
+
+    def seconds(self, index: BlockIndex) -> float:
+        """Return the model's estimate of a block; those of all realisations but the last few are the same."""
+        *cases, last = index
+        rest = self.sizes["realisation"] - last * self.chunks["realisation"]
+        part = min(rest / self.chunks["realisation"], 1.0)
+        return part * self._first_seconds((*cases, 0))
+
+    def _first_seconds(self, index: BlockIndex) -> float:
+        """Estimate a block of the first realisations, once."""
+        known = self._estimates
+        if index not in known:
+            known[index] = models.load(self.campaign.model).seconds(self.block(index))
+        return known[index]
+
+    @cached_property
+    def _estimates(self) -> dict[BlockIndex, float]:
+        return {}
 
     def _block(self, region: Mapping[str, slice]) -> Block[Any]:
         case_dims = self.dims[:-1]
@@ -149,15 +180,22 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a campaign will cost, as ``run --dry-run`` prints it."""
+    """What a campaign will cost, as ``run --dry-run`` prints it: its first round, all others apart."""
 
     cases: int
     realisations: int
+    at_most: int
     results: int
     solves: int
     blocks: int
     bytes: int
     seconds: float
+    notes: tuple[str, ...]
+
+    @property
+    def rounds(self) -> float:
+        """Work of every round there may be, in units of the first."""
+        return self.at_most / self.realisations
 
 
 def templates(
@@ -232,13 +270,13 @@ def available_memory() -> float:
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     """Fill a block with work: shared axes whole, then realisations, then the other axes."""
-    whole = {axis.dim for axis in template.series.axes if _is_whole(axis, model.whole)}
+    whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
     goal = _block_seconds(template, model, chunks)
-    for dim in sorted(whole, key=lambda dim: -template.sizes[dim]):
+    for dim in reversed(whole):
         while chunks[dim] > 1 and (
-            math.prod(chunks.values()) > limit or _mean_seconds(template, model, chunks) > 4 * goal
+            math.prod(chunks.values()) > limit or _is_cut(template, model, chunks, dim, 4 * goal)
         ):
             chunks[dim] = math.ceil(chunks[dim] / 2)
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
@@ -250,14 +288,33 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     }
 
 
+def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
+    """Return the dimensions that cases share work along, in the order in which the model names their parameters."""
+    dims = [axis.dim for path in model.whole for axis in template.series.axes if _is_whole(axis, path)]
+    return list(dict.fromkeys(dims))
+
+
+def _is_cut(template: Template, model: Model[Any], chunks: Mapping[str, int], dim: str, most: float) -> bool:
+    """Return whether blocks of more than `most` seconds are halved along a dimension.
+
+    Not where the halves would repeat much of each other's work, unless a block lasts very long.
+    """
+    now = _mean_seconds(template, model, chunks)
+    if now <= most or now > SHARED_SECONDS:
+        return now > most
+    half = math.ceil(chunks[dim] / 2)
+    growth = _mean_seconds(template, model, {**chunks, dim: half}) / now * chunks[dim] / half
+    return growth < REPEATED_WORK
+
+
 def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
     parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
     total = parts * _mean_seconds(template, model, chunks)
     return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
 
 
-def _is_whole(axis: Axis, whole: tuple[str, ...]) -> bool:
-    return any(axis.path == path or axis.path.startswith(path + ".") for path in whole)
+def _is_whole(axis: Axis, path: str) -> bool:
+    return axis.path == path or axis.path.startswith(path + ".")
 
 
 def _part(template: Template, dim: str, most: int) -> int:
@@ -294,11 +351,13 @@ def estimate(campaign: Campaign) -> Estimate:
     return Estimate(
         cases=sum(part.cases for part in parts),
         realisations=realisations,
+        at_most=campaign.replication.at_most,
         results=sum(part.results for part in parts),
         solves=sum(part.solves for part in parts),
         blocks=sum(part.blocks for part in parts),
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
     )
 
 
@@ -307,16 +366,18 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
     seconds, solves = 0.0, 0
     for index in itertools.product(*(range(count) for count in template.grid[:-1])):
         block = template.block((*index, 0))
-        seconds += model.seconds(block)
+        seconds += template.seconds((*index, 0))
         alone = replace(block, realisations=block.realisations[:1])
         solves += model.distinct(alone) if model.distinct else block.cases
     realisations = template.sizes["realisation"]
     return Estimate(
         cases=template.cases,
         realisations=realisations,
+        at_most=template.campaign.replication.at_most,
         results=template.cases * realisations,
         solves=solves * realisations,
         blocks=math.prod(template.grid),
         bytes=template.bytes,
         seconds=seconds * realisations / template.chunks["realisation"],
+        notes=template.notes,
     )

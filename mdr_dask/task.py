@@ -37,6 +37,8 @@ class Work:
         Results to compute, and those to write down as not needed.
     attempt : int
         How often the block has been run, this time included.
+    estimate : float
+        Seconds that it should take by the model's estimate.
     """
 
     place: Place
@@ -46,6 +48,7 @@ class Work:
     wanted: NDArray[np.bool_]
     spared: NDArray[np.bool_]
     attempt: int
+    estimate: float
 
     def halves(self) -> tuple[Work, ...]:
         """Return the same work as two tasks, to be run one after the other; none for a single result."""
@@ -54,7 +57,9 @@ class Work:
             return ()
         first = np.zeros_like(self.wanted)
         first.flat[cells[: cells.size // 2]] = True
-        return replace(self, wanted=first), replace(self, wanted=self.wanted & ~first)
+        half = self.estimate / 2
+        rest = self.wanted & ~first
+        return replace(self, wanted=first, estimate=half), replace(self, wanted=rest, estimate=half)
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ class Outcome:
 
     counts: tuple[int, ...]
     solves: int
+    estimate: float
     compute_seconds: float
     write_seconds: float
 
@@ -98,7 +104,8 @@ def run_block(work: Work) -> Outcome:
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
     _write(work, values if work.wanted.any() else {}, status, _record(work, result, status, middle - started))
-    return Outcome(_counts(work, status), result.solves, middle - started, time.perf_counter() - middle)
+    written = time.perf_counter() - middle
+    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written)
 
 
 def _other_version(work: Work) -> str:
@@ -244,4 +251,4 @@ def write_off(work: Work, message: str) -> Outcome:
     lost = zip(*np.nonzero(work.wanted.reshape(work.block.cases, -1)), strict=True)
     result = Result({}, status, {(int(case), int(number)): message for case, number in lost})
     _write(work, {}, status, _record(work, result, status, 0.0))
-    return Outcome(_counts(work, status), 0, 0.0, 0.0)
+    return Outcome(_counts(work, status), 0, work.estimate, 0.0, 0.0)

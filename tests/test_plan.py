@@ -20,10 +20,11 @@ SLOW_CASE = 0.05
 def costs(toy, monkeypatch):
     """Give every result of the toy model a cost, and whole axes if asked."""
 
-    def set_costs(seconds: float, **changes: object) -> None:
+    def set_costs(seconds: float, /, **changes: object) -> None:
         import sys
 
-        model = replace(toy.MODEL, seconds=lambda block: seconds * block.cases * len(block.realisations), **changes)
+        each = {"seconds": lambda block: seconds * block.cases * len(block.realisations)}
+        model = replace(toy.MODEL, **(each | changes))
         monkeypatch.setattr(sys.modules["mdr_dask.models.toy"], "MODEL", model)
 
     return set_costs
@@ -152,3 +153,22 @@ def test_campaigns_too_large_to_run_are_refused_with_their_message(path, monkeyp
     with pytest.raises(CampaignError, match=r"expected at most") as caught:
         plan.estimate(load(path))
     assert str(caught.value).replace(str(path), path.name) == path.with_suffix(".txt").read_text().strip()
+
+
+def test_shared_axes_are_cut_where_it_repeats_no_work_and_the_last_named_first(toy, costs):
+    """A solution for each slope and position: cutting an axis repeats nothing; one for each slope: along positions."""
+    costs(1.0, whole=("slope", "position"))
+    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
+    assert template.chunks["position"] == 1
+    costs(1.0, whole=("position", "slope"))
+    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
+    assert template.chunks["slope"] == 1
+    costs(1.0, whole=("slope", "position"), seconds=lambda block: len(set(block.column("slope").tolist())))
+    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
+    assert template.chunks["position"] == 8
+
+
+def test_blocks_that_last_very_long_are_cut_even_where_it_repeats_work(toy, costs):
+    costs(1.0, whole=("position",), seconds=lambda block: 2 * plan.SHARED_SECONDS)
+    (template,) = plan.templates(study(toy, (8, 6), 1), 1)
+    assert template.chunks["position"] == 1

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -41,16 +42,27 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set that a mapping stands for, told by its fixed keys such as ``shape: cone``."""
+    """Return the parameter set that a mapping stands for, told by its fixed keys such as ``shape: cone``.
+
+    Sets without such keys are told by the keys they know, well spelt or nearly so.
+    """
     if not isinstance(value, dict):
         return None
-    candidates = structures(info)
-    fitting = (
+    fitting = [
         kind
-        for kind in candidates
+        for kind in structures(info)
         if all(value.get(key, kind.model_fields[key].default) == only for key, only in fixed(kind).items())
+    ]
+    return max(fitting, key=lambda kind: _likeness(kind, value), default=None)
+
+
+def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
+    """Return how many keys of a mapping a parameter set knows, and how many look like one of its own."""
+    keys = [str(key) for key in value]
+    return (
+        sum(key in kind.model_fields for key in keys),
+        sum(bool(get_close_matches(key, kind.model_fields)) for key in keys),
     )
-    return next(fitting, None)
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:

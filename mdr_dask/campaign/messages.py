@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from mdr_dask.campaign import fields
@@ -80,9 +81,15 @@ def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: An
         found = fields.owner(kind, path, data)
         info = found[0].model_fields[found[1]] if found else None
         claimed = fields.structure(info, value) if info else None
-        if info and claimed and part in {one.__name__ for one in fields.structures(info)} - {claimed.__name__}:
+        if info and claimed and _names_another(str(part), info, claimed):
             return True
     return False
+
+
+def _names_another(part: str, info: FieldInfo, claimed: type[BaseModel]) -> bool:
+    """Return whether a part of an error's place is a branch of a union that a mapping does not claim to be."""
+    others = {one.__name__ for one in fields.structures(info)} - {claimed.__name__}
+    return part in others or part.startswith("literal[")
 
 
 def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:

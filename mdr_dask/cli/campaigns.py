@@ -69,15 +69,23 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     from mdr_dask.errors import CampaignError
     from mdr_dask.plan import estimate
 
-    rows, problems = [], []
+    rows, notes, problems = [], [], []
     for path in campaigns:
         try:
             campaign = load(path)
-            rows.append({"campaign": str(path), "model": campaign.model, **_costs(estimate(campaign))})
+            costs = estimate(campaign)
         except CampaignError as error:
             problems += list(error.args)
+            continue
+        rows.append({"campaign": str(path), "model": campaign.model, **_costs(costs)})
+        notes += [f"{path}: {note}" for note in costs.notes]
+        if form == "json":
+            rows[-1]["notes"] = list(costs.notes)
     if rows:
         print_rows(rows, {"bytes": "B", "seconds": "s"}, form or "table")
+    if form != "json":
+        for note in notes:
+            click.echo(note)
     if problems:
         raise CampaignError(*problems)
 
@@ -86,6 +94,7 @@ def _costs(estimate: Estimate) -> dict[str, Any]:
     return {
         "cases": estimate.cases,
         "realisations": estimate.realisations,
+        "at_most": estimate.at_most,
         "results": estimate.results,
         "solves": estimate.solves,
         "blocks": estimate.blocks,
@@ -143,15 +152,32 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
         progress = outlook(study, url)
         kept, to_do = progress.kept, progress.to_do
     if form == "json":
-        print_json({"campaign": study.name, "store": url, **_costs(costs), "kept": kept, "to_do": to_do})
+        notes = list(costs.notes)
+        print_json(
+            {"campaign": study.name, "store": url, **_costs(costs), "kept": kept, "to_do": to_do, "notes": notes}
+        )
         return
+    more = costs.rounds
     click.echo(f"{study.name} -> {url}")
-    click.echo(f"{costs.cases} cases x {costs.realisations} realisations = {costs.results} results")
-    click.echo(f"{costs.solves} solves remain after sharing, in {costs.blocks} blocks")
-    click.echo(f"{costs.bytes / 2**20:.3g} MiB uncompressed, about {seconds(costs.seconds)} on one core")
+    click.echo(
+        f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
+    )
+    click.echo(f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks")
+    size, most = (f"{count * costs.bytes / 2**20:.3g}" for count in (1, more))
+    times = " to ".join(dict.fromkeys((seconds(costs.seconds), seconds(costs.seconds * more))))
+    click.echo(f"{' to '.join(dict.fromkeys((size, most)))} MiB uncompressed, about {times} on one core")
+    if more > 1:
+        click.echo("from the first round to the last one, if no case meets its tolerance before")
+    for note in costs.notes:
+        click.echo(note)
     if kept:
         left = seconds(costs.seconds * to_do / costs.results)
         click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
+
+
+def _range(first: int, more: float) -> str:
+    """Return a count of the first round, and what it comes to at most."""
+    return f"{first}" if more == 1 else f"{first} to {round(first * more)}"
 
 
 def _resources(options: dict[str, Any]) -> Resources:

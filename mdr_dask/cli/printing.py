@@ -91,6 +91,22 @@ def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict
     return joined, {name: units[name] for name in kept} | {name: units[f"{name}_mean"] for name in outputs}
 
 
+def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
+    """Join each constant and the ends of its interval into one column for a reader: ``0.123 (0.120, 0.126)``."""
+    known = {name for name in units if f"{name}_low" in units and f"{name}_high" in units}
+    ends = {f"{name}_{end}" for name in known for end in ("low", "high")}
+    kept = [name for name in units if name not in ends]
+    joined = [{name: _with_interval(row, name) if name in known else row[name] for name in kept} for row in rows]
+    return joined, {name: units[name] for name in kept}
+
+
+def _with_interval(row: Row, name: str) -> str:
+    value, low, high = row[name], row[f"{name}_low"], row[f"{name}_high"]
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return _short(value)
+    return f"{value:.4g} ({low:.4g}, {high:.4g})"
+
+
 def _with_error(mean: float, error: float) -> str:
     return f"{mean:.4g} +- {error:.1g}" if math.isfinite(error) else _short(mean)
 

@@ -65,7 +65,8 @@ def describe(progress: Progress) -> str:
     fresh = progress.done + progress.failed
     if fresh and progress.wall_seconds > 0:
         rate = fresh / progress.wall_seconds
-        parts += [f"{rate:.3g} a second", f"{seconds(progress.to_do / rate)} left"]
+        left = progress.seconds_left
+        parts += [f"{rate:.3g} a second", f"{seconds(progress.to_do / rate if left is None else left)} left"]
     return ", ".join(parts)
 
 

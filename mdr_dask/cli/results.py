@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli import selection
-from mdr_dask.cli.printing import print_json, print_rows, table, with_errors
+from mdr_dask.cli.printing import print_json, print_rows, table, with_errors, with_intervals
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -207,6 +207,8 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
             if (len(names) > 1 or len(found) > 1) and not form:
                 click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
             rows, units = table(result)
+            if not form:
+                rows, units = with_intervals(rows, units)
             print_rows(
                 [{"series": group, **row} for row in rows] if group and form else rows, units, form or "table", limit
             )

@@ -1,154 +1,251 @@
-"""One exponential, and what to fit where one is not enough, to a trace that relaxes to zero."""
+"""One exponential, and what to fit where one is not enough, to the mean of traces that relax to zero."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 WINDOW = 8.0  # over the expected rate
-ENOUGH = 0.02  # share of the squared trace that one exponential may leave
-GRID = 241
-
-Interval = Callable[[float, np.ndarray], tuple[float, float]]
+FLOOR = 0.01  # of the largest relaxing part: what the grid adds to the standard error of a moment (docs/kinetics.md)
+ENOUGH = 2e-3  # share of the squared trace below which what is left may be the grid's: FLOOR at every moment
+DOUBTFUL = 0.05  # probability below which one exponential is rejected
+GRID = 121
+ROUNDS = 6
+STEPS, STEPS_ON = 25, 8  # from a guess, and from the fit to the trace itself to that of a resample
+SHAPED = 200  # resamples to which more than one exponential is fitted
 
 RATE_FIELDS = {
-    "rate": ("1", "rate b of one exponential in t' = (t - t_0) / tau, eq. 4.5"),
-    "rate_low": ("1", "lower end of the 95 % interval of b"),
-    "rate_high": ("1", "upper end of the 95 % interval of b"),
+    "rate": ("1", "rate b of one exponential in t' = (t - t_0) / tau, eq. 4.5; weights 1 / variance of the mean"),
+    "rate_unweighted": ("1", "the same with every stretch of time counting alike"),
     "amplitude": ("1", "amplitude mu* of one exponential"),
     "integral_rate": ("1", "relaxing part at t_0+ over its integral in t': a rate without a model"),
-    "integral_rate_low": ("1", "lower end of its 95 % interval"),
-    "integral_rate_high": ("1", "upper end of its 95 % interval"),
-    "window": ("1", "last t' of the fit"),
-    "unexplained": ("1", "share of the squared relaxing part that one exponential leaves"),
-    "misfit": ("1", "rms deviation of one exponential over the standard error of the trace"),
+}
+AMPLITUDE_FIELDS = {
+    "amplitude_unweighted": ("1", "amplitude mu* with every stretch of time counting alike"),
+    "two_amplitude": ("1", "amplitude of two exponentials together"),
+}
+SHAPE_FIELDS = {
     "stretched_rate": ("1", "rate b of exp(-(b t')^beta), where one exponential is not enough"),
     "stretched_exponent": ("1", "its exponent beta"),
-    "stretched_unexplained": ("1", "share that it leaves"),
     "fast_rate": ("1", "greater rate of two exponentials, where one is not enough"),
     "slow_rate": ("1", "smaller rate of two exponentials"),
-    "fast_share": ("1", "share of the amplitude that relaxes at the greater rate"),
+    "fast_share": ("1", "share of the amplitude that relaxes at the greater rate; negative where it grows first"),
+}
+GOODNESS_FIELDS = {
+    "window": ("1", "last t' of the fit"),
+    "unexplained": ("1", "weighted share of the squared relaxing part that one exponential leaves"),
+    "probability": ("1", "of a residual as large as this if one exponential were true, by bootstrap"),
+    "stretched_unexplained": ("1", "share that the stretched exponential leaves"),
     "two_unexplained": ("1", "share that two exponentials leave"),
 }
 
 
-def widths(time: np.ndarray) -> np.ndarray:
+def widths(time: FloatArray) -> FloatArray:
     """Return the weights of the trapezoidal rule, so that every stretch of time counts alike."""
     step = np.diff(time)
-    weights: np.ndarray = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
+    weights: FloatArray = 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
     return weights
 
 
-def exponential(time: np.ndarray, trace: np.ndarray, weights: np.ndarray) -> tuple[float, float, float]:
-    """Fit one exponential by weighted least squares, the rate on a grid and a parabola, the amplitude eliminated.
+def point_weights(time: FloatArray, trace: FloatArray, error: FloatArray) -> FloatArray:
+    """Return the weights of the points of a mean trace: its variance inverted, for every stretch of time alike.
+
+    The points of a log-spaced grid crowd at the start, where they all say the same: each stands for its stretch.
+    """
+    variance = error**2 + (FLOOR * np.abs(trace).max()) ** 2
+    weights: FloatArray = widths(time) / variance
+    weights /= weights.sum()
+    return weights
+
+
+def exponential(time: FloatArray, traces: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fit one exponential to each of many traces by weighted least squares, the amplitude eliminated.
+
+    Parameters
+    ----------
+    time : array, shape (m,)
+        From zero, or soon after, on.
+    traces : array, shape (n, m)
+        What relaxes to zero.
+    weights : array, shape (m,)
+        Of the squared residuals.
 
     Returns
     -------
-    rate, amplitude, unexplained : float
+    rate, amplitude, unexplained : array, shape (n,)
         The last one is the weighted share of the squared trace that is left.
     """
     logs = np.linspace(np.log(0.02 / time[-1]), np.log(2 / time[time > 0][0]), GRID)
-    for _ in range(2):
-        shape = np.exp(-np.exp(logs)[:, None] * time)
-        overlap = shape @ (weights * trace)
-        gain = overlap**2 / (shape**2 @ weights)
-        best = int(np.argmax(gain))
-        inner = min(max(best, 1), logs.size - 2)
-        step = logs[1] - logs[0]
-        logs = np.linspace(logs[inner] - step, logs[inner] + step, 21)
-    bend = gain[inner - 1] - 2 * gain[inner] + gain[inner + 1]
-    shift = 0.5 * (gain[inner - 1] - gain[inner + 1]) / bend if bend < 0 else 0.0
-    rate = float(np.exp(logs[10] + shift * step))
-    curve = np.exp(-rate * time)
-    amplitude = float((weights * trace) @ curve / (weights @ curve**2))
-    left = float(weights @ (trace - amplitude * curve) ** 2 / (weights @ trace**2))
-    return rate, amplitude, left
+    pulled = weights * traces
+
+    def gain(shape: FloatArray, overlap: FloatArray) -> FloatArray:
+        explained: FloatArray = overlap**2 / (shape**2 @ weights)
+        return explained
+
+    shape = np.exp(-np.exp(logs)[:, None] * time)
+    centre = logs[1:-1][np.argmax(gain(shape, pulled @ shape.T)[:, 1:-1], axis=1)]
+    step = logs[1] - logs[0]
+    for _ in range(ROUNDS):
+        near = np.exp(-np.exp(centre[:, None] + step * np.array([-1.0, 0.0, 1.0]))[..., None] * time)
+        left, middle, right = gain(near, np.einsum("nkm,nm->nk", near, pulled)).T
+        bend = left - 2 * middle + right
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shift = np.where(bend < 0, 0.5 * (left - right) / bend, np.sign(right - left))
+        centre = centre + step * np.clip(shift, -1, 1)
+        step *= 0.25
+    rate = np.exp(centre)
+    curve = np.exp(-rate[:, None] * time)
+    amplitude = np.sum(pulled * curve, axis=1) / (curve**2 @ weights)
+    return rate, amplitude, _unexplained(traces, amplitude[:, None] * curve, weights)
 
 
-def _refined(time: np.ndarray, trace: np.ndarray, weights: np.ndarray, rate: float) -> dict[str, float]:
-    """Fit a stretched exponential and two exponentials, from one exponential."""
-    from scipy.optimize import least_squares
+def _unexplained(traces: FloatArray, curves: FloatArray, weights: FloatArray) -> FloatArray:
+    left: FloatArray = (traces - curves) ** 2 @ weights / (traces**2 @ weights)
+    return left
 
-    root = np.sqrt(weights / (weights @ trace**2))
 
-    def amplitudes(curves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        design = curves * root
-        found: np.ndarray = np.linalg.lstsq(design.T, root * trace, rcond=None)[0]
-        return found, root * trace - found @ design
+def stretched(p: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A exp(-(b t)^beta) and its derivatives by p = (A, ln b, ln beta); shapes (n, m) and (n, m, 3)."""
+    amplitude, beta = p[:, :1], np.exp(p[:, 2:])
+    logarithm = p[:, 1:2] + np.log(np.maximum(time, 1e-300))
+    power = np.exp(np.minimum(beta * logarithm, 300.0))
+    curve = np.exp(-power)
+    sloped = -amplitude * curve * np.minimum(power, 700.0) * beta
+    return amplitude * curve, np.stack([curve, sloped, sloped * logarithm], axis=-1)
 
-    def stretched(p: np.ndarray) -> np.ndarray:
-        return amplitudes(np.exp(-((np.exp(p[0]) * time) ** np.exp(p[1])))[None])[1]
 
-    def curves_of(p: np.ndarray) -> np.ndarray:
-        rates: np.ndarray = np.exp(p[0] + np.array([[0.0], [1.0]]) * np.exp(p[1]))
-        curves: np.ndarray = np.exp(-rates * time)
-        return curves
+def double(p: FloatArray, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return A exp(-a t) + B exp(-b t) and its derivatives by p = (A, B, ln a, ln b)."""
+    rates = np.exp(p[:, 2:, None]) * time
+    curves = np.exp(-rates)
+    sloped = -p[:, :2, None] * rates * curves
+    total: FloatArray = np.sum(p[:, :2, None] * curves, axis=1)
+    return total, np.moveaxis(np.concatenate([curves, sloped], axis=1), 1, 2)
 
-    def double(p: np.ndarray) -> np.ndarray:
-        return amplitudes(curves_of(p))[1]
 
-    one = least_squares(stretched, [np.log(rate), 0.0], bounds=([-12, -3], [14, 1.5]))
-    two = least_squares(double, [np.log(rate) - 1, 0.5], bounds=([-12, -4], [14, 2.5]))
-    slow, fast = np.exp(two.x[0]), np.exp(two.x[0] + np.exp(two.x[1]))
-    parts = amplitudes(curves_of(two.x))[0]
-    return {
-        "stretched_rate": float(np.exp(one.x[0])),
-        "stretched_exponent": float(np.exp(one.x[1])),
-        "stretched_unexplained": float(2 * one.cost),
-        "fast_rate": float(fast),
-        "slow_rate": float(slow),
-        "fast_share": float(parts[1] / parts.sum()) if parts.sum() != 0 else np.nan,
-        "two_unexplained": float(2 * two.cost),
+def least_squares(
+    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, start: FloatArray, steps: int = STEPS
+) -> tuple[FloatArray, FloatArray]:
+    """Fit a law to each of many traces by Levenberg and Marquardt's steps, all traces at once.
+
+    Returns
+    -------
+    parameters, unexplained : array, shapes (n, k) and (n,)
+    """
+    p = start.copy()
+    curve, sloped = law(p, time)
+    cost, damping = (traces - curve) ** 2 @ weights, np.full(len(p), 1e-3)
+    for _ in range(steps):
+        pulled = np.swapaxes(sloped * weights[:, None], 1, 2)
+        normal, pull = pulled @ sloped, pulled @ (traces - curve)[..., None]
+        diagonal = np.einsum("nkk->nk", normal)
+        floor = 1e-12 * diagonal.max(axis=1, keepdims=True) + 1e-300
+        damped = normal + np.eye(p.shape[1]) * (damping[:, None] * diagonal + floor)[:, None, :]
+        trial = np.clip(p + np.clip(np.linalg.solve(damped, pull)[..., 0], -3, 3), -14, 14)
+        there, slopes_there = law(trial, time)
+        cost_there = (traces - there) ** 2 @ weights
+        better = cost_there < cost
+        p[better], curve[better], sloped[better], cost[better] = (
+            array[better] for array in (trial, there, slopes_there, cost_there)
+        )
+        damping = np.clip(np.where(better, damping / 5, damping * 5), 1e-9, 1e9)
+    return p, cost / (traces**2 @ weights)
+
+
+def _followed(
+    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray
+) -> tuple[FloatArray, float]:
+    """Fit the first trace from several starts, and the others from what was found."""
+    tried, left = least_squares(law, time, np.repeat(traces[:1], len(starts), axis=0), weights, starts)
+    best = int(np.argmin(left))
+    from_here = np.repeat(tried[best : best + 1], len(traces), axis=0)
+    found, _ = least_squares(law, time, traces, weights, from_here, STEPS_ON)
+    return found, float(left[best])
+
+
+def _shapes(
+    time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float
+) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    """Fit a stretched exponential and two exponentials: samples of their constants, and shares that they leave."""
+    scale = np.abs(traces[0]).max()
+    scaled = traces[: 1 + SHAPED] / scale
+    b = np.log(rate)
+    one, left_one = _followed(
+        stretched, time, scaled, weights, np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
+    )
+    starts = np.array([[0.5, 0.5, b - 0.7, b + 0.7], [0.8, 0.2, b - 0.2, b + 2], [1.2, -0.2, b + 0.2, b + 1.5]])
+    two, left_two = _followed(double, time, scaled, weights, starts)
+    two = np.where(two[:, 2:3] <= two[:, 3:], two, two[:, [1, 0, 3, 2]])
+    samples = {
+        "stretched_rate": np.exp(one[:, 1]),
+        "stretched_exponent": np.exp(one[:, 2]),
+        "fast_rate": np.exp(two[:, 3]),
+        "slow_rate": np.exp(two[:, 2]),
+        "fast_share": two[:, 1] / two[:, :2].sum(axis=1),
+        "two_amplitude": two[:, :2].sum(axis=1) * scale,
     }
+    return samples, {"stretched_unexplained": left_one, "two_unexplained": left_two}
+
+
+def _probability(traces: FloatArray, curves: FloatArray, weights: FloatArray) -> float:
+    """Return how often the scatter alone leaves as much as is left: residuals of the resamples about the residual."""
+    residual = traces - curves
+    by_scatter = (residual[1:] - residual[0]) ** 2 @ weights
+    return float(np.mean(by_scatter >= residual[0] ** 2 @ weights))
+
+
+def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> NDArray[np.bool_]:
+    """Return where what one exponential leaves may be chance, or the grid's."""
+    enough: NDArray[np.bool_] = (unexplained < ENOUGH) | (np.asarray(probability) >= DOUBTFUL)
+    return enough
 
 
 def relaxation_of(
-    time: np.ndarray, trace: np.ndarray, others: np.ndarray, error: np.ndarray, expected: float, interval: Interval
-) -> dict[str, float]:
-    """Fit the relaxation of a mean trace.
+    time: FloatArray, traces: FloatArray, error: FloatArray, expected: float, shaped: bool = False
+) -> tuple[dict[str, FloatArray], dict[str, float]]:
+    """Fit the relaxation of a mean trace and of its resamples.
 
     Parameters
     ----------
     time : array, shape (m,)
         (t - t_0) / tau from zero on.
-    trace : array, shape (m,)
-        Mean of mu - mu_2.
-    others : array, shape (groups, m)
-        The same without one group of realisations each.
+    traces : array, shape (n, m)
+        Mean of mu - mu_2 over the realisations, and the same over resamples of them.
     error : array, shape (m,)
-        Standard error of the trace.
+        Standard error of the mean.
     expected : float
         Rate of the law, which fixes the window of the fit, 8 / expected.
-    interval : callable
-        95 % interval from a value and the values without one group each.
+    shaped : bool
+        Whether to fit more than one exponential where one is not enough.
 
     Returns
     -------
-    dict
-        The entries of `RATE_FIELDS`.
+    samples : dict of array, shape (n,)
+        The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough.
+    goodness : dict of float
+        The entries of `GOODNESS_FIELDS` that there are.
     """
-    if not np.all(np.any(others[:, time <= time[min(8, time.size - 1)]] != 0, axis=1)):
-        return dict.fromkeys(RATE_FIELDS, np.nan)
-    inside = time <= max(WINDOW / expected, time[min(8, time.size - 1)])
-    t, y, weights = time[inside], trace[inside], widths(time[inside])
+    early = time[min(8, time.size - 1)]
+    inside = time <= max(WINDOW / expected, early)
+    t, y = time[inside], traces[:, inside]
+    weights = point_weights(t, y[0], error[inside])
     rate, amplitude, left = exponential(t, y, weights)
-    low, high = interval(rate, np.array([exponential(t, other[inside], weights)[0] for other in others]))
-    whole = widths(time)
-    integral = trace[0] / (whole @ trace)
-    integral_low, integral_high = interval(integral, np.array([other[0] / (whole @ other) for other in others]))
-    off = y - amplitude * np.exp(-rate * t)
-    sure = np.where(error[inside] > 0, error[inside], np.inf)  # at rest the trace has no scatter
-    row = dict.fromkeys(RATE_FIELDS, np.nan) | {
+    rate_alike, amplitude_alike, _ = exponential(t, y, widths(t))
+    samples = {
         "rate": rate,
-        "rate_low": low,
-        "rate_high": high,
+        "rate_unweighted": rate_alike,
         "amplitude": amplitude,
-        "integral_rate": float(integral),
-        "integral_rate_low": integral_low,
-        "integral_rate_high": integral_high,
-        "window": float(t[-1]),
-        "unexplained": left,
-        "misfit": float(np.sqrt(weights @ (off / sure) ** 2 / weights.sum())),
+        "amplitude_unweighted": amplitude_alike,
+        "integral_rate": traces[:, 0] / (traces @ widths(time)),
     }
-    return row | _refined(t, y, weights, rate) if left > ENOUGH else row
+    probability = _probability(y, amplitude[:, None] * np.exp(-rate[:, None] * t), weights)
+    goodness = {"window": float(t[-1]), "unexplained": float(left[0]), "probability": probability}
+    if not shaped or one_is_enough(left[0], probability):
+        return samples, goodness
+    shapes, shares = _shapes(t, y, weights, float(rate[0]))
+    return samples | shapes, goodness | shares

@@ -206,7 +206,7 @@ class Block(Generic[P]):
         case = self.parameters
         for path, column in self.columns.items():
             value = column[index]
-            case = _replace(case, path.split("."), value.item() if isinstance(value, np.generic) else value)
+            case = replaced(case, path, value.item() if isinstance(value, np.generic) else value)
         return case
 
     def part(self, index: int, realisation: int) -> Block[P]:
@@ -215,10 +215,12 @@ class Block(Generic[P]):
         return Block(self.parameters, columns, 1, (realisation,), self.seed, self.outputs, self.accuracy)
 
 
-def _replace(parameters: Any, path: list[str], value: Any) -> Any:
-    if len(path) > 1:
-        value = _replace(getattr(parameters, path[0]), path[1:], value)
-    return parameters.model_copy(update={path[0]: value})
+def replaced(parameters: Any, path: str, value: Any) -> Any:
+    """Return a parameter set with another value at a dotted path."""
+    name, _, rest = path.partition(".")
+    if rest:
+        value = replaced(getattr(parameters, name), rest, value)
+    return parameters.model_copy(update={name: value})
 
 
 @dataclass(frozen=True)
@@ -265,15 +267,18 @@ class Model(Generic[P]):
     seconds : callable, Block -> float
         Estimated time of `compute`; cheap, vectorised over the cases.
     whole : tuple of str
-        Parameters whose axes stay whole inside a block, because cases share work along them.
+        Parameters whose axes stay whole inside a block, because cases share work along them; those named last are cut
+        first where a block becomes too large.
     coordinates : callable, Parameters -> dict of str to Coordinate
         Coordinates of the dimensions that outputs have beyond case and realisation.
     distinct : callable, Block -> int, optional
         Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
     units : callable, Parameters -> dict of str to str
-        Units of outputs that differ from the declared ones, as in a campaign of dimensionless numbers.
+        Units of outputs and parameters that differ from the declared ones, as in a campaign of dimensionless numbers.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, beyond its outputs.
+    notes : callable, Parameters -> tuple of str
+        What a user should know of a parameter set before it is run, such as how well a fit to their data holds.
     """
 
     name: str
@@ -288,6 +293,7 @@ class Model(Generic[P]):
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}
+    notes: Callable[[P], tuple[str, ...]] = lambda _: ()
 
     def output(self, name: str) -> Output:
         """Return the declared output of that name; KeyError if there is none."""

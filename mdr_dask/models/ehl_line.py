@@ -43,6 +43,11 @@ class EhlLineParameters(Parameters):
     inlet: float | None = quantity(
         "1", "where the oil begins, over the half width (negative); fully flooded if not given", lt=0, default=None
     )
+    neighbours: bool = Field(
+        False,
+        description="whether a case borrows grids and fine solutions from the nearest point of a fixed lattice, "
+        "three a decade: for sweeps denser than that",
+    )
     slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u", ge=0, default=0.0)
     shear_law: Literal["newtonian", "eyring"] = Field("newtonian", description="shear stress over shear rate")
     eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", gt=0, default=5e6)
@@ -124,13 +129,13 @@ def _groups(block: Block[EhlLineParameters]) -> tuple[FloatArray, FloatArray, Fl
     return groups(lookup)
 
 
-def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
-    """Return the dimensionless case of every case; equal ones share a solution."""
+def _line_contacts(block: Block[EhlLineParameters]) -> list[tuple[LineContact, bool]]:
+    """Return the dimensionless case of every case, and whether it is solved beside the lattice; equal ones share."""
     from mdr_dask.physics.line_contact import line_contact
 
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
-    return [
+    cases = [
         line_contact(
             W, U, G, modulus, viscosity_law=law, viscosity=viscosity, compressible=bool(compressible), inlet=inlet
         )
@@ -138,6 +143,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
             *(group.tolist() for group in _groups(block)), columns, strict=True
         )
     ]
+    return list(zip(cases, block.column("neighbours").tolist(), strict=True))
 
 
 def _case_outputs(
@@ -181,6 +187,7 @@ def _positions(parameters: EhlLineParameters) -> FloatArray:
 
 def compute(block: Block[EhlLineParameters]) -> Result:
     """Solve every different case of a block once; realisations of a case are the same."""
+    from mdr_dask.physics.ehl_lattice import solve_beside_lattice
     from mdr_dask.physics.film import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, moes_parameters
     from mdr_dask.physics.line_contact import solve
 
@@ -199,11 +206,12 @@ def compute(block: Block[EhlLineParameters]) -> Result:
     }
     status = np.full(shape, Status.DONE, dtype=np.int8)
     messages: dict[tuple[int, int], str] = {}
-    solved: dict[LineContact, LineSolution] = {}
-    for index, case in enumerate(_line_contacts(block)):
-        if case not in solved:
-            solved[case] = solve(case, block.accuracy or ACCURACY)
-        solution = solved[case]
+    solved: dict[tuple[LineContact, bool], LineSolution] = {}
+    for index, (case, neighbours) in enumerate(_line_contacts(block)):
+        if (case, neighbours) not in solved:
+            solver = solve_beside_lattice if neighbours else solve
+            solved[case, neighbours] = solver(case, block.accuracy or ACCURACY)
+        solution = solved[case, neighbours]
         found: dict[str, FloatArray | float] = {name: float(column[index]) for name, column in given.items()}
         notes = [solution.reason] if solution.reason else []
         if solution.status == 0:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, FloatArray, Result, Status, canonical
-from mdr_dask.models.material import Kelvin, Material, solid_of
+from mdr_dask.models.material import Kelvin, Material, fit_error, solid_of
 from mdr_dask.models.profile_file import ProfileFile, line_of
 
 if TYPE_CHECKING:
@@ -65,7 +65,11 @@ class Case:
         return 1.0 if self.profile is not None else self.rms or self.length
 
     def numbers(self) -> Numbers:
-        """Return the case without units; raises as `solid_of` and `line_of` do."""
+        """Return the case without units; ValueError for a number that is none, others as `solid_of`, `line_of`."""
+        given = {"load": self.force, "velocity": self.velocity, "height": self.height, "length": self.period}
+        for name, value in given.items():
+            if not (np.isfinite(value) and value > 0):
+                raise ValueError(f"the {name} must be positive and finite, got {value!r}")
         solid, period, height = solid_of(self.material), self.period, self.height
         static, (coefficient, exponent) = solid.static_modulus, self.body
         pace = self.velocity / period
@@ -223,6 +227,7 @@ def compute(block: Block[Any], cases: list[Case], accuracy: float) -> Result:
             if key not in solved:
                 solved[key] = solve_numbers(numbers, partial(roughness.phases, block.seed, realisation), accuracy)
             found, status[j, r], sentence = solved[key]
+            found = {**found, "material_error": fit_error(case.material)} if found else found
             if sentence:
                 messages[j, r] = sentence
             for name in block.outputs:

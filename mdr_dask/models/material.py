@@ -13,7 +13,7 @@ from mdr_dask.models.base import FloatArray, NamedFile, Parameters, quantity
 from mdr_dask.models.tables import Table, parse_table
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.rheology import LinearSolid
+    from mdr_dask.physics.rheology import LinearSolid, SeriesFit
 
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
@@ -168,20 +168,53 @@ def _solid(material: Material) -> LinearSolid:
     if material.prony is not None:
         arms = material.prony
         return rheology.prony(arms.static_modulus, arms.moduli, arms.times, arms.viscosity)
-    if material.power_law is not None:
-        law = material.power_law
-        numbers = law.static_modulus, law.loss_modulus, law.frequency, law.exponent, law.lowest, law.highest
-        return rheology.power_law_series(*numbers).solid
-    assert material.dma_table is not None
-    return _fitted(material.dma_table)
+    kind = material.power_law or material.dma_table
+    assert kind is not None
+    return _fit_of(kind).solid
 
 
-def _fitted(table: ModulusTable) -> LinearSolid:
+@lru_cache(maxsize=256)
+def _fit_of(kind: PowerLaw | ModulusTable) -> SeriesFit:
     from mdr_dask.physics import rheology
 
-    omega, storage, loss = _moduli(table)
-    divisor = 1.0 if table.poisson_ratio is None else 2 * (1 + table.poisson_ratio)
-    return rheology.fit_series(omega, storage / divisor, loss / divisor, table.arms_per_decade).solid
+    if isinstance(kind, PowerLaw):
+        numbers = kind.static_modulus, kind.loss_modulus, kind.frequency, kind.exponent, kind.lowest, kind.highest
+        return rheology.power_law_series(*numbers)
+    omega, storage, loss = _moduli(kind)
+    divisor = 1.0 if kind.poisson_ratio is None else 2 * (1 + kind.poisson_ratio)
+    return rheology.fit_series(omega, storage / divisor, loss / divisor, kind.arms_per_decade)
+
+
+def fit_error(material: Material) -> float:
+    """Return the rms relative error of the Prony series that stands for a law or a table; 0 for other materials.
+
+    Raises as `solid_of` does.
+    """
+    kind = material.power_law or material.dma_table
+    return 0.0 if kind is None else _fit_of(kind).error
+
+
+def fit_notes(material: Material | None) -> tuple[str, ...]:
+    """Return how well the Prony series of a law or a table holds, in one sentence, if there is one."""
+    kind = None if material is None else material.power_law or material.dma_table
+    if kind is None:
+        return ()
+    try:
+        fit = _fit_of(kind)
+    except (DataError, ValueError):
+        return ()  # every case will say so
+    what = "power law" if isinstance(kind, PowerLaw) else f"table {kind.file.name}"
+    lowest, highest = fit.range
+    errors = [f"{error:.1%} in {modulus}" for modulus, error in _errors(fit).items()]
+    return (
+        f"{what}: {fit.solid.times.size} arms for {lowest:.3g} to {highest:.3g} rad/s, rms error {', '.join(errors)}, "
+        f"largest {fit.largest_error:.1%} at {fit.worst_frequency:.3g} rad/s",
+    )
+
+
+def _errors(fit: SeriesFit) -> dict[str, float]:
+    both = {"G'": fit.storage_error, "G''": fit.loss_error}
+    return {modulus: error for modulus, error in both.items() if np.isfinite(error)}
 
 
 def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -221,8 +254,8 @@ def _columns(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, 
 def _temperatures(table: Table) -> FloatArray | None:
     if table.values.shape[1] < 4:
         return None
-    unit = table.units[3].strip("[]() ").lower() if table.units else "k"
-    return np.asarray(table.values[:, 3] + (0.0 if unit == "k" else 273.15), dtype=np.float64)
+    unit = table.units[3].strip("[]() ").lower() if table.units else ""
+    return np.asarray(table.values[:, 3] + (0.0 if unit in ("", "k") else 273.15), dtype=np.float64)
 
 
 def _superposed(

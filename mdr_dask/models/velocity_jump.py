@@ -28,7 +28,7 @@ from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
-    from mdr_dask.physics.protocol_kernels import Line
+    from mdr_dask.physics.protocol_forces import Line
 
 SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
@@ -276,7 +276,7 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
         amplitude = _amplitudes(case)
         static, moduli, relaxation, viscosity = _solid(case)
         course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
-        unit = max([viscosity / static, *relaxation])
+        unit = time_unit(case)
         solid = foundation(np.array(moduli) / static, np.array(relaxation) / unit, viscosity / static / unit)
     except (DataError, ValueError) as problem:
         return {}, Status.FAILED, str(problem)
@@ -290,10 +290,11 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
         if found[-1].status != CONVERGED:
             status = Status.NOT_CONVERGED if found[-1].status == NOT_CONVERGED else Status.FAILED
             return {}, status, found[-1].message
-    fine, coarse = found
+    fine, _ = found
     steep = case.rms_roughness / case.length
     load = case.normal_force / scale.force
-    largest = max(float(np.max(np.abs(fine.drag))), 1e-300)
+    friction, coarser = (np.append(along.drag / along.load, along.at / along.load_at) for along in found)
+    largest = max(float(np.max(np.abs(friction))), 1e-300)
     return (
         {
             "friction_coefficient_before": fine.before / load * steep,
@@ -302,7 +303,7 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
             "friction_coefficient": fine.drag / fine.load * steep,
             "indentation_depth": fine.depth * case.rms_roughness,
             "rms_slope": roughness.spectral_slope(amplitude) * steep,
-            "discretisation_error": float(np.max(np.abs(fine.drag - coarse.drag))) / largest,
+            "discretisation_error": float(np.max(np.abs(friction - coarser))) / largest,
         },
         Status.DONE,
         "",
@@ -325,6 +326,12 @@ def _solid(case: VelocityJump) -> tuple[float, tuple[float, ...], tuple[float, .
         return case.shear_modulus, (), (), case.shear_modulus * case.relaxation_time
     solid = solid_of(case.material)
     return solid.static_modulus, tuple(solid.moduli), tuple(solid.times), solid.viscosity
+
+
+def time_unit(case: VelocityJump) -> float:
+    """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
+    static, _, relaxation, viscosity = _solid(case)
+    return max([viscosity / static, *relaxation])
 
 
 def _under(case: VelocityJump, height: FloatArray, slope: FloatArray) -> Line:
@@ -378,7 +385,7 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="velocity_jump",
-    version=1,
+    version=2,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask.physics.ehl_levels import GridSolution
 from mdr_dask.physics.ehl_newton import log_viscosities
-from mdr_dask.physics.line_contact import GridSolution, LineContact, LineSolution
+from mdr_dask.physics.line_contact import LineContact, LineSolution
 
 FloatArray = NDArray[np.float64]
 

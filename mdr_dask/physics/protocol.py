@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from mdr_dask.physics.element import Foundation
 from mdr_dask.physics.indenter import shape
+from mdr_dask.physics.protocol_forces import Edges, Line, under_elements
 from mdr_dask.physics.protocol_kernels import (
     CONVERGED,
     NOT_CONVERGED,
     OUTSIDE_LINE,
     ROWS,
-    Foundation,
-    Line,
     State,
     follow_elements,
     mean_after,
+    note_edges,
     orbit,
-    under_elements,
 )
 
 FloatArray = NDArray[np.float64]
@@ -127,10 +127,30 @@ def indented_line(height: FloatArray, slope: FloatArray, coefficient: float, exp
     return Line(height + smooth, slope + 0.5 * (left + right), False)
 
 
+def untouched(elements: int, arms: int) -> State:
+    """Return elements that have never been touched."""
+    edges = Edges(np.full(elements, -1.0), np.zeros(elements))
+    strains = np.zeros((2, elements, arms))
+    touching = np.zeros(elements, np.bool_)
+    return State(np.zeros(elements), strains[0], np.zeros(elements), strains[1], touching, edges)
+
+
+def _copy(state: State) -> State:
+    """Return a state that may be moved on."""
+    return State(
+        state.displacement.copy(),
+        state.arms.copy(),
+        state.free.copy(),
+        state.free_arms.copy(),
+        state.touching.copy(),
+        Edges(state.edges.place.copy(), state.edges.gap.copy()),
+    )
+
+
 def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tuple[State, float, int]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
-    One element is carried around the line until it comes back as it was, in steps of one cell by the method of
+    One element is carried around the line until it comes back as it was, in steps of half a cell by the method of
     :func:`follow_line`; the depth is the root of a mean displacement that increases with it. At ``reach = 0`` the
     elements have rested under the load for ever.
 
@@ -142,11 +162,12 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
         `CONVERGED` or a key of `MESSAGES`.
     """
     n, arms = line.height.size - 1, solid.times.size
-    state = State(np.zeros(n), np.zeros((n, arms)), np.zeros(n), np.zeros(n, np.bool_))
-    low = -float(line.height[:n].max())
+    state = untouched(n, arms)
+    carrier = _halved(line) if reach > 0 else line
+    low = -float(carrier.height[:-1].max())
 
     def excess(depth: float) -> float:
-        carried = _sliding(line, solid, state, reach, depth) if reach > 0 else _resting(line, state, depth)
+        carried = _sliding(carrier, solid, state, reach, depth) if reach > 0 else _resting(line, state, depth)
         return carried / load - 1
 
     width = load
@@ -158,7 +179,18 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
     if not abs(excess(depth)) < NEARLY:
         return state, depth, NOT_CONVERGED
     outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
+    note_edges(solid, line, state, depth, reach, load)
     return state, depth, OUTSIDE_LINE if outside else CONVERGED
+
+
+def _halved(line: Line) -> Line:
+    """Return the same cubic line with a node more in the middle of every cell."""
+    n = line.height.size - 1
+    height, slope = np.empty(2 * n + 1), np.empty(2 * n + 1)
+    height[::2], slope[::2] = line.height, line.slope
+    height[1::2] = 0.5 * (line.height[:-1] + line.height[1:]) - np.diff(line.slope) / (8 * n)
+    slope[1::2] = 1.5 * n * np.diff(line.height) - 0.25 * (line.slope[:-1] + line.slope[1:])
+    return Line(height, slope, line.periodic)
 
 
 def _resting(line: Line, state: State, depth: float) -> float:
@@ -167,6 +199,7 @@ def _resting(line: Line, state: State, depth: float) -> float:
     state.displacement[:] = np.maximum(w, 0)
     state.arms[:] = state.displacement[:, None]
     state.free[:] = 0.0
+    state.free_arms[:] = 0.0
     state.touching[:] = w > 0
     return float(state.displacement.mean())
 
@@ -175,7 +208,7 @@ def _sliding(line: Line, solid: Foundation, state: State, reach: float, depth: f
     """Fill all elements in the steady state at a depth; return the load that makes their mean what it is."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
-    n = line.height.size - 1
+    n = state.displacement.size
     good, last = orbit(solid, line, reach, depth, state, TURNS)
     if not good:
         return np.nan
@@ -219,7 +252,7 @@ def follow_line(
     -------
     Response
     """
-    now = State(state.displacement.copy(), state.arms.copy(), state.free.copy(), state.touching.copy())
+    now = _copy(state)
     out = np.full((ROWS, moments.size), np.nan)
     status = follow_elements(solid, line, moments, travels, reaches, loads, now, depth, out)
     drag, depths, rate, contact, stored, work, lost = out
@@ -255,5 +288,5 @@ def follow(
     w = depth + under
     touching = np.abs(w - displacement) < TOUCHING * (abs(depth) + np.abs(under) + displacement)
     u = np.where(touching, w, displacement)
-    state = State(u, np.zeros((u.size, 0)), u.copy(), touching)
+    state = untouched(u.size, 0)._replace(displacement=u, free=u.copy(), touching=touching)
     return follow_line(line, KELVIN, moments, travels, reaches, loads, state, depth)

@@ -1,4 +1,4 @@
-"""One element of a viscoelastic foundation through one step, and all of them through a course of velocity and load.
+"""All elements of a viscoelastic foundation through a course of velocity and load, and around a line until steady.
 
 Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
 """
@@ -11,6 +11,21 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mdr_dask.physics.element import (
+    Foundation,
+    Scratch,
+    advance,
+    at_rest,
+    fading,
+    flight,
+    fly,
+    pull,
+    release,
+    scratch_for,
+    stored,
+)
+from mdr_dask.physics.protocol_forces import Edges, Line, balance, depth_for, under_elements
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -20,343 +35,26 @@ ROWS = 7
 CORRECTIONS = 2  # of the moments of release and the depth within a step
 
 
-class Foundation(NamedTuple):
-    """A solid whose static modulus is 1, and the modes in which its elements recover without force.
+class State(NamedTuple):
+    """All elements at one moment.
 
     Parameters
     ----------
-    moduli, times : array, shape (arms,)
-        G_m / G_inf and tau_m.
-    viscosity : float
-        eta / G_inf of the dashpot, 0 for none.
-    rates : array, shape (modes,)
-        Rates of decay of the modes, positive. There is one mode an arm, and one more for a dashpot.
-    outward, inward : array, shape (modes, modes)
-        From modes to the state (u of a solid with a dashpot, a_1, ...), and back.
-    push : array, shape (modes,)
-        Growth of the modes of the total under a unit load.
+    displacement, arms : array, shape (n,) and (n, arms)
+        u, and the strain of the arms.
+    free, free_arms : array, shape (n,) and (n, arms)
+        The same as they would be, had an element in contact not been touched; `free_arms` of these elements only.
+    touching : array, shape (n,)
+        Whether in contact.
+    edges : Edges
     """
-
-    moduli: FloatArray
-    times: FloatArray
-    viscosity: float
-    rates: FloatArray
-    outward: FloatArray
-    inward: FloatArray
-    push: FloatArray
-
-
-class Line(NamedTuple):
-    """Heights and slopes at n + 1 nodes of a line of unit length, and whether it closes."""
-
-    height: FloatArray
-    slope: FloatArray
-    periodic: bool
-
-
-class State(NamedTuple):
-    """All elements at one moment: displacement, strain of the arms, where each would be without contact, contact."""
 
     displacement: FloatArray
     arms: FloatArray
     free: FloatArray
+    free_arms: FloatArray
     touching: BoolArray
-
-
-class Scratch(NamedTuple):
-    """Room for one element: modes, decay over part of a step, fading of the arms over it, arms, modes again."""
-
-    modes: FloatArray
-    decay: FloatArray
-    fades: FloatArray
-    arms: FloatArray
-
-
-@njit(nogil=True, cache=True)
-def scratch_for(solid: Foundation) -> Scratch:
-    """Return room for one element."""
-    modes, arms = solid.rates.size, solid.times.size
-    return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty(arms))
-
-
-@njit(nogil=True, cache=True)
-def _fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
-    """Write how modes decay and arms fade over a time."""
-    for k in range(decay.size):
-        decay[k] = np.exp(-solid.rates[k] * step)
-    for m in range(fades.size):
-        fades[m] = np.exp(-step / solid.times[m])
-
-
-@njit(nogil=True, cache=True)
-def _fly(solid: Foundation, u: float, arms: FloatArray, decay: FloatArray, modes: FloatArray) -> float:
-    """Let an element recover without force; `arms` is overwritten."""
-    if arms.size == 0:
-        return float(u * decay[0])
-    extra = 1 if solid.viscosity > 0 else 0
-    count = solid.rates.size
-    for k in range(count):
-        total = solid.inward[k, 0] * u if extra else 0.0
-        for m in range(arms.size):
-            total += solid.inward[k, m + extra] * arms[m]
-        modes[k] = total * decay[k]
-    for m in range(arms.size):
-        total = 0.0
-        for k in range(count):
-            total += solid.outward[m + extra, k] * modes[k]
-        arms[m] = total
-    if extra:
-        total = 0.0
-        for k in range(count):
-            total += solid.outward[0, k] * modes[k]
-        return total
-    return at_rest(solid, arms)
-
-
-@njit(nogil=True, cache=True)
-def at_rest(solid: Foundation, arms: FloatArray) -> float:
-    """Return the displacement without force of an element that has no dashpot."""
-    pull, glass = 0.0, 1.0
-    for m in range(arms.size):
-        pull += solid.moduli[m] * arms[m]
-        glass += solid.moduli[m]
-    return pull / glass
-
-
-@njit(nogil=True, cache=True)
-def _press(
-    solid: Foundation, u0: float, u1: float, arms: FloatArray, step: float, fades: FloatArray
-) -> tuple[float, float]:
-    """Move an element from u0 to u1 at constant speed; return work and loss, whose difference is stored exactly.
-
-    The stretch q = u - a of an arm is A + B exp(-t / tau) with A = tau du/dt; work is the integral of f du, loss that
-    of G q^2 / tau and of eta (du/dt)^2.
-    """
-    if step <= 0:
-        return 0.0, 0.0
-    speed = (u1 - u0) / step
-    work = 0.5 * (u1 * u1 - u0 * u0) + solid.viscosity * speed * speed * step
-    lost = solid.viscosity * speed * speed * step
-    for m in range(arms.size):
-        tau, fade = solid.times[m], fades[m]
-        a = speed * tau
-        b = (u0 - arms[m]) - a
-        work += solid.moduli[m] * speed * (a * step + b * tau * (1 - fade))
-        lost += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
-        arms[m] = u1 - (a + b * fade)
-    return work, lost
-
-
-@njit(nogil=True, cache=True)
-def stored(solid: Foundation, u: float, arms: FloatArray) -> float:
-    """Return the energy stored in an element."""
-    energy = 0.5 * u * u
-    for m in range(arms.size):
-        energy += 0.5 * solid.moduli[m] * (u - arms[m]) ** 2
-    return energy
-
-
-@njit(nogil=True, cache=True)
-def _pull(solid: Foundation, u: float, arms: FloatArray) -> float:
-    """Return the force of springs and arms."""
-    force = 1.0 * u
-    for m in range(arms.size):
-        force += solid.moduli[m] * (u - arms[m])
-    return float(force)
-
-
-@njit(nogil=True, cache=True)
-def _release(
-    solid: Foundation, w0: float, w1: float, arms: FloatArray, step: float, fades: FloatArray, room: FloatArray
-) -> float:
-    """Return the part of a step after which an element pressed along it is let go; 1 if it is not."""
-    speed = (w1 - w0) / step
-    begin = _pull(solid, w0, arms) + solid.viscosity * speed
-    if begin <= 0:
-        return 0.0
-    room[:] = arms
-    _press(solid, w0, w1, room, step, fades)
-    end = _pull(solid, w1, room) + solid.viscosity * speed
-    return 1.0 if end >= 0 else begin / (begin - end)
-
-
-@njit(nogil=True, cache=True)
-def _flight(
-    solid: Foundation,
-    u0: float,
-    arms: FloatArray,
-    part: float,
-    w0: float,
-    w1: float,
-    step: float,
-    decay: FloatArray,
-    scratch: Scratch,
-) -> float:
-    """Return where an element is after a step if it is pressed for a part of it and free for the rest."""
-    scratch.arms[:] = arms
-    if part <= 0:
-        return _fly(solid, u0, scratch.arms, decay, scratch.modes)
-    u = w0 + part * (w1 - w0)
-    _fading(solid, part * step, scratch.decay, scratch.fades)
-    _press(solid, w0, u, scratch.arms, part * step, scratch.fades)
-    _fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
-    return _fly(solid, u, scratch.arms, scratch.decay, scratch.modes)
-
-
-@njit(nogil=True, cache=True)
-def advance(
-    solid: Foundation,
-    u0: float,
-    arms: FloatArray,
-    touching: bool,
-    part: float,
-    free: float,
-    w0: float,
-    w1: float,
-    step: float,
-    decay: FloatArray,
-    fades: FloatArray,
-    scratch: Scratch,
-) -> tuple[float, bool, float, float]:
-    """Move one element through a step; return displacement, contact, work and loss. `arms` is overwritten.
-
-    `part` is after which part of the step it is let go if it is, `free` where it then ends.
-    """
-    before = stored(solid, u0, arms)
-    if w1 > free:
-        if touching:
-            work, lost = _press(solid, u0, w1, arms, step, fades)
-            return w1, True, work, lost
-        part = (u0 - w0) / ((u0 - w0) + (w1 - free)) if u0 > w0 else 0.0
-        _fading(solid, part * step, scratch.decay, scratch.fades)
-        u = _fly(solid, u0, arms, scratch.decay, scratch.modes) if part > 0 else u0
-        loss = before - stored(solid, u, arms) if part > 0 else 0.0
-        rest = (1 - part) * step
-        _fading(solid, rest, scratch.decay, scratch.fades)
-        work, lost = _press(solid, u, w1, arms, rest, scratch.fades)
-        return w1, True, work, lost + loss
-    if not touching or part <= 0:
-        u = _fly(solid, u0, arms, decay, scratch.modes)
-        return u, False, 0.0, before - stored(solid, u, arms)
-    u = u0 + part * (w1 - u0)
-    _fading(solid, part * step, scratch.decay, scratch.fades)
-    work, lost = _press(solid, u0, u, arms, part * step, scratch.fades)
-    _fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
-    before = stored(solid, u, arms)
-    u = _fly(solid, u, arms, scratch.decay, scratch.modes)
-    return u, False, work, lost + before - stored(solid, u, arms)
-
-
-@njit(nogil=True, cache=True)
-def under_elements(line: Line, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope over every element after a travel, from cubic cells; return the whole cells of it."""
-    n = under.size
-    cells = travel * n
-    shift = int(np.floor(cells))
-    y = cells - shift
-    a0, a1 = (1 + 2 * y) * (1 - y) ** 2, y * y * (3 - 2 * y)
-    b0, b1 = y * (1 - y) ** 2 / n, y * y * (y - 1) / n
-    g0, k0, k1 = 6 * y * (y - 1) * n, (1 - y) * (1 - 3 * y), y * (3 * y - 2)
-    i = shift % n
-    for j in range(n):
-        under[j] = a0 * line.height[i] + a1 * line.height[i + 1] + b0 * line.slope[i] + b1 * line.slope[i + 1]
-        slope_under[j] = g0 * (line.height[i] - line.height[i + 1]) + k0 * line.slope[i] + k1 * line.slope[i + 1]
-        i = i + 1 if i + 1 < n else 0
-    return shift
-
-
-@njit(nogil=True, cache=True)
-def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
-    """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
-    n = under.size
-    for _ in range(200):
-        total, touching = 0.0, 0
-        for j in range(n):
-            w = depth + under[j]
-            if w > free[j]:
-                total += w
-                touching += 1
-            else:
-                total += free[j]
-        if touching == 0:
-            nearest = np.inf
-            for j in range(n):
-                nearest = min(nearest, free[j] - under[j])
-            if abs(total - mean * n) <= 1e-12 * abs(mean) * n:
-                return nearest, True
-            depth = nearest + (mean * n - total)
-            continue
-        step = (mean * n - total) / touching
-        depth += step
-        if abs(step) <= 1e-12 * (abs(depth) + abs(mean)):
-            return depth, True
-    return depth, False
-
-
-@njit(nogil=True, cache=True)
-def _forces(
-    gaps: FloatArray, pulls: FloatArray, slope: FloatArray, damping: float, rate: float, reach: float, first: int
-) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact; edges are placed inside the cells by linear interpolation.
-
-    `first` is the element at the start of the line, behind which there is none if the line does not close, else -1.
-    """
-    n = gaps.size
-    load, drag, length = 0.0, 0.0, 0.0
-    gap0, f0, s0 = gaps[n - 1], pulls[n - 1] + damping * (rate + reach * slope[n - 1]), slope[n - 1]
-    for j in range(n):
-        gap1, f1, s1 = gaps[j], pulls[j] + damping * (rate + reach * slope[j]), slope[j]
-        low, high = 0.0, 1.0
-        if (gap0 < 0 and gap1 < 0) or j == first:
-            high = 0.0
-        elif gap0 < 0:
-            low = gap0 / (gap0 - gap1)
-        elif gap1 < 0:
-            high = gap0 / (gap0 - gap1)
-        if f0 <= 0 and f1 <= 0:
-            high = low
-        elif f0 < 0:
-            low = max(low, f0 / (f0 - f1))
-        elif f1 < 0:
-            high = min(high, f0 / (f0 - f1))
-        if high > low:
-            width, middle = high - low, 0.5 * (low + high)
-            f, s = f0 + (f1 - f0) * middle, s0 + (s1 - s0) * middle
-            load += width * f
-            drag += width * (f * s + width * width / 12 * (f1 - f0) * (s1 - s0))
-            length += width
-        gap0, f0, s0 = gap1, f1, s1
-    return load / n, drag / n, length / n
-
-
-@njit(nogil=True, cache=True)
-def _balance(
-    solid: Foundation,
-    state: State,
-    under: FloatArray,
-    slope: FloatArray,
-    depth: float,
-    rate: float,
-    reach: float,
-    load: float,
-    gaps: FloatArray,
-    pulls: FloatArray,
-    first: int,
-) -> tuple[float, float, float]:
-    """Return the rate of the depth that carries the load (of a dashpot), drag and fraction in contact."""
-    plain = solid.times.size == 0
-    for j in range(under.size):
-        gaps[j] = depth + under[j] - state.free[j]
-        pulls[j] = depth + under[j] if plain else _pull(solid, depth + under[j], state.arms[j])
-    carried, drag, length = _forces(gaps, pulls, slope, solid.viscosity, rate, reach, first)
-    if solid.viscosity == 0:
-        return rate, drag, length
-    for _ in range(60):
-        if length <= 0 or abs(carried - load) <= 1e-11 * load:
-            break
-        rate += (load - carried) / (length * solid.viscosity)
-        carried, drag, length = _forces(gaps, pulls, slope, solid.viscosity, rate, reach, first)
-    return rate, drag, length
+    edges: Edges
 
 
 @njit(nogil=True, cache=True)
@@ -398,15 +96,15 @@ def _instant(
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
-        state.free[j] = at_rest(solid, state.arms[j])
+        state.free[j] = at_rest(solid, state.arms, j)
         mean += state.free[j] / n
     depth, good = depth_for(under, state.free, mean + load / glass, depth)
     for j in range(n):
-        before = stored(solid, state.displacement[j], state.arms[j])
+        before = stored(solid, state.displacement[j], state.arms, j)
         w = depth + under[j]
         state.touching[j] = w > state.free[j]
         state.displacement[j] = max(w, state.free[j])
-        work += stored(solid, state.displacement[j], state.arms[j]) - before
+        work += stored(solid, state.displacement[j], state.arms, j) - before
     return depth, work / n, good
 
 
@@ -416,11 +114,226 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     n, lost = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
-            lost += stored(solid, state.displacement[j], state.arms[j])
+            lost += stored(solid, state.displacement[j], state.arms, j)
             state.displacement[j] = state.free[j] = 0.0
             state.arms[j, :] = 0.0
+            state.edges.place[j] = -1.0
             state.touching[j] = False
     return lost / n
+
+
+class Room(NamedTuple):
+    """Arrays of one step: heights and slopes over the elements at its end and start, where each would be at the end
+    without contact, when and where it is let go, gaps and forces, and decay over the whole step.
+    """
+
+    under: FloatArray
+    slope: FloatArray
+    old_under: FloatArray
+    old_slope: FloatArray
+    after: FloatArray
+    after_arms: FloatArray
+    parts: FloatArray
+    leaves: FloatArray
+    gaps: FloatArray
+    pulls: FloatArray
+    force: FloatArray
+    power: FloatArray
+    decay: FloatArray
+    fades: FloatArray
+    scratch: Scratch
+
+
+@njit(nogil=True, cache=True)
+def _room_for(solid: Foundation, n: int) -> Room:
+    rows = np.empty((11, n))
+    return Room(
+        rows[0],
+        rows[1],
+        rows[2],
+        rows[3],
+        rows[4],
+        np.empty((n, solid.times.size)),
+        rows[5],
+        rows[6],
+        rows[7],
+        rows[8],
+        rows[9],
+        rows[10],
+        np.empty(solid.rates.size),
+        np.empty(solid.times.size),
+        scratch_for(solid),
+    )
+
+
+@njit(nogil=True, cache=True)
+def _let_go(
+    solid: Foundation, state: State, room: Room, depth: float, fall: float, reach0: float, reach1: float, step: float
+) -> None:
+    """Write which elements are let go within a step that ends at a depth, and where they end."""
+    plain, damping = solid.times.size == 0, solid.viscosity
+    for j in range(room.under.size):
+        if not state.touching[j]:
+            continue
+        u, w1 = state.displacement[j], depth + room.under[j]
+        rise0, rise1 = fall + reach0 * room.old_slope[j], fall + reach1 * room.slope[j]
+        if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
+            room.parts[j], room.leaves[j], room.after[j] = 1.0, w1, u * room.decay[0]
+            continue
+        arms, scratch = state.arms, room.scratch
+        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, room.fades, scratch.arms)
+        if part < 1 or room.parts[j] < 1:
+            pressed = part if part < 1 else 0.0
+            room.after[j] = flight(solid, u, arms, j, pressed, leaves, step, room.decay, scratch)
+        room.parts[j], room.leaves[j] = part, leaves
+
+
+@njit(nogil=True, cache=True)
+def _move(
+    solid: Foundation, state: State, room: Room, old_depth: float, depth: float, step: float
+) -> tuple[float, float]:
+    """Move all elements through a step; return mean work and loss."""
+    n, plain, damping = room.under.size, solid.times.size == 0, solid.viscosity
+    u, touching, after = state.displacement, state.touching, room.after
+    work, lost = 0.0, 0.0
+    for j in range(n):
+        w0, w1, was = old_depth + room.old_under[j], depth + room.under[j], touching[j]
+        if not was:
+            state.free[j] = after[j]
+            for m in range(solid.times.size):
+                state.free_arms[j, m] = room.after_arms[j, m]
+        elif plain:
+            state.free[j] *= room.decay[0]
+        elif damping > 0:
+            state.free[j] = fly(solid, state.free[j], state.free_arms, j, room.decay, room.scratch.modes)
+        if not was and w1 <= after[j]:
+            if plain:
+                lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
+            else:
+                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], room.after_arms, j)
+            u[j] = after[j]
+            for m in range(solid.times.size):
+                state.arms[j, m] = room.after_arms[j, m]
+            continue
+        if was and plain and w1 > after[j]:
+            gone = damping * (w1 - u[j]) ** 2 / step
+            work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
+            lost += gone
+            u[j] = w1
+            continue
+        u[j], touching[j], done, gone = advance(
+            solid,
+            u[j],
+            state.arms,
+            j,
+            was,
+            room.parts[j],
+            room.leaves[j],
+            after[j],
+            w0,
+            w1,
+            step,
+            room.decay,
+            room.fades,
+            room.scratch,
+        )
+        if not touching[j]:
+            state.free[j] = u[j]
+        work += done
+        lost += gone
+    return work / n, lost / n
+
+
+@njit(nogil=True, cache=True)
+def _step(
+    solid: Foundation,
+    state: State,
+    room: Room,
+    mean: float,
+    old_depth: float,
+    guess: float,
+    reach0: float,
+    reach1: float,
+    step: float,
+) -> tuple[float, float, float, bool]:
+    """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
+    plain = solid.times.size == 0
+    for j in range(room.under.size):
+        room.parts[j] = 1.0 if state.touching[j] else 0.0
+        if plain:
+            room.after[j] = state.displacement[j] * room.decay[0]
+            continue
+        for m in range(solid.times.size):
+            room.after_arms[j, m] = state.arms[j, m]
+        room.after[j] = fly(solid, state.displacement[j], room.after_arms, j, room.decay, room.scratch.modes)
+    depth = guess
+    for _ in range(CORRECTIONS):
+        depth, good = depth_for(room.under, room.after, mean, depth)
+        if not good:
+            return depth, 0.0, 0.0, False
+        _let_go(solid, state, room, depth, (depth - old_depth) / step, reach0, reach1, step)
+    depth, good = depth_for(room.under, room.after, mean, depth)
+    if not good:
+        return depth, 0.0, 0.0, False
+    work, lost = _move(solid, state, room, old_depth, depth, step)
+    return depth, work, lost, True
+
+
+@njit(nogil=True, cache=True)
+def _state_energy(solid: Foundation, state: State) -> float:
+    energy, n = 0.0, state.displacement.size
+    if solid.times.size == 0:
+        for j in range(n):
+            energy += 0.5 * state.displacement[j] * state.displacement[j] / n
+        return energy
+    for j in range(n):
+        energy += stored(solid, state.displacement[j], state.arms, j) / n
+    return energy
+
+
+@njit(nogil=True, cache=True)
+def forces_now(
+    solid: Foundation,
+    state: State,
+    room: Room,
+    depth: float,
+    rate: float,
+    reach: float,
+    load: float,
+    first: int,
+) -> tuple[float, float, float, float]:
+    """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
+
+    Without a dashpot the depth is that of the load; the one for the mean displacement of the elements is not more exact
+    than a sum over a line with kinks.
+    """
+    plain = solid.times.size == 0
+    for j in range(room.under.size):
+        w = depth + room.under[j]
+        room.pulls[j] = w if plain else pull(solid, w, state.arms, j)
+        room.gaps[j] = w - state.free[j] if solid.viscosity > 0 else room.pulls[j]
+    edges, force, power = state.edges, room.force, room.power
+    if solid.viscosity > 0:
+        rate, drag, length = balance(
+            solid.viscosity,
+            room.gaps,
+            room.pulls,
+            room.slope,
+            state.touching,
+            edges,
+            rate,
+            reach,
+            load,
+            first,
+            force,
+            power,
+        )
+        return depth, rate, drag, length
+    glass = 1 + solid.moduli.sum()
+    more, drag, length = balance(
+        glass, room.gaps, room.pulls, room.slope, state.touching, edges, 0.0, 0.0, load, first, force, power
+    )
+    return depth + more, rate, drag, length
 
 
 @njit(nogil=True, cache=True)
@@ -436,89 +349,40 @@ def follow_elements(
     out: FloatArray,
 ) -> int:
     """March all elements through the moments and write `out`, shape (ROWS, moments)."""
-    n, scratch = line.height.size - 1, scratch_for(solid)
-    under, grade, below = np.empty(n), np.empty(n), np.empty(n)
-    gaps, pulls, parts = np.empty(n), np.empty(n), np.empty(n)
-    decay, fades, modes = np.empty(solid.rates.size), np.empty(solid.times.size), np.empty(solid.rates.size)
-    shift = under_elements(line, travels[0], under, grade)
-    u, arms, free, touching = state.displacement, state.arms, state.free, state.touching
-    plain, damping = solid.times.size == 0, solid.viscosity
+    n = line.height.size - 1
+    room, modes = _room_for(solid, n), np.empty(solid.rates.size)
+    shift = under_elements(line, travels[0], room.under, room.slope)
     rate, work, lost = 0.0, 0.0, 0.0
     if solid.viscosity == 0:
-        depth, work, good = _instant(solid, state, under, loads[0], depth)
+        depth, work, good = _instant(solid, state, room.under, loads[0], depth)
         if not good:
             return NOT_CONVERGED
     for now in range(moments.size):
         if now > 0:
             step = moments[now] - moments[now - 1]
-            below[:] = under
+            room.old_under[:] = room.under
+            room.old_slope[:] = room.slope
             old_depth, old_shift = depth, shift
-            shift = under_elements(line, travels[now], under, grade)
+            shift = under_elements(line, travels[now], room.under, room.slope)
             if not line.periodic and shift != old_shift:
                 lost += _forget(solid, state, old_shift, shift)
-            _fading(solid, step, decay, fades)
+            fading(solid, step, room.decay, room.fades)
             mean = mean_after(solid, state, loads[now - 1], loads[now], step, modes)
-            depth += rate * step
-            for j in range(n):
-                parts[j] = 0.0
-                free[j] = u[j] * decay[0] if plain else _flight(solid, u[j], arms[j], 0, 0, 0, step, decay, scratch)
-            for _ in range(CORRECTIONS):
-                depth, good = depth_for(under, free, mean, depth)
-                if not good:
-                    return NOT_CONVERGED
-                for j in range(n):
-                    if touching[j]:
-                        w0, w1 = u[j], depth + under[j]
-                        push = damping * (w1 - w0) / step
-                        if plain and w0 + push > 0 and w1 + push >= 0:
-                            parts[j], free[j] = 1.0, w0 * decay[0]
-                            continue
-                        parts[j] = _release(solid, w0, w1, arms[j], step, fades, scratch.arms)
-                        part = parts[j] if parts[j] < 1 else 0.0
-                        free[j] = _flight(solid, w0, arms[j], part, w0, w1, step, decay, scratch)
-            depth, good = depth_for(under, free, mean, depth)
+            guess = depth + rate * step
+            depth, done, gone, good = _step(
+                solid, state, room, mean, old_depth, guess, reaches[now - 1], reaches[now], step
+            )
             if not good:
                 return NOT_CONVERGED
-            for j in range(n):
-                w0, w1 = old_depth + below[j], depth + under[j]
-                if plain and not touching[j] and w1 <= free[j]:
-                    lost += 0.5 * (u[j] * u[j] - free[j] * free[j]) / n
-                    u[j] = free[j]
-                elif plain and touching[j] and w1 > free[j]:
-                    gone = damping * (w1 - u[j]) ** 2 / step
-                    work += (0.5 * (w1 * w1 - u[j] * u[j]) + gone) / n
-                    lost += gone / n
-                    u[j] = w1
-                else:
-                    u[j], touching[j], done, gone = advance(
-                        solid,
-                        u[j],
-                        arms[j],
-                        touching[j],
-                        parts[j],
-                        free[j],
-                        w0,
-                        w1,
-                        step,
-                        decay,
-                        fades,
-                        scratch,
-                    )
-                    work += done / n
-                    lost += gone / n
+            work, lost = work + done, lost + gone
             if solid.viscosity == 0:
                 rate = (depth - old_depth) / step
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return OUTSIDE_LINE
-        rate, drag, length = _balance(
-            solid, state, under, grade, depth, rate, reaches[now], loads[now], gaps, pulls, first
-        )
-        energy = 0.0
-        for j in range(n):
-            energy += (0.5 * u[j] * u[j] if plain else stored(solid, u[j], arms[j])) / n
-        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, depth, rate, length
-        out[STORED, now], out[WORK, now], out[LOST, now] = energy, work, lost
+        exact, rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
+        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
+        out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
     return CONVERGED
 
 
@@ -526,34 +390,54 @@ def follow_elements(
 def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
     """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
 
+    The line may have a multiple of the nodes that there are elements.
+
     Return whether it did, and its displacement at the end.
     """
     n, scratch = line.height.size - 1, scratch_for(solid)
+    every = n // state.displacement.size
     step = 1 / (n * reach)
     decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
-    _fading(solid, step, decay, fades)
-    arms, last = np.zeros(solid.times.size), np.zeros(solid.times.size)
+    fading(solid, step, decay, fades)
+    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
     w0 = depth + line.height[top]
     u, touching = max(w0, 0.0), w0 > 0
+    free = 0.0
     for _ in range(turns if line.periodic else 1):
-        last[:] = arms
+        last[:] = arms[0]
         before = u
         for cell in range(n):
             i = (top + cell) % n
-            state.displacement[i], state.touching[i] = u, touching
-            state.arms[i, :] = arms
+            if not touching:
+                free = u
+                free_arms[0, :] = arms[0]
+            if i % every == 0:
+                j = i // every
+                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
+                state.arms[j, :] = arms[0]
+                state.free_arms[j, :] = free_arms[0]
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            part = _release(solid, w0, w1, arms, step, fades, scratch.arms) if touching else 0.0
-            used = part if part < 1 else 0.0
-            free = _flight(solid, u, arms, used, w0, w1, step, decay, scratch)
-            state.free[(i + 1) % n] = free
-            u, touching, _, _ = advance(solid, u, arms, touching, part, free, w0, w1, step, decay, fades, scratch)
+            rise0, rise1 = reach * line.slope[i], reach * line.slope[i + 1]
+            part, leaves = 0.0, u
+            if touching:
+                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
+            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
+            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
+            u, touching, _, _ = advance(
+                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
+            )
         change = abs(u - before)
         for m in range(arms.size):
-            change = max(change, abs(arms[m] - last[m]))
+            change = max(change, abs(arms[0, m] - last[m]))
         if line.periodic and change <= 1e-13 * abs(u):
             return True, u
-    if not line.periodic:
-        state.free[0] = 0.0
     return not line.periodic, u
+
+
+@njit(nogil=True, cache=True)
+def note_edges(solid: Foundation, line: Line, state: State, depth: float, reach: float, load: float) -> None:
+    """Note where the edges are in a steady state."""
+    room = _room_for(solid, line.height.size - 1)
+    under_elements(line, 0.0, room.under, room.slope)
+    forces_now(solid, state, room, depth, 0.0, reach, load, -1 if line.periodic else 0)

@@ -126,6 +126,8 @@ class SeriesFit:
         Root mean square of the relative error of G' and G''; NaN for one that was not given.
     largest_error : float
         Largest relative error of either.
+    worst_frequency : float
+        Angular frequency of the largest error, rad/s.
     range : tuple of float
         Lowest and highest angular frequency of the data, rad/s.
     """
@@ -134,7 +136,13 @@ class SeriesFit:
     storage_error: float
     loss_error: float
     largest_error: float
+    worst_frequency: float
     range: tuple[float, float]
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the relative errors of the moduli that were given."""
+        return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
 
 
 def power_law_series(
@@ -177,7 +185,8 @@ def power_law_series(
     moduli, _ = nnls(_loss_columns(omega, times) / wanted[:, None], np.ones_like(omega), maxiter=100 * times.size)
     solid = prony(static_modulus, moduli, times)
     error = complex_modulus(solid, omega).imag / wanted - 1
-    return SeriesFit(solid, np.nan, _rms(error), float(np.abs(error).max()), (lowest, highest))
+    worst = int(np.abs(error).argmax())
+    return SeriesFit(solid, np.nan, _rms(error), abs(float(error[worst])), float(omega[worst]), (lowest, highest))
 
 
 def fit_series(
@@ -219,8 +228,10 @@ def fit_series(
     solid = prony(static, moduli, times, weights[-1] if dashpot else 0.0)
     modulus = complex_modulus(solid, omega)
     errors = modulus.real / stored - 1, modulus.imag / lost - 1
-    largest = float(max(np.abs(error).max() for error in errors))
-    return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), largest, (float(omega.min()), float(omega.max())))
+    larger = np.maximum(*np.abs(errors))
+    worst = int(larger.argmax())
+    covered = float(omega.min()), float(omega.max())
+    return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), float(larger[worst]), float(omega[worst]), covered)
 
 
 def _times_covering(omega: FloatArray, arms_per_decade: float) -> FloatArray:
@@ -308,14 +319,11 @@ class Recovery:
         tau_m / (tau_m - lambda_k).
     amplitude : array, shape (arms, arms)
         Rows that give c_k = amplitude[k] @ (u - a) for a state of zero stress.
-    memory : array, shape (arms, arms)
-        a_m in mode k: lambda_k / (lambda_k - tau_m).
     """
 
     times: FloatArray
     stretch: FloatArray
     amplitude: FloatArray
-    memory: FloatArray
 
 
 def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
@@ -339,16 +347,18 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     stretch = times[:, None] / distance
     norm = np.sum((moduli * times)[:, None] / distance**2, axis=0)
     amplitude = (moduli[:, None] / distance / norm).T.copy()
-    return Recovery(zeros, stretch, amplitude, -zeros / distance)
+    return Recovery(zeros, stretch, amplitude)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> float:
-    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`."""
-    total = 1.0
+def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
+    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
+    total, rate = 1.0, 0.0
     for m in range(times.size):
-        total += weight[m] / ((times[m] - times[k]) - offset)
-    return total
+        inverse = 1 / ((times[m] - times[k]) - offset)
+        total += weight[m] * inverse
+        rate += weight[m] * inverse * inverse
+    return total, rate
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -359,18 +369,32 @@ def _zeros_between(moduli: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     for k in range(arms):
         last = k == arms - 1
         gap = 2 * times[k] * moduli.sum() if last else times[k + 1] - times[k]
-        left = last or _imbalance(k, gap / 2, weight, times) >= 0
+        left = last or _imbalance(k, gap / 2, weight, times)[0] >= 0
         pole, sign = (k, 1.0) if left else (k + 1, -1.0)
-        high = np.log(gap)
-        low = high - 80.0
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            if sign * _imbalance(pole, sign * np.exp(middle), weight, times) > 0:
-                high = middle
-            else:
-                low = middle
-        offset = sign * np.exp(0.5 * (low + high))
+        offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
         zeros[k] = times[pole] + offset
         for m in range(arms):
             distance[m, k] = (times[m] - times[pole]) - offset
     return zeros, distance
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
+    """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
+    high = np.log(gap)
+    low = high - 80.0
+    place = 0.5 * (low + high)
+    for _ in range(80):
+        offset = np.exp(place)
+        total, rate = _imbalance(pole, sign * offset, weight, times)
+        if sign * total > 0:
+            high = place
+        else:
+            low = place
+        following = place - sign * total / (rate * offset)
+        if not low < following < high or high - low > 1.0:
+            following = 0.5 * (low + high)
+        if abs(following - place) <= 1e-15:
+            break
+        place = following
+    return float(np.exp(place))

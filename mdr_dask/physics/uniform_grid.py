@@ -77,6 +77,17 @@ class UniformGrid:
         last = load[k - 1] * (self.edge(image, depth) - self.nodes[k - 1])
         return float(2.0 * np.trapezoid(load[:k], self.nodes[:k]) + last)
 
+    def depth(self, image: FloatArray, force: float, guess: float | None = None) -> float:
+        """Return the depth under which the image carries a force, by Newton steps on a convex function."""
+        depth = float(np.max(image[: max(int(self.nodes.size * 0.4), 2)])) if guess is None else guess
+        for _ in range(60):
+            slope = 2.0 * max(self.edge(image, depth), self.spacing)
+            change = (force - self.force(image, depth)) / slope
+            depth += change
+            if abs(change) < 1e-13:
+                break
+        return depth
+
 
 @lru_cache(maxsize=8)
 def uniform_grid(cells: int, length: float) -> UniformGrid:

@@ -2,130 +2,197 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mdr_dask.physics.viscoelastic_sweep import CLOSED, sweep
+from mdr_dask.physics.viscoelastic_sweep import CLOSED, multiply, sweep
 
 FloatArray = NDArray[np.float64]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def tangent(
-    lengths: FloatArray,
-    pieces: int,
-    moduli: FloatArray,
-    reach: FloatArray,
-    times: FloatArray,
-    stretch_of: FloatArray,
-    amplitude_of: FloatArray,
-    memory_of: FloatArray,
-    periodic: bool,
-    change: FloatArray,
-    strain_area: FloatArray,
-    scratch: FloatArray,
-) -> None:  # pragma: no cover
-    """Differentiate a sweep: change of a_m over the line, and integral of u, by (e at the start..., depth).
+LINEAR = 1e-10
+"""Residual of a step of Newton's method, relative to what it is to remove: far below what the next one brings."""
 
-    Contacts and flights of fixed lengths act linearly on the arms, and u is continuous where they meet, so moving the
-    meeting points does not matter to first order.
+
+class Swept(NamedTuple):
+    """Contacts and flights of a sweep, and the solid that went through them.
 
     Parameters
     ----------
-    lengths, pieces, moduli, reach, times, stretch_of, amplitude_of
-        As in `sweep`.
-    memory_of : array, shape (arms, arms)
-        a_m in each mode.
-    periodic : bool
-        Whether the line closes; otherwise there is only the column of the depth, and the recovery beyond the line
-        counts.
-    change : array, shape (arms, columns), output
-        Derivative of a(end) - a(start); the last column belongs to the depth, the others to e(start).
-    strain_area : array, shape (columns,), output
-        Derivative of the integral of u.
-    scratch : array, shape (2, arms, columns)
+    lost : array, shape (pieces, arms)
+        1 - exp(-length / time) of every mode in flight and of every arm in contact.
+    lengths, moduli, reach, times, stretch_of, amplitude_of
+        See `sweep`.
     """
-    arms, columns = change.shape
-    depth, glass = columns - 1, 1.0 + moduli.sum()
-    stretch, modes = scratch[0], scratch[1]
-    change[:] = 0.0
-    strain_area[:] = 0.0
-    stretch[:] = 0.0
-    for m in range(arms):
-        if periodic:
-            stretch[m, m] = 1.0
-        else:
-            stretch[m, depth] = 1.0
+
+    lost: FloatArray
+    lengths: FloatArray
+    moduli: FloatArray
+    reach: FloatArray
+    times: FloatArray
+    stretch_of: FloatArray
+    amplitude_of: FloatArray
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def follow(
+    direction: FloatArray, swept: Swept, periodic: bool, turned: FloatArray, scratch: FloatArray
+) -> None:  # pragma: no cover
+    """Differentiate a sweep along one direction: how the integrals of e_m and of u over the line change.
+
+    Contacts and flights of fixed lengths act linearly on the arms, and u is continuous where they meet, so moving the
+    meeting points does not matter to first order. A piece costs two products of a matrix and a vector.
+
+    Parameters
+    ----------
+    direction : array, shape (arms + 1,)
+        Change of e at the start and of the depth.
+    swept : Swept
+        The pieces.
+    periodic : bool
+        Whether the line closes; otherwise the recovery beyond the line counts.
+    turned : array, shape (arms + 1,), output
+        Change of the integral of e_m, and of that of u.
+    scratch : array, shape (3, arms)
+    """
+    lost, lengths, moduli, reach, times, stretch_of, amplitude_of = swept
+    arms, pieces = moduli.size, lost.shape[0]
+    depth, glass = direction[arms], 1.0 + moduli.sum()
+    stretch, modes, integral = scratch[0], scratch[1], scratch[2]
+    turned[:] = 0.0
+    stretch[:] = direction[:arms]
     for piece in range(pieces):
-        length = lengths[piece]
         if piece % 2 == 1:
-            strain_area[depth] += length
+            turned[arms] += depth * lengths[piece]
             for m in range(arms):
-                lost = -np.expm1(-length / reach[m])
-                for j in range(columns):
-                    change[m, j] += lost * stretch[m, j]
-                    stretch[m, j] *= 1 - lost
-        elif length > 0:
-            _take_stress(stretch, moduli, glass)
-            np.dot(amplitude_of, stretch, modes)
-            np.dot(stretch_of, modes * np.exp(-length / times).reshape(-1, 1), stretch)
-            stretch[:, depth] += 1.0
+                turned[m] += reach[m] * lost[piece, m] * stretch[m]
+                stretch[m] *= 1 - lost[piece, m]
+        elif lengths[piece] > 0:
+            _take_stress(stretch, depth, moduli, glass)
+            multiply(amplitude_of, stretch, modes)
+            strain = 0.0
             for k in range(arms):
-                lost = -np.expm1(-length / times[k])
-                weight = times[k] * (lost if periodic or piece < pieces - 1 else 1.0)
-                for j in range(columns):
-                    strain_area[j] += weight * modes[k, j]
-                    after = modes[k, j] * (1 - lost)
-                    modes[k, j] *= -lost
-                    for m in range(arms):
-                        stretch[m, j] -= after
-                        change[m, j] += memory_of[m, k] * modes[k, j]
+                integral[k] = modes[k] * times[k] * lost[piece, k]
+                turned[arms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
+                modes[k] *= 1 - lost[piece, k]
+                strain += modes[k]
+            multiply(stretch_of, modes, stretch)
+            multiply(stretch_of, integral, modes)
+            for m in range(arms):
+                turned[m] += modes[m]
+                stretch[m] += depth - strain
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _take_stress(stretch: FloatArray, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
+def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
-    arms, columns = stretch.shape
-    if arms == 0:
+    if stretch.size == 0:
         return
-    for j in range(columns):
-        strain = 1.0 if j == columns - 1 else 0.0
-        stress = strain
-        for m in range(arms):
-            stress += moduli[m] * stretch[m, j]
-        balance = strain - stress / glass
-        for m in range(1, arms):
-            stretch[m, j] -= stress / glass
-            balance += moduli[m] * stretch[m, j]
-        stretch[0, j] = -balance / moduli[0]
+    stress = depth
+    for m in range(stretch.size):
+        stress += moduli[m] * stretch[m]
+    balance = depth - stress / glass
+    for m in range(1, stretch.size):
+        stretch[m] -= stress / glass
+        balance += moduli[m] * stretch[m]
+    stretch[0] = -balance / moduli[0]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def solve_in_place(matrix: FloatArray, vector: FloatArray) -> bool:  # pragma: no cover
-    """Overwrite `vector` by the solution of a small dense system; False if the matrix is singular."""
-    size = vector.size
+def _losses(lengths: FloatArray, reach: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
+    """Return what modes lose in every flight and arms in every contact, shape (pieces, arms)."""
+    lost = np.empty((lengths.size, reach.size))
+    for piece in range(lengths.size):
+        scales = reach if piece % 2 == 1 else times
+        for m in range(reach.size):
+            lost[piece, m] = -np.expm1(-lengths[piece] / scales[m])
+    return lost
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def newton_step(
+    residual: FloatArray,
+    scale: FloatArray,
+    swept: Swept,
+    basis: FloatArray,
+    triangle: FloatArray,
+    rotations: FloatArray,
+    scratch: FloatArray,
+    step: FloatArray,
+) -> None:  # pragma: no cover
+    """Solve the linear system of a step by minimal residuals over a Krylov space (GMRES with Givens rotations).
+
+    Rows divided by `scale`, the derivative is the identity and a smooth operator over the relaxation times, whose
+    singular values fall off fast: four to seven products whatever the number of arms.
+
+    Parameters
+    ----------
+    residual, scale : array, shape (n,)
+        What the integrals of e_m and u are to change by, n = arms + 1, and the size of the change for a unit of each.
+    swept : Swept
+        The pieces.
+    basis, triangle, rotations, scratch : arrays, shape (n + 1, n), (n + 1, n), (3, n + 1) and (3, arms)
+        Room to work in.
+    step : array, shape (n,), output
+    """
+    size = residual.size
+    right = rotations[2]
+    step[:] = 0.0
+    basis[0] = residual / scale
+    norm = np.sqrt(np.sum(basis[0] ** 2))
+    if not norm > 0:
+        return
+    basis[0] /= norm
+    right[0] = norm
+    used = 0
     for j in range(size):
-        pivot = j
-        for i in range(j + 1, size):
-            if abs(matrix[i, j]) > abs(matrix[pivot, j]):
-                pivot = i
-        if not abs(matrix[pivot, j]) > 0:
-            return False
-        if pivot != j:
-            for c in range(j, size):
-                matrix[j, c], matrix[pivot, c] = matrix[pivot, c], matrix[j, c]
-            vector[j], vector[pivot] = vector[pivot], vector[j]
-        for i in range(j + 1, size):
-            factor = matrix[i, j] / matrix[j, j]
-            for c in range(j + 1, size):
-                matrix[i, c] -= factor * matrix[j, c]
-            vector[i] -= factor * vector[j]
-    for j in range(size - 1, -1, -1):
-        for c in range(j + 1, size):
-            vector[j] -= matrix[j, c] * vector[c]
-        vector[j] /= matrix[j, j]
-    return True
+        column = basis[j + 1]
+        follow(basis[j], swept, True, column, scratch)
+        column /= scale
+        used = j + 1
+        _orthogonalise(basis, triangle, j)
+        _rotate(triangle, rotations, j)
+        if abs(right[j + 1]) <= LINEAR * norm or not np.isfinite(right[j + 1]):
+            break
+    for i in range(used - 1, -1, -1):
+        for j in range(i + 1, used):
+            right[i] -= triangle[i, j] * right[j]
+        right[i] /= triangle[i, i]
+        step += right[i] * basis[i]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
+    """Take the earlier rows out of row j + 1, twice against rounding, and leave the coefficients in column j."""
+    column = basis[j + 1]
+    triangle[: j + 1, j] = 0.0
+    for _ in range(2):
+        for i in range(j + 1):
+            part = np.sum(column * basis[i])
+            triangle[i, j] += part
+            column -= part * basis[i]
+    norm = np.sqrt(np.sum(column**2))
+    triangle[j + 1, j] = norm
+    if norm > 0:
+        column /= norm
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
+    """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
+    cosine, sine, right = rotations[0], rotations[1], rotations[2]
+    for i in range(j):
+        upper, lower = triangle[i, j], triangle[i + 1, j]
+        triangle[i, j] = cosine[i] * upper + sine[i] * lower
+        triangle[i + 1, j] = cosine[i] * lower - sine[i] * upper
+    length = np.sqrt(triangle[j, j] ** 2 + triangle[j + 1, j] ** 2)
+    cosine[j], sine[j] = triangle[j, j] / length, triangle[j + 1, j] / length
+    triangle[j, j] = length
+    right[j + 1] = -sine[j] * right[j]
+    right[j] *= cosine[j]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -161,7 +228,6 @@ def solve_sliding(
     times: FloatArray,
     stretch_of: FloatArray,
     amplitude_of: FloatArray,
-    memory_of: FloatArray,
     tolerance: float,
     unknown: FloatArray,
     totals: FloatArray,
@@ -180,8 +246,8 @@ def solve_sliding(
         F_N / (4 G_inf cell), the integral of u wanted, in cells times height.
     periodic : bool
         Whether the line closes; otherwise elements enter undeformed and recover beyond its end.
-    moduli, reach, times, stretch_of, amplitude_of, memory_of
-        The solid, see `sweep` and `tangent`.
+    moduli, reach, times, stretch_of, amplitude_of
+        The solid, see `sweep`.
     tolerance : float
         Largest last step, relative to the depth.
     unknown : array, shape (arms + 1,), input and output
@@ -195,11 +261,12 @@ def solve_sliding(
         `inside` is False if an element is in contact at the end of a line that is not periodic.
     """
     arms, nodes = moduli.size, profile.size
-    columns = arms + 1 if periodic else 1
+    size = arms + 1
     lengths, penetration = np.empty(2 * nodes + 4), np.empty(nodes)
-    imbalance, work = np.empty(arms), np.empty((10, max(arms, 1)))
-    change, row, scratch = np.empty((arms, columns)), np.empty(columns), np.empty((2, arms, columns))
-    matrix, residual = np.empty((columns, columns)), np.empty(columns)
+    imbalance, work, scratch = np.empty(arms), np.empty((10, max(arms, 1))), np.empty((3, arms))
+    residual, scale, step, turned = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
+    basis, triangle, rotations = np.empty((size + 1, size)), np.empty((size + 1, size)), np.empty((3, size + 1))
+    scale[:arms] = -reach * np.expm1(-(nodes - 1) / reach)
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
@@ -221,36 +288,21 @@ def solve_sliding(
             totals,
             work,
         )
-        tangent(
-            lengths,
-            pieces,
-            moduli,
-            reach,
-            times,
-            stretch_of,
-            amplitude_of,
-            memory_of,
-            periodic,
-            change,
-            row,
-            scratch,
-        )
-        total = totals[0] if periodic else totals[0] + totals[5]
-        residual[columns - 1] = strain_area - total
-        matrix[columns - 1] = row
+        found = lengths[:pieces]
+        swept = Swept(_losses(found, reach, times), found, moduli, reach, times, stretch_of, amplitude_of)
         if periodic:
-            for m in range(arms):
-                scale = change[m, m]
-                residual[m] = -imbalance[m] / reach[m] / scale
-                for j in range(columns):
-                    matrix[m, j] = change[m, j] / scale
-        if not solve_in_place(matrix, residual):
-            return False, sweeps, True
+            residual[:arms], residual[arms] = -imbalance, strain_area - totals[0]
+            scale[arms] = totals[3]
+            newton_step(residual, scale, swept, basis, triangle, rotations, scratch, step)
+        else:
+            residual[:arms], residual[arms] = 0.0, 1.0  # a unit of depth
+            follow(residual, swept, False, turned, scratch)
+            step[arms] = (strain_area - totals[0] - totals[5]) / turned[arms]
         largest = 0.0
-        for j in range(columns):
-            weight = min(1.0, moduli[j]) if j < columns - 1 else 1.0  # a soft arm cannot matter
-            largest = max(largest, weight * abs(residual[j]))
-            unknown[unknown.size - columns + j] += residual[j]
+        for j in range(size):
+            weight = min(1.0, moduli[j]) if j < arms else 1.0  # a soft arm cannot matter
+            largest = max(largest, weight * abs(step[j]))
+            unknown[j] += step[j]
         if not np.isfinite(largest):
             return False, sweeps, True
         if largest <= tolerance * unknown[arms] + rounding:

@@ -19,6 +19,16 @@ SURFACE_LAYER = 1e-7
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
+def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
+    """Fill a matrix times a vector; the matrix is given by its columns, which the compiler can add as vectors."""
+    product[:] = 0.0
+    for k in range(vector.size):
+        factor = vector[k]
+        for m in range(product.size):
+            product[m] += columns[k, m] * factor
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
 def step_factors(
     length: float, reach: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
@@ -159,8 +169,10 @@ def sweep(
         e_m at the first node under the penetration there; ignored if `undeformed`.
     moduli, reach : array, shape (arms,)
         Arms, ascending in reach.
-    times, stretch_of, amplitude_of : arrays
-        Recovery modes, lengths in cells.
+    times : array, shape (arms,)
+        Of the recovery modes, in cells.
+    stretch_of, amplitude_of : array, shape (arms, arms)
+        Stretches of every mode (a row each), and what the stretch of every arm (a row each) adds to the modes.
     undeformed : bool
         Whether the elements enter free and at rest.
     lengths : array, shape (>= 2 nodes + 2,), output
@@ -297,10 +309,8 @@ def _into_flight(
             stress += moduli[m] * e[m]
     if e.size:
         e[0] = -stress / moduli[0]
-    for k in range(modes.size):
-        modes[k] = 0.0
-        for m in range(modes.size):
-            modes[k] += amplitude_of[k, m] * e[m]
+    if e.size:
+        multiply(amplitude_of, e, modes)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -317,11 +327,12 @@ def _add_flight(
     """Let the modes decay over a flight, add its integrals of u and e, and leave the stretches at its end in `e`."""
     for m in range(e.size):
         e[m] = 0.0
-    for k in range(modes.size):
+    for k in range(times.size):
         lost = -np.expm1(-length / times[k])
         integral = modes[k] * times[k] * lost
         totals[0] += integral
         modes[k] *= 1 - lost
+        after = modes[k]
         for m in range(e.size):
-            imbalance[m] += stretch_of[m, k] * integral
-            e[m] += stretch_of[m, k] * modes[k]
+            imbalance[m] += stretch_of[k, m] * integral
+            e[m] += stretch_of[k, m] * after

@@ -54,6 +54,10 @@ class Worn:
         Its derivative.
     breaks : tuple of float
         Places between c and the contact radius where `change` is not smooth.
+    depth : float
+        d.
+    border : float, optional
+        Where sticking ends, if that is beyond the first stick radius c, up to which the body is virgin.
     """
 
     profile: Profile
@@ -66,6 +70,13 @@ class Worn:
     change: Function
     change_slope: Function
     breaks: tuple[float, ...] = ()
+    depth: float = 1.0
+    border: float | None = None
+
+    @property
+    def stick_border(self) -> float:
+        """Radius up to which the contact sticks."""
+        return self.stick_radius if self.border is None else self.border
 
     def height(self, radius: ArrayLike) -> FloatArray:
         """Return the worn profile f(r)."""
@@ -87,22 +98,23 @@ class Worn:
 
     def pressure(self, radius: ArrayLike) -> FloatArray:
         """Return p(r) / (E* d0 / a0), zero outside the contact."""
-        c = self.stick_radius
+        c, border = self.stick_radius, self.stick_border
 
         def slope(x: FloatArray) -> FloatArray:
             inside = np.maximum(x, c)
             return np.asarray(self.profile.image_slope(x) + np.where(x > c, self.change_slope(inside), 0.0))
 
-        near = np.array([c * (1.0 + 1e-13), self.edge * (1.0 - 1e-13)])
-        jump, last = self.change(near)
-        gap = 1.0 - float(self.profile.image(near[1:])[0]) - float(last)
+        near = np.array([border * (1.0 - 1e-13), border * (1.0 + 1e-13), self.edge * (1.0 - 1e-13)])
+        before, after, last = self.change(near)
+        jump = float(after) - (float(before) if border > c else 0.0)
+        gap = self.depth - float(self.profile.image(near[2:])[0]) - float(last)
         return pressure(
             slope,
             radius,
             self.edge,
             edge_gap=gap if abs(gap) > 1e-9 else 0.0,
             breaks=(c, *self.breaks, *self.profile.breaks),
-            jumps=[(c, float(jump))],
+            jumps=[(border, jump)],
             tolerance=1e-8,
         ).value
 

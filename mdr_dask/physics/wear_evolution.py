@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numba import njit
@@ -65,15 +65,17 @@ class Problem(Protocol):
     def panels(self) -> Panels:
         """Return the panels between the inner border and the edge."""
 
-    @property
-    def inner_radius(self) -> float:
+    def inner(self, unknowns: FloatArray) -> float:
         """Return the radius of the inner border."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
 
-    def radii(self, edge: float) -> FloatArray:
-        """Return the radii of the nodes."""
+    def memory(self, past: Sequence[Any], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
+
+    def moment(self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Any]) -> Moment:
+        """Return the moment that a solved step ends in."""
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return gathered - known - theta * rate at every node, and the conditions at the edge."""
@@ -81,15 +83,45 @@ class Problem(Protocol):
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return its derivatives by the nodal unknowns."""
 
-    def gathered(self, unknowns: FloatArray) -> FloatArray:
-        """Return what the radii have gathered."""
-
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return the quantity in d0 whose step error is controlled."""
 
 
+class FixedBorder:
+    """What problems with a fixed inner border share: the memory of a radius is a value of a function on the panels."""
+
+    panels: Panels
+    inner_radius: float
+
+    def inner(self, unknowns: FloatArray) -> float:
+        """Return the radius of the inner border."""
+        return self.inner_radius
+
+    def gathered(self, unknowns: FloatArray) -> FloatArray:
+        """Return what the radii have gathered."""
+        raise NotImplementedError
+
+    def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
+        memories = np.array([moment.gathered for moment in past])
+        squares = np.array([moment.edge for moment in past]) ** 2 - self.inner_radius**2
+        last = self.panels.nodes.size - 1
+
+        def known(unknowns: FloatArray) -> FloatArray:
+            lengths = (unknowns[last] ** 2 - self.inner_radius**2) / squares
+            return interpolate_weighted(self.panels, memories, shares, lengths)
+
+        return known
+
+    def moment(
+        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
+    ) -> Moment:
+        """Return the moment that a solved step ends in."""
+        return Moment(time, unknowns, self.gathered(unknowns), float(unknowns[self.panels.nodes.size - 1]))
+
+
 @dataclass(frozen=True, eq=False)
-class PartialSlip:
+class PartialSlip(FixedBorder):
     """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and a.
 
     `virgin` are the coefficients of a cubic spline of ln s0 over ln(r^2 - c^2) from `first` on, `step` apart.
@@ -213,76 +245,13 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
     return PartialSlip(profile, c, panels, table[0], table[1] - table[0], coefficients, eta)
 
 
-@dataclass(frozen=True, eq=False)
-class GrossSlip:
-    """Slip everywhere; unknowns g at the nodes but the last, a, and the depth d if the force is given."""
-
-    profile: Profile
-    panels: Panels
-    force: float | None = None
-    inner_radius: float = 0.0
-
-    def radii(self, edge: float) -> FloatArray:
-        """Return the radii of the nodes for an edge."""
-        return np.asarray(edge * np.sqrt(self.panels.nodes))
-
-    def start(self) -> Moment:
-        """Return the virgin contact."""
-        g = self.profile.image(self.radii(1.0))
-        tail = [1.0] if self.force is None else [1.0, 1.0]
-        return Moment(0.0, np.append(g[:-1], tail), np.zeros_like(g), 1.0)
-
-    def split(self, unknowns: FloatArray) -> tuple[FloatArray, float, float]:
-        """Return g at all nodes, the edge and the depth."""
-        last = self.panels.nodes.size - 1
-        depth = 1.0 if self.force is None else float(unknowns[-1])
-        return np.append(unknowns[:last], depth), float(unknowns[last]), depth
-
-    def pressure(self, unknowns: FloatArray) -> FloatArray:
-        """Return p at the nodes."""
-        g, a, _ = self.split(unknowns)
-        return self.panels.outer @ g / a
-
-    def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return f at the nodes."""
-        return self.panels.full @ self.split(unknowns)[0]
-
-    def normal_force(self, unknowns: FloatArray) -> float:
-        """Return F_N = 2 int_0^a (d - g) dx."""
-        g, a, depth = self.split(unknowns)
-        # int_0^1 u dz / sqrt(z) is the last row of the full half-integral of u sqrt(1 - z)
-        return float(np.pi * a * self.panels.full[-1] @ ((depth - g) * np.sqrt(1.0 - self.panels.nodes)))
-
-    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return f - f0 - known - theta p; then continuity at the edge, and the force."""
-        gain = self._gain(unknowns)
-        rows = np.append((gain - known - theta * self.pressure(unknowns))[:-1], gain[-1])
-        return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
-
-    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives by g."""
-        _, a, _ = self.split(unknowns)
-        size = unknowns.size
-        nodes = self.panels.nodes.size
-        result = np.zeros((size, size))
-        result[:nodes, :nodes] = self.panels.full
-        result[: nodes - 1, :nodes] -= theta / a * self.panels.outer[:-1]
-        if self.force is not None:
-            result[-1, :nodes] = -np.pi * a * self.panels.full[-1] * np.sqrt(1.0 - self.panels.nodes)
-        return result
-
-    def gathered(self, unknowns: FloatArray) -> FloatArray:
-        """Return the worn depth."""
-        gain = self._gain(unknowns)
-        gain[-1] = 0.0
-        return gain
-
-    def _gain(self, unknowns: FloatArray) -> FloatArray:
-        g, a, _ = self.split(unknowns)
-        return np.asarray(self.panels.full @ g - self.profile.height(self.radii(a)))
-
-
-def march(problem: Problem, end: float, tolerance: float) -> list[Moment]:
+def march(
+    problem: Problem,
+    end: float,
+    tolerance: float,
+    start: Moment | None = None,
+    stops: Callable[[Any], bool] = lambda moment: False,
+) -> list[Any]:
     """Advance a contact until the first step that ends at or beyond a time.
 
     The steps do not depend on that time, so that a longer march repeats the shorter one exactly.
@@ -295,20 +264,24 @@ def march(problem: Problem, end: float, tolerance: float) -> list[Moment]:
         Time to reach.
     tolerance : float
         Error of f in d0 allowed in one step.
+    start : Moment, optional
+        Where to start from, in place of the virgin contact.
+    stops : callable, Moment -> bool
+        Tells after which moment to stop before that time.
 
     Returns
     -------
     list of Moment
-        All accepted steps; the first is the virgin contact.
+        All accepted steps; the first is the start.
 
     Raises
     ------
     NotConvergedError
         If a step fails however short it is.
     """
-    history = [_settled(problem)]
+    history = [settled(problem) if start is None else start]
     step = 0.1 * tolerance
-    while history[-1].time < end:
+    while history[-1].time < end and not stops(history[-1]):
         if len(history) > _MOST_STEPS:
             raise NotConvergedError(f"the wear law needed more than {_MOST_STEPS} steps")
         moment, error = _try_step(problem, history, step)
@@ -354,13 +327,12 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
     return total
 
 
-def _settled(problem: Problem) -> Moment:
+def settled(problem: Problem) -> Any:
     """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
     virgin = problem.start()
-    unknowns = _newton(problem, virgin.unknowns, 0.0, lambda edge: np.zeros(problem.panels.nodes.size))
-    if unknowns is None:
-        return virgin
-    return Moment(0.0, unknowns, problem.gathered(unknowns), float(unknowns[problem.panels.nodes.size - 1]))
+    known = problem.memory([virgin], np.zeros(1))
+    unknowns = _newton(problem, virgin.unknowns, 0.0, known)
+    return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
 
 
 def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tuple[Moment | None, float]:
@@ -371,40 +343,32 @@ def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tup
     shares = _backward_shares([time, *(m.time for m in past)])
     theta, shares = 1.0 / shares[0], -shares[1:] / shares[0]
     guess = _extrapolate(time, history[-1 : -order - 2 : -1])
-
-    memories = np.array([moment.gathered for moment in past])
-    squares = np.array([moment.edge for moment in past]) ** 2 - problem.inner_radius**2
-
-    def known(edge: float) -> FloatArray:
-        lengths = (edge**2 - problem.inner_radius**2) / squares
-        return interpolate_weighted(problem.panels, memories, shares, lengths)
-
+    known = problem.memory(past, shares)
     unknowns = _newton(problem, guess, theta, known)
     if unknowns is None:
         unknowns = _newton(problem, past[0].unknowns.copy(), theta, known)
     if unknowns is None:
         return None, np.inf
-    nodes = problem.panels.nodes.size
-    edge = float(unknowns[nodes - 1])
     gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
-    return Moment(time, unknowns, problem.gathered(unknowns), edge), float(gap) * _ERROR_SHARE[order - 1]
+    return problem.moment(time, unknowns, theta, known(unknowns), past), float(gap) * _ERROR_SHARE[order - 1]
 
 
 def _newton(
-    problem: Problem, guess: FloatArray, theta: float, known: Callable[[float], FloatArray]
+    problem: Problem, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
 ) -> FloatArray | None:
-    """Solve one step; columns of the edge and the depth are differences, renewed once."""
+    """Solve one step; columns of the edge and what follows it are differences, renewed twice."""
     nodes = problem.panels.nodes.size
     unknowns = guess.copy()
     columns = np.empty((unknowns.size, unknowns.size - nodes + 1))
     for iteration in range(_MOST_ITERATIONS):
-        residual = problem.residual(unknowns, theta, known(unknowns[nodes - 1]))
+        past = known(unknowns)
+        residual = problem.residual(unknowns, theta, past)
         matrix = problem.jacobian(unknowns, theta)
         for column in range(nodes - 1, unknowns.size):
             if iteration < 3:
                 moved = unknowns.copy()
                 moved[column] += 1e-7
-                shifted = problem.residual(moved, theta, known(moved[nodes - 1]))
+                shifted = problem.residual(moved, theta, known(moved))
                 columns[:, column - nodes + 1] = (shifted - residual) / 1e-7
             matrix[:, column] = columns[:, column - nodes + 1]
         if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
@@ -413,10 +377,10 @@ def _newton(
         if not solve_in_place(matrix, change):
             return None
         unknowns += change
-        if not unknowns[nodes - 1] > problem.inner_radius:
+        if not unknowns[nodes - 1] > problem.inner(unknowns) >= 0.0:
             return None
         if np.max(np.abs(change)) < _LAST_CHANGE:
-            return unknowns if np.all(np.isfinite(problem.gathered(unknowns))) else None
+            return unknowns if np.all(np.isfinite(problem.worn(unknowns))) else None
     return None
 
 

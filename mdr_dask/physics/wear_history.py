@@ -151,7 +151,7 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
 
 
 def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
-    depth = block.depth if block.depth is not None else _depth(grid, image, float(block.force or 0.0))
+    depth = block.depth if block.depth is not None else grid.depth(image, float(block.force or 0.0))
     if image[-1] <= depth:
         raise ValueError(
             f"the contact reaches beyond the table or grid, which ends at r = {grid.nodes[-1]:.4g} contact radii; "
@@ -161,18 +161,6 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
     free = np.maximum(1.0 - load / block.slip_share, 0.0)
     power = 2.0 * float(np.trapezoid(load * free, grid.nodes))
     return _State(image, depth, grid.pressure(image, depth), grid.inverse @ free, power)
-
-
-def _depth(grid: UniformGrid, image: FloatArray, force: float) -> float:
-    """Return the depth under which the image carries a force, by Newton steps on a convex function."""
-    depth = float(np.max(image[: max(int(grid.nodes.size * 0.4), 2)]))
-    for _ in range(60):
-        slope = 2.0 * max(grid.edge(image, depth), grid.spacing)
-        change = (force - grid.force(image, depth)) / slope
-        depth += change
-        if abs(change) < 1e-13:
-            break
-    return depth
 
 
 def _record(

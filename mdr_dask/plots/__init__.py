@@ -7,7 +7,7 @@ from importlib import import_module
 from mdr_dask.plots.base import Plot
 
 #: Modules of this room that hold ``PLOTS``.
-SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "wear")
+SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "wear")
 
 
 def available(model: str) -> dict[str, Plot]:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_TRACES = 30
+EXPONENT = 0.7  # Hurst exponent of Figs. 4.1-4.4
 BEFORE = 0.3  # of the width of the figure that shows the steady state before the jump
 
 
@@ -83,7 +84,10 @@ def draw_velocities(series: Mapping[str, xr.Dataset]) -> Figure:
     from matplotlib import colormaps
     from matplotlib.figure import Figure
 
-    data = first_of(pick(series, "velocity"), "velocity")
+    data = pick(series, "velocity")
+    if "hurst" in data.dims:
+        data = data.sel(hurst=EXPONENT, method="nearest")
+    data = first_of(data, "velocity")
     data = data if "velocity" in data.dims else data.expand_dims("velocity")
     figure = Figure(figsize=(9.5, 3.8), layout="constrained")
     left, right = figure.subplots(1, 2)
@@ -97,7 +101,10 @@ def draw_velocities(series: Mapping[str, xr.Dataset]) -> Figure:
         case = data.isel(velocity=k)
         time, trace, _ = _trace(case.sel(relaxation_times=case["relaxation_times"] <= 3))
         right.plot(time, trace, lw=0.9, color=colormaps["viridis"](k / max(speed.size - 1, 1)))
-    right.set_title(f"$v_1$ from {speed.min():.2g} (dark) to {speed.max():.2g} m/s (light)", fontsize=10)
+    right.set_title(
+        f"$v_1$ from {speed.min():.2g} (dark) to {speed.max():.2g} m/s (light), H = {float(data['hurst']):.3g}",
+        fontsize=10,
+    )
     _labelled(right, r"$(t - t_0)/\tau$", r"$\mu/\nabla z$")
     return figure
 
@@ -106,30 +113,42 @@ def draw_fit(series: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the relaxing part with the exponential fitted to it (Fig. 4.3)."""
     from matplotlib.figure import Figure
 
-    from mdr_dask.fit.kinetics import FITS
+    from mdr_dask.fit.kinetics import relaxation_curves
 
     data = first_of(next(iter(series.values())))
-    found = next(fit for fit in FITS if fit.name == "kinetics").compute({"": data}).isel(case=0)
+    found = relaxation_curves(data)
     slope = data["rms_slope"]
     trace, error = _mean((data["friction_coefficient"] - data["friction_coefficient_after"]) / slope)
-    scale = float(slope.mean())
     time, window = data["relaxation_times"].values, float(found["window"])
-    figure = Figure(figsize=(8.8, 3.8), layout="constrained")
+    inside = found["t"].values
+    figure = Figure(figsize=(10, 4), layout="constrained")
     for axes, logarithmic in zip(figure.subplots(1, 2), (False, True), strict=True):
         axes.plot(time, trace, "k.", ms=4, label="mean of the realisations")
         axes.fill_between(time, trace - error, trace + error, color="0.6", alpha=0.5, label="standard error")
-        inside = np.geomspace(time[1], window, 200)
-        curve = float(found["amplitude"]) / scale * np.exp(-float(found["rate"]) * inside)
-        ends = float(found["rate_low"]), float(found["rate_high"])
-        axes.plot(inside, curve, "C3", label=f"$b$ = {float(found['rate']):.2f} ({ends[0]:.2f}, {ends[1]:.2f})")
+        low, high = found["one_low"], found["one_high"]
+        axes.fill_between(inside, low, high, color="C3", alpha=0.25, lw=0)
+        ends = ", ".join(f"{float(found[f'rate_{end}']):.2f}" for end in ("low", "high"))
+        axes.plot(inside, found["one"], "C3", label=f"$b$ = {float(found['rate']):.2f} ({ends}), weights 1/variance")
+        alike = ", ".join(f"{float(found[f'rate_unweighted_{end}']):.2f}" for end in ("low", "high"))
+        axes.plot(
+            inside,
+            found["alike"],
+            "C1-.",
+            lw=1,
+            label=f"$b$ = {float(found['rate_unweighted']):.2f} ({alike}), all times alike",
+        )
         law = float(found["law_rate"])
-        axes.plot(inside, curve[0] * np.exp(-law * inside), "C0--", lw=1, label=f"$b$ = {law:.2f} of the law")
+        start = float(found["one"][0])
+        axes.plot(inside, start * np.exp(-law * inside), "C0--", lw=1, label=f"$b$ = {law:.2f} of eq. 4.12")
+        if "two" in found:
+            axes.plot(inside, found["two"], "C2:", lw=1.5, label="two exponentials")
         axes.axvline(window, color="0.7", lw=0.8, label="end of the window")
         axes.axhline(0, color="0.8", lw=0.6)
-        axes.set_xlim((time[0], time[-1]) if logarithmic else (0, 2 * window))
+        axes.set_xlim((time[0], time[-1]) if logarithmic else (0, 1.2 * window))
         axes.set_xscale("log" if logarithmic else "linear")
         _labelled(axes, r"$(t - t_0)/\tau$", r"$(\mu - \mu_2)/\nabla z$")
     figure.axes[0].legend(frameon=False, fontsize=8)
+    figure.suptitle("red band and brackets: 95 %, bootstrap over the realisations", fontsize=9)
     return figure
 
 

@@ -159,6 +159,9 @@ def _coordinates(template: Template) -> dict[str, _Coordinate]:
     for name, (value, unit, meaning) in _numbers(template.series.parameters, "").items():
         if name not in found and name not in template.sizes:
             found[name] = ((), np.array(value), _attrs(unit, meaning))
+    for name, unit in models.load(template.campaign.model).units(template.series.parameters).items():
+        if name in found:
+            found[name][2]["units"] = unit
     return found
 
 
@@ -217,6 +220,7 @@ def _series_attributes(template: Template) -> dict[str, Any]:
         ],
         "outputs": [output.name for output in template.outputs],
         "blocks": dict(template.chunks),
+        **({"notes": list(template.notes)} if template.notes else {}),
     }
 
 

@@ -125,6 +125,18 @@ def test_a_value_does_not_depend_on_its_block() -> None:
     assert together.solves == 3
 
 
+def test_neighbours_change_a_film_within_its_accuracy_and_whatever_the_block() -> None:
+    speeds = np.geomspace(1e-12, 1e-11, 6)
+    films = ("central_film", "discretisation_error")
+    alone = compute(block(films, {"speed_parameter": speeds}))
+    swept = compute(block(films, {"speed_parameter": speeds}, **CHECKED, neighbours=True))
+    np.testing.assert_allclose(swept.values["central_film"], alone.values["central_film"], rtol=2e-3)
+    assert np.all(swept.values["discretisation_error"] <= 1e-3)
+    part = compute(block(films, {"speed_parameter": speeds[4:2:-1], "neighbours": [True, False]}))
+    assert part.values["central_film"][0, 0] == swept.values["central_film"][4, 0]
+    assert part.values["central_film"][1, 0] == alone.values["central_film"][3, 0]
+
+
 def test_extremes_are_data_not_warnings() -> None:
     """No case of an absurd box raises, warns, or gives a film that is not positive."""
     random = np.random.default_rng(3)

@@ -63,6 +63,7 @@ def test_units_in_the_store(write, parameters, units):
     data = filled(write(parameters, f"outputs: [{', '.join(names)}]\n"))
     assert tuple(data[name].attrs["units"] for name in names) == units
     assert data.radius.attrs["units"] == "1"
+    assert "path" not in data.coords or data["path"].attrs["units"] == "1"
 
 
 def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
@@ -75,7 +76,21 @@ def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
     assert main(["run", str(path)]) == 0
     streams = capsys.readouterr()
     assert streams.out == "wear.zarr: 48 done, 0 failed\n"
-    assert " 2 solves in 2 blocks" in streams.err
+    assert " 2 solves in 1 blocks" in streams.err
+
+
+def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
+    """G* U0 / (mu E*) takes 6 values in 18 combinations; the blocks hold all the cases of each of them."""
+    varied = STEEL.replace("load: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa, 400 GPa]")
+    varied = varied.replace("90 GPa", "[80 GPa, 160 GPa, 320 GPa]").replace("friction: 0.6", "friction: [0.4, 0.8]")
+    varied = varied.replace("wear_coefficient: 1e-4", "wear_coefficient: [1e-5, 1e-4]").replace("1 um", "0.5 um")
+    path = write(varied + "  cycles: [1e3, 1e4]\n  method: exact\n")
+    assert main(["run", str(path), "--dry-run"]) == 0
+    assert "6 solves remain after sharing, in 1 blocks" in capsys.readouterr().out
+    assert main(["run", str(path)]) == 0
+    streams = capsys.readouterr()
+    assert streams.out == "wear.zarr: 72 done, 0 failed\n"
+    assert " 6 solves in 1 blocks" in streams.err
 
 
 def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsys):

@@ -114,14 +114,22 @@ def test_gross_slip_is_a_message_and_nothing_else_fails():
     assert np.isfinite(result.values["wear_volume"][0, 0])
 
 
-@pytest.mark.parametrize("method", ["fast", "exact"])
-def test_constant_force(method):
-    result = run(FrettingWear(stick_radius=0.5, cycles=0.3, method=method, hold="force", cells=60))
-    if method == "fast":
-        assert result.status[0, 0] == Status.FAILED
-        assert "constant depth only" in result.messages[0, 0]
-    else:
-        assert result.values["normal_force"][0, 0] == pytest.approx(4 / 3, rel=1e-4)
+def test_constant_force():
+    """Every method keeps the force; depth and border grow; the limit comes last."""
+    names = ("normal_force", "block_depth", "stick_border", "wear_volume", "worn_profile", "worn_image", "pressure")
+    found = {}
+    for method in ("fast", "exact", "literal", "limit"):
+        parameters = FrettingWear(stick_radius=0.5, cycles=0.3, method=method, hold="force", cells=60, points=21)
+        result = run(parameters, outputs=names)
+        assert result.status[0, 0] == Status.DONE
+        assert result.values["normal_force"][0, 0] == pytest.approx(4 / 3, rel=1e-3)
+        assert np.all(np.isfinite(result.values["worn_profile"]))
+        found[method] = {name: float(np.ravel(result.values[name][0, 0])[0]) for name in names}
+    for name, tolerance in (("block_depth", 2e-3), ("stick_border", 5e-3)):
+        for method in ("fast", "literal"):
+            assert found[method][name] == pytest.approx(found["exact"][name], abs=tolerance)
+        assert found["limit"][name] > found["exact"][name]
+    assert found["limit"]["wear_volume"] > 10 * found["exact"]["wear_volume"]
 
 
 def test_history_of_amplitudes():
@@ -199,3 +207,13 @@ def test_distinct_and_seconds_are_cheap_estimates():
     assert MODEL.distinct is not None
     assert MODEL.distinct(block) == 3
     assert MODEL.seconds(block) > 0
+
+
+def test_an_evolution_that_cannot_be_followed_is_a_value():
+    """Under constant force the border leaves a flat bottom next to gross slip too fast for the panels."""
+    result = run(
+        FrettingWear(shape=PowerShape(exponent=5.0), stick_radius=0.05, cycles=1.0, method="exact", hold="force")
+    )
+    assert result.status[0, 0] == Status.NOT_CONVERGED
+    assert "the wear law could not be advanced" in result.messages[0, 0]
+    assert np.isnan(result.values["wear_volume"][0, 0])

@@ -8,7 +8,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics import ehl_grid, film
-from mdr_dask.physics.line_contact import LineContact, LineSolution, extrapolate, line_contact, solve
+from mdr_dask.physics.ehl_levels import extrapolate
+from mdr_dask.physics.line_contact import LineContact, LineSolution, line_contact, solve
 
 E_STAR = 115.385e9
 CHECKED = (2.0452e-5, 1e-11, 5007.0)

@@ -116,8 +116,8 @@ def _coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
 
 
 def _units(parameters: FrettingWear) -> dict[str, str]:
-    """Return the units of a dimensionless campaign: every output is a pure number."""
-    return {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
+    """Return the units of a dimensionless campaign: every output is a pure number, and so is the path."""
+    return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 
 def _distinct_solutions(block: Block[FrettingWear]) -> int:
@@ -145,10 +145,14 @@ def _seconds(block: Block[FrettingWear]) -> float:
     cells = block.parameters.cells
     if on_grid(block.parameters):
         return 0.01 + (3e-7 if method == "literal" else 1e-7) * cells**3 * size
-    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * (1e-3 / tolerance) ** 0.6}[method]
+    accurate = (1e-3 / tolerance) ** 0.6
+    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.1 * accurate}[method]
+    if block.parameters.hold == "force":
+        each = {"limit": 0.5 * accurate, "fast": 0.03, "exact": accurate}[method]
     numbers, _ = reduce_block(block)
-    solves = size if method == "fast" else _count(numbers.exponent, numbers.level)
-    return float(0.01 + each * solves + 2e-3 * size)
+    moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
+    solves = moments if method == "fast" else _count(numbers.exponent, numbers.level)
+    return float(0.01 + each * solves + 2e-3 * moments + 5e-5 * size)
 
 
 OUTPUTS = (
@@ -177,13 +181,16 @@ OUTPUTS = (
 
 MODEL = Model(
     name="fretting_wear",
-    version=2,
+    version=3,
     summary="fretting wear of bodies of revolution: limit, fast, exact and literal",
     parameters=FrettingWear,
     outputs=OUTPUTS,
     compute=compute,
     seconds=_seconds,
-    whole=("cycles", "path", "wear_coefficient", "hardness"),
+    whole=(
+        *("cycles", "path", "wear_coefficient", "hardness"),
+        *("friction", "amplitude", "shear_modulus", "modulus", "depth", "load", "curvature_radius", "angle"),
+    ),
     coordinates=_coordinates,
     distinct=_distinct_solutions,
     units=_units,

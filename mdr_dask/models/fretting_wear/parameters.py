@@ -64,9 +64,7 @@ class FrettingWear(Parameters):
     )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
     tolerance: float = quantity("1", "error of the exact profile wanted, in eta d0", ge=1e-5, le=1e-1, default=1e-3)
-    cells: int = quantity(
-        "1", "cells of the grid of method literal, of hold force and of histories", ge=20, le=2000, default=200
-    )
+    cells: int = quantity("1", "cells of the grid of method literal and of histories", ge=20, le=2000, default=200)
     friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
     wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)

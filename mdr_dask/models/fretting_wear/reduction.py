@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.models.base import Block
+from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.fretting_wear.parameters import EXPONENTS, FrettingWear, PowerShape, TableShape
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
     amount = _column(block, "path" if sliding else "cycles")
     columns = (n, amount, _column(block, "xi"), length, height, force)
     n, amount, xi, length, height, force = (np.broadcast_to(c[:, None], level.shape) for c in columns)
-    return Numbers(n, level, advance, amount * advance, xi, length, height, force), messages
+    return Numbers(n, canonical(level), advance, canonical(amount * advance), xi, length, height, force), messages
 
 
 def _first_contact(

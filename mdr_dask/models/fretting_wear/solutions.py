@@ -81,7 +81,7 @@ def solve_each(
 
 def solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
     """Return how many solutions a task takes: one for all cycles if they are moments of one march, or none matter."""
-    marched = task.method == "sliding" or (task.method == "exact" and task.hold == "depth" and not task.blocks)
+    marched = task.method == "sliding" or (task.method == "exact" and not task.blocks)
     return 1 if marched or task.method == "limit" else len(wanted)
 
 
@@ -120,7 +120,7 @@ def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) ->
         float(numbers.level[place]),
         "sliding" if parameters.path is not None else parameters.method,
         parameters.hold,
-        parameters.tolerance if parameters.method == "exact" else 0.0,
+        parameters.tolerance if _has_tolerance(parameters) else 0.0,
         parameters.cells if on_grid(parameters) else 0,
         blocks,
     )
@@ -128,8 +128,12 @@ def _task(parameters: FrettingWear, numbers: Numbers, place: tuple[int, int]) ->
 
 def on_grid(parameters: FrettingWear) -> bool:
     """Tell whether a case is solved on the uniform grid."""
-    loaded = parameters.hold == "force" or bool(parameters.history)
-    return parameters.path is None and (parameters.method == "literal" or loaded)
+    return parameters.path is None and (parameters.method == "literal" or bool(parameters.history))
+
+
+def _has_tolerance(parameters: FrettingWear) -> bool:
+    """Tell whether the tolerance matters: under constant force the limit depends on the way to it."""
+    return parameters.method == "exact" or (parameters.method == "limit" and parameters.hold == "force")
 
 
 def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact]:
@@ -144,9 +148,11 @@ def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact
         return gross(
             profile, [path for path, _ in wanted], constant_force=task.hold == "force", tolerance=task.tolerance
         )
-    if task.blocks or task.hold == "force":
-        return [_loaded(task, profile, cycles) for cycles, _ in wanted]
+    if task.blocks:
+        return [_loaded(task, profile)] * len(wanted)
     stick = profile.inside(task.level)
+    if task.hold == "force":
+        return _forced(task, profile, stick, wanted)
     if task.method == "limit":
         return [wear.limit(profile, stick)] * len(wanted)
     if task.method == "fast":
@@ -156,16 +162,28 @@ def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact
     return [literal(profile, stick, cycles, cells=task.cells) for cycles, _ in wanted]
 
 
-def _loaded(task: Task, profile: Profile, cycles: float) -> Loaded:
-    """Run the blocks of a history, or one block at constant force."""
+def _forced(task: Task, profile: Profile, stick: float, wanted: list[tuple[float, float]]) -> Sequence[Contact]:
+    """Solve a task under constant force."""
+    from mdr_dask.physics.wear_force import exact_forced, limit_forced
+    from mdr_dask.physics.wear_force_fast import fast_forced
+    from mdr_dask.physics.wear_literal import literal
+
+    if task.method == "limit":
+        return [limit_forced(profile, stick, task.tolerance)] * len(wanted)
+    if task.method == "fast":
+        return [fast_forced(profile, stick, cycles, xi) for cycles, xi in wanted]
+    if task.method == "exact":
+        return list(exact_forced(profile, stick, [cycles for cycles, _ in wanted], task.tolerance))
+    return [literal(profile, stick, cycles, cells=task.cells, constant_force=True) for cycles, _ in wanted]
+
+
+def _loaded(task: Task, profile: Profile) -> Loaded:
+    """Run the blocks of a history."""
     from mdr_dask.physics.transforms import gauss
     from mdr_dask.physics.wear_history import LoadBlock, history
 
     if task.method in {"limit", "fast"}:
-        raise ValueError(
-            f"the {task.method} method holds for one block at constant depth only; use method exact for hold force "
-            "and for histories"
-        )
+        raise ValueError(f"the {task.method} method holds for one block of load only; use method exact for histories")
     abscissa, weight = gauss(64)
     first = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
     blocks = [
@@ -175,7 +193,7 @@ def _loaded(task: Task, profile: Profile, cycles: float) -> Loaded:
             depth=factor if task.hold == "depth" else None,
             force=first * factor if task.hold == "force" else None,
         )
-        for path, amplitude, factor in (task.blocks or ((cycles, 1.0, 1.0),))
+        for path, amplitude, factor in task.blocks
     ]
     deepest = max(block.depth or 1.0 for block in blocks) if task.hold == "depth" else 2.0
     return Loaded(history(profile, blocks, cells=task.cells, reach=min(1.7 * deepest, profile.largest_radius)))
@@ -207,7 +225,8 @@ def _of_one(contact: Worn | Record | Slid, name: str, x: FloatArray) -> float | 
     from mdr_dask.physics.wear import Worn
     from mdr_dask.physics.wear_exact import Slid
 
-    plain = {"stick_border": "stick_radius", "discretisation_error": "error"}.get(name, name)
+    border = "stick_border" if isinstance(contact, Worn) else "stick_radius"
+    plain = {"stick_border": border, "discretisation_error": "error"}.get(name, name)
     if name not in {"worn_profile", "worn_image", "pressure", "worn_depth"}:
         return float(getattr(contact, plain, 1.0))  # what has no depth of its own keeps the first one
     if isinstance(contact, Worn):

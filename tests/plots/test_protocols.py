@@ -1,0 +1,75 @@
+"""The figure of protocols, drawn from Datasets made by hand: every curve stands for what is in the data."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask.errors import DataError
+from mdr_dask.plots import available
+from mdr_dask.plots.protocols import draw_protocols
+
+TIMES = np.array([0.0, 1.0, 2.0, 4.0])
+BASE = {
+    "length": 0.002,
+    "rms_roughness": 2e-6,
+    "shear_modulus": 1e7,
+    "relaxation_time": 1e-3,
+    "normal_force": 0.1,
+    "velocity": 0.05,
+    "relaxation_times": list(TIMES),
+}
+
+
+def dataset(protocol: dict[str, object], axes: tuple[dict[str, object], ...] = (), **changes: object) -> xr.Dataset:
+    generator = np.random.default_rng(1)
+    lines = 1 + 0.1 * generator.random((3, TIMES.size))
+    outputs = {
+        "friction_coefficient": (("realisation", "relaxation_times"), lines),
+        "rms_slope": (("realisation",), np.full(3, 0.5)),
+    }
+    for name in ("before", "jump", "after"):
+        outputs[f"friction_coefficient_{name}"] = (("realisation",), generator.random(3))
+    parameters = json.dumps(BASE | {"protocol": protocol} | changes)
+    return xr.Dataset(outputs, {"relaxation_times": TIMES}, {"parameters": parameters, "axes": list(axes)})
+
+
+def curves(figure: object, column: int, columns: int) -> list[np.ndarray]:
+    panels = figure.axes[column::columns]
+    return [np.array(panel.get_lines()[0].get_xydata()) for panel in panels]
+
+
+def test_one_column_a_series_with_friction_velocity_and_load() -> None:
+    steps = {"shape": "steps", "times": [0.0, 2e-3], "velocities": [0.1, 0.05], "forces": [0.2, 0.3]}
+    swing = {"shape": "oscillation", "amplitude": 0.02, "frequency": 250.0}
+    data = {"one": dataset(steps), "two": dataset(swing)}
+    figure = draw_protocols(data)
+    friction, velocity, load = curves(figure, 0, 2)
+    wanted = (data["one"]["friction_coefficient"] / 0.5).mean("realisation").values
+    assert np.allclose(friction[3:, 1], wanted)
+    assert np.allclose(friction[3:, 0], TIMES)
+    late = velocity[velocity[:, 0] > 2, 1], load[load[:, 0] > 2, 1]
+    assert np.allclose(late[0], 0.05)
+    assert np.allclose(late[1], 0.3)
+    assert velocity[0, 1] == 0.05
+    _, velocity, _ = curves(figure, 1, 2)
+    assert velocity[:, 1].max() == pytest.approx(0.07, rel=1e-4)  # 400 points a curve
+
+
+def test_an_axis_stands_at_its_first_value() -> None:
+    axis = {"path": "protocol.velocity", "name": "v", "dim": "v", "values": [0.2, 0.3], "labels": None}
+    ramp = {"shape": "ramp", "duration": 4e-3, "velocity": None}
+    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], "v")
+    _, velocity, _ = curves(draw_protocols({"": data}), 0, 1)
+    assert velocity[-1, 1] == pytest.approx(0.2)
+
+
+def test_missing_outputs_are_named() -> None:
+    data = dataset({"shape": "jump"}).drop_vars("friction_coefficient_before")
+    with pytest.raises(DataError, match="expected the outputs friction_coefficient"):
+        draw_protocols({"": data})
+
+
+def test_it_is_registered() -> None:
+    assert "protocols" in available("velocity_jump")
