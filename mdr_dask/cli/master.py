@@ -47,8 +47,8 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
-    SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by --keep, which
-    is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
+    SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by
+    --keep, which is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
