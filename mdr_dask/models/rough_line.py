@@ -18,10 +18,12 @@ FINEST = 64  # oversampling beyond which `auto` gives up
 SAFETY = 3.0  # see docs/friction.md for how honest it makes the estimate
 CLOSE = 0.005  # change of the depth between grids that is taken from the tangent
 SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
-QUICK = (4, 8)  # grids that cases go along from node to node, compared with every other node
+RESTART = 4  # oversampling of the sweeps over what is left
+SAMPLED = 4  # oversampling of a line that cases go along from node to node
+REFINEMENTS = (1, 2, 4, 8, 16)  # of its cells where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
-QUICK_SAFETY, QUICK_MEMORY = 0.5, 0.05  # of the last change between grids and of the one before; see docs/friction.md
-FEW = 10  # Nyquist points in contact that are too few to go from node to node
+QUICK_SAFETY, QUICK_MEMORY = 0.8, 0.08  # of the last change between grids and of the one before; see docs/friction.md
+FEW = 10  # nodes in contact that are too few to go from node to node
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,10 @@ class Line:
     def amplitudes(self) -> FloatArray:
         """Return the amplitudes of its harmonics."""
         return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
+
+    def sampled(self, accuracy: float) -> bool:
+        """Return whether the cubic cells of `auto` are left to the cases that are too hard from node to node."""
+        return self.coefficient == 0 and accuracy >= QUICKEST
 
     def slope(self) -> float:
         """Return the spectral rms slope."""
@@ -111,12 +117,12 @@ class Task:
         """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
         if self.scheme != "hermite":
             return self._swept(accuracy, 1)
-        if self.line.coefficient > 0 or accuracy < QUICKEST:
+        if not self.line.sampled(accuracy):
             return self._swept(accuracy, 2)
         steady, error = self._sampled(accuracy)
         wanting = ~(error <= accuracy)
         if np.any(wanting):
-            found, error[wanting] = self.only(wanting)._swept(accuracy, QUICK[-1] // 2)
+            found, error[wanting] = self.only(wanting)._swept(accuracy, RESTART)
             steady = steady.replaced(wanting, found)
         return steady, error
 
@@ -125,22 +131,22 @@ class Task:
         from mdr_dask.physics import sampled, sliding
 
         steady, error = sliding.unsolved(self.loads.size), np.full(self.loads.size, np.inf)
-        left, coarse = np.flatnonzero(sliding.valid(self.reaches, self.loads)), None
+        left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
+        height, slope = self.nodes(SAMPLED, "hermite")
+        line = sampled.nodes(height, slope, 1, True)
+        coarse = sampled.begin(height, slope, self.reaches[left], self.loads[left])
         change = np.zeros(left.size)
-        for oversampling in QUICK:
+        for refinement in REFINEMENTS:
             if not left.size:
                 break
-            some, nodes = self.only(left), self.nodes(oversampling, "hermite")
-            if coarse is None:
-                coarse = sampled.settle(*nodes, 2, some.reaches, some.loads)
-            fine = sampled.settle(*nodes, 1, some.reaches, some.loads, coarse)
+            fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
             found, now = sampled.extrapolated(coarse, fine)
             # two grids may agree by chance, hardly three
             estimate = np.maximum(QUICK_SAFETY * now, QUICK_MEMORY * change) + fine.doubt
-            many = fine.contact_fraction * self.line.points > FEW
+            many = fine.contact_fraction * height.size * refinement > FEW
             error[left] = np.where(many & np.isfinite(estimate), estimate, np.inf)
             steady = steady.replaced(left, found)
-            still = ~(error[left] <= accuracy) & ~(fine.contact_fraction * self.line.points <= FEW)
+            still = ~(error[left] <= accuracy)
             left, coarse, change = left[still], fine.only(still), now[still]
         return steady, error
 

@@ -25,6 +25,7 @@ IntArray = NDArray[np.intp]
 ACCURACY = 0.01  # where the campaign does not say
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
+POINT_LINE, POINT_SAMPLED = 2e-7, 2.5e-8  # and for every Nyquist point gone along from node to node
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 
 
@@ -347,6 +348,9 @@ def seconds(block: Block[SlidingFriction]) -> float:
     for (line, oversampling, scheme), members in cases.groups():
         numbers = np.stack([cases.reaches[members], cases.loads[members]])
         solves = np.unique(numbers, axis=1).shape[1]
+        if oversampling == "auto" and scheme == "hermite" and line.sampled(block.accuracy or ACCURACY):
+            total += len(block.realisations) * line.points * (POINT_LINE + solves * POINT_SAMPLED)
+            continue
         grid = 4 if oversampling == "auto" else int(oversampling)
         checks = 3.5 if oversampling == "auto" or "discretisation_error" in block.outputs else 1
         nodes = line.points * grid

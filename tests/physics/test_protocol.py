@@ -40,7 +40,7 @@ def bowl(nodes: int, coefficient: float = 10.0) -> Line:
 def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
     step = cells / nodes / reach
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
-    return np.unique(np.concatenate([grown, np.arange(grown[-1] + step, last, step), TIMES[TIMES < last]]))
+    return np.unique(np.concatenate([grown, np.arange(grown[-1] + step, last, step), TIMES[last > TIMES]]))
 
 
 def jump(
