@@ -223,9 +223,9 @@ def _line_results(
     found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
     if not FROM_JUMP.intersection(block.outputs):
         return [kinetics.CONVERGED] * len(cases), found
-    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+    turned = roughness.turns(block.seed, realisation, cases[0].points // 2)
     nodes = cases[0].points * cases[0].oversampling
-    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+    line = roughness.turned_line(amplitude, turned, nodes), roughness.turned_line(amplitude, turned, nodes, 1)
     accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
     resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
     jumps = _solve(cases, *line, resolutions, False)

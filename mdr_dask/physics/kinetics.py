@@ -38,7 +38,7 @@ MESSAGES = {
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
-NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
+NEWTON = 0.03  # of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer
 EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
 LONG, STRAY = 15.0, 0.02  # relaxation times after which friction has come so near to its end, of all its changes
@@ -111,11 +111,13 @@ def _turned(
     """Write the columns of a profile that begins at cell `best`."""
     n = height.size
     for i in range(n + 2):
-        heights[i], slopes[i] = height[(best + i) % n] - top, slope[(best + i) % n]
+        node = best + i if best + i < n else best + i - n
+        node = node if node < n else node - n
+        heights[i], slopes[i] = height[node] - top, slope[node]
     area[0] = square[0] = 0.0
     for i in range(n + 1):
         enter, leave = slopes[i] / n, slopes[i + 1] / n
-        before, after = slope[(best + i - 1) % n] / n, slope[(best + i + 2) % n] / n
+        before, after = slopes[i - 1 if i > 0 else n - 1] / n, slopes[i + 2 if i < n else 2] / n
         area[i + 1] = area[i] + (0.5 * (heights[i + 1] + heights[i]) + (enter - leave) / 12) / n
         # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
         bend = (leave**2 - before**2 - after**2 + enter**2) / 24
@@ -128,7 +130,8 @@ def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
     n = height.size
     best, best_place, highest = 0, 0.0, -np.inf
     for i in range(n):
-        after, enter, leave = height[(i + 1) % n], slope[i] / n, slope[(i + 1) % n] / n
+        following = i + 1 if i + 1 < n else 0
+        after, enter, leave = height[following], slope[i] / n, slope[following] / n
         place = 0.0
         if enter > 0 > leave:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
@@ -261,7 +264,8 @@ def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, 
     finer = STEPS_PER_DECADE / per_decade
     first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
     scale = max(abs(change), NEGLIGIBLE * load)
-    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, NEWTON * scale, last)
+    close = NEWTON * min(1.0, (8 / per_decade) ** 2)
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, close * scale, last)
 
 
 def velocity_jump(
