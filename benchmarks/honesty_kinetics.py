@@ -11,7 +11,12 @@ from mdr_dask.models.base import Block
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump
 from mdr_dask.physics import roughness
 
-TRACE = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after", "friction_coefficient")
+TRACE = (
+    "friction_coefficient_before",
+    "friction_coefficient_jump",
+    "friction_coefficient_after",
+    "friction_coefficient",
+)
 
 
 def solve(hurst, points, force, reach, change, realisation, oversampling, steps, outputs):
