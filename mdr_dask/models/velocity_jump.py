@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
     from mdr_dask.physics.protocol_forces import Line
 
-SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
+SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 2.7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
 FLAT = 1e-12  # of the largest height
-SAFETY = 1.25  # see docs/kinetics.md for how honest it makes the estimate
+SAFETY = 1.4  # see docs/kinetics.md for how honest it makes the estimate
 SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of the line
 
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
