@@ -47,9 +47,12 @@ def ratios(body, realisations):
     return friction / (math.sqrt(2) * slope * laws.indenter(XI)), result.status
 
 
-if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
+def main(realisations=20):
     print("xi      " + " ".join(f"{xi:7.3g}" for xi in XI))
     for name, body in BODIES.items():
-        ratio, status = ratios(body, count)
+        ratio, status = ratios(body, int(realisations))
         print(f"{name:8}" + " ".join(f"{value:7.3f}" for value in ratio), f"({np.mean(status == 1):.0%} of cases)")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

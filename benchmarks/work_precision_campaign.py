@@ -52,6 +52,7 @@ GRIDS = {
 LINES, MOST_SEEDS, TRUTH = (4, 16, 64, 256), 4, 1000
 WANTED = (0.1, 0.05, 0.02)
 SEED_OF_TRUTH = 99
+FLOOR = 1e-5  # of errors drawn: full contact is exact on any grid of cubic cells
 
 
 def run(folder, scene, scheme, grid, realisations, seed, accuracy=0.05):
@@ -117,21 +118,21 @@ def draw(tables, path):
     ):
         for legend, rows in grids.items():
             errors, _, seconds = zip(*rows, strict=True)
-            axes.loglog(seconds, errors, "o-", ms=4, lw=1, label=legend)
+            axes.loglog(seconds, np.maximum(errors, FLOOR), "o-", ms=4, lw=1, label=legend)
         for accuracy, _, error, lines, seconds in accuracies:
-            axes.loglog([seconds], [error], "k*", ms=10)
+            axes.loglog([seconds], [max(error, FLOOR)], "k*", ms=10)
             axes.annotate(
                 f"{accuracy:.0%}, {lines:.0f} lines",
-                (seconds, error),
+                (seconds, max(error, FLOOR)),
                 fontsize="x-small",
                 xytext=(5, 5),
                 textcoords="offset points",
             )
-        axes.set(title=scene, xlabel="processor time of the campaign (s)")
+        axes.set(title=scene, xlabel="processor time of the campaign (s)", xlim=(0.02, 3), ylim=(FLOOR, 1))
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel("rms relative error of mean μ")
     figure.axes[0].plot([], [], "k*", ms=10, label="accuracy and until: both chosen")
-    figure.axes[0].legend(fontsize="x-small")
+    figure.axes[2].legend(*figure.axes[0].get_legend_handles_labels(), fontsize="x-small", loc="lower left")
     figure.savefig(path, dpi=120)
 
 

@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import xarray as xr
 from test_execute import digests
 
 from mdr_dask.cli import main
+from mdr_dask.execute import Progress
 
 CAMPAIGN = """\
 name: small
@@ -62,6 +64,45 @@ def test_dry_run_says_what_would_be_done_and_writes_nothing(campaign, capsys):
     assert main(["run", str(campaign), "--dry-run"]) == 0
     assert "8 cases x 8 realisations = 64 results" in capsys.readouterr().out
     assert not Path("results").exists()
+
+
+def test_dry_run_says_how_far_rounds_may_go(campaign, capsys):
+    until = "realisations: {at_least: 8, at_most: 24, until: {friction_coefficient: 1 %}}"
+    campaign.write_text(CAMPAIGN.replace("realisations: 8", until))
+    assert main(["run", str(campaign), "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "8 cases x 8 to 24 realisations = 64 to 192 results" in said
+    assert "64 to 192 solves remain after sharing" in said
+    assert "from the first round to the last one" in said
+    assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["realisations"], document["at_most"], document["results"]) == (8, 24, 64)
+
+
+def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
+    table = Path(__file__).parent / "data/dma/freq_user_raw.csv"
+    material = f"material: {{dma_table: {{file: {table}, table_temperature: 298 K, poisson_ratio: 0.5}}}}"
+    text = CAMPAIGN.replace("shear_modulus: 10 MPa", material).replace("  relaxation_time: 1 ms\n", "")
+    campaign.write_text(text + "outputs: [friction_coefficient, material_error]\n")
+    note = r"rms error 1\.6% in G', 4\.2% in G'', largest 8\.7% at 62\.8 rad/s"
+    for command in (["check"], ["run", "--dry-run"]):
+        assert main([*command, str(campaign)]) == 0
+        assert re.search(note, capsys.readouterr().out)
+    assert main(["check", str(campaign), "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert re.search(note, row["notes"][0])
+    assert main(["run", str(campaign), "--quiet"]) == 0
+    kept = xr.open_zarr("results/small.zarr")
+    assert re.search(note, kept.attrs["notes"][0])
+    np.testing.assert_allclose(kept["material_error"], np.hypot(0.016, 0.042) / np.sqrt(2), rtol=0.03)
+
+
+def test_time_left_goes_by_the_work_and_not_by_the_results():
+    from mdr_dask.cli.progress import describe
+
+    early = Progress(total=100, done=90, estimated=10.0, finished=2.0, wall_seconds=3.0)
+    assert describe(early) == "90 of 100 results, 0 failed, 30 a second, 12 s left"
+    assert describe(Progress(total=100)) == "0 of 100 results, 0 failed"
 
 
 def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):

@@ -23,6 +23,7 @@ INTERVAL = (0.025, 0.975)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
 FLAT = 0.05  # of the largest friction that still counts as plateau
+BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
 
@@ -157,6 +158,7 @@ def _zone_one(data: xr.Dataset) -> dict[str, xr.Variable]:
     residual = logs[0] - offset[0] - slope[0] * x
     return {
         **_interval("alpha", -slope, "exponent of the force in zone 1"),
+        **_measure("alpha_stated", laws.alpha(float(data["hurst"])), "H / (1 + H)"),
         **_interval("beta", np.exp(offset), "factor of the law of zone 1"),
         **_measure("rms_error", float(np.sqrt(np.mean(residual**2))), "rms relative deviation from the law"),
         **_measure("loads", len(points), "number of loads in zone 1"),
@@ -226,6 +228,7 @@ def _interpolation(data: xr.Dataset) -> dict[str, xr.Variable]:
     stated = model(np.array([[laws.alpha(hurst), np.log(laws.BETA)]]))[0]
     return {
         **_interval("alpha", constants[:, 0], "exponent of the force in the interpolation law"),
+        **_measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
         **_interval("beta", np.exp(constants[:, 1]), "factor of the interpolation law"),
         **_law_error(model(constants[:1])[0], means[0], "", "constants fitted"),
         **_law_error(stated, means[0], "_stated", "with H / (1 + H) and 1.6"),
@@ -245,25 +248,55 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
     raise FitError("expected a store with an indenter: cone, parabola or power")
 
 
+def _half_width(data: xr.Dataset) -> Any:
+    """Return the half width of the static contact without roughness."""
+    coefficient, exponent = _body(data)
+    load = data["normal_force"] / (4 * data["shear_modulus"])
+    return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
+
+
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
     _require_kelvin(data)
-    coefficient, exponent = _body(data)
-    load = data["normal_force"] / (4 * data["shear_modulus"])
-    width = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     low = laws.indenter_low(
-        width, data["velocity"], data["relaxation_time"], data["shear_modulus"], data["normal_force"], slope
+        _half_width(data),
+        data["velocity"],
+        data["relaxation_time"],
+        data["shear_modulus"],
+        data["normal_force"],
+        slope,
     )
     return xr.DataArray(low / (np.sqrt(2) * slope))
 
 
+def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
+    """Return where the law of rough indenters is meant to hold.
+
+    The body is flat against the roughness and pressed in by more than its rms height, and the velocity is not beyond
+    that of the largest friction, where region IV begins.
+    """
+    coefficient, exponent = _body(data)
+    width = _half_width(data)
+    flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= BODY * slope
+    deep = coefficient * width**exponent >= data["rms_roughness"]
+    within = flat & deep
+    if "velocity" in data["friction_coefficient"].dims:
+        mean = data["friction_coefficient"].mean("realisation").fillna(0.0)
+        within = within & (data["velocity"] <= mean.idxmax("velocity"))
+    return xr.DataArray(within)
+
+
 def _indenter(data: xr.Dataset) -> dict[str, xr.Variable]:
-    """Fit the exponent of eq. 3.40."""
+    """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
     slope = spectral_slope(data)
-    friction, xi = _table(data, data["friction_coefficient"] / (np.sqrt(2) * slope), indenter_xi(data, slope))
-    used = np.any(friction > 0, axis=1) & np.isfinite(xi) & (xi > 0)
+    columns = data["friction_coefficient"] / (np.sqrt(2) * slope), indenter_xi(data, slope)
+    friction, xi, within = _table(data, *columns, within_indenter_law(data, slope))
+    used = (within > 0) & np.any(friction > 0, axis=1) & np.isfinite(xi) & (xi > 0)
+    count = _measure("cases", int(used.sum()), "number of cases within the law")
     if np.count_nonzero(used) < 3:
-        raise FitError(f"expected three cases with friction, got {int(used.sum())}")
+        errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
+        names = ["exponent", "exponent_low", "exponent_high", *errors]
+        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | count
     logs, xi = np.log(_resampled(friction[used])), xi[used]
 
     def model(constants: FloatArray) -> FloatArray:
@@ -276,6 +309,7 @@ def _indenter(data: xr.Dataset) -> dict[str, xr.Variable]:
         **_interval("exponent", np.exp(constants[:, 0]), "exponent of the law of rough indenters"),
         **_law_error(np.exp(model(constants[:1])[0]), np.exp(logs[0]), "", "exponent fitted"),
         **_law_error(np.exp(stated), np.exp(logs[0]), "_stated", "exponent 1.5"),
+        **count,
     }
 
 

@@ -22,6 +22,8 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 MOST_STEPS = 400_000
 CELLS = 0.5  # of the line passed in a step, at 12 steps per decade
 PART = 0.01  # of a ramp or a period in a step, at 12 steps per decade
+NEARLY = 1e-2  # of a step
+ROUNDING = 1e-12  # of a time
 FIRST = 1e-3  # of the time in which a step's cells are passed, or of the relaxation time
 
 
@@ -214,6 +216,7 @@ def trace(
     from mdr_dask.physics.protocol_kernels import CONVERGED, NOT_CONVERGED
 
     before, parts = course
+    times = _snapped(times, np.array([part.start for part in parts]) / scale.time)
     none = np.full(times.size, np.nan)
     state, depth, status = steady_start(line, solid, abs(before) * scale.reach, force / scale.force)
     if status != CONVERGED:
@@ -232,6 +235,7 @@ def trace(
         if moments is None:
             sentence = f"the course needs more than {MOST_STEPS} steps: fewer points or a shorter time"
             return Trace(np.nan, np.nan, np.nan, none, none, none, np.nan, NOT_CONVERGED, sentence)
+        moments = _with_times(moments, times)
         way, speed, load = part.at(moments * scale.time)
         travels = travel + way / scale.length
         found = follow_line(line, solid, moments, travels, speed * scale.reach, load / scale.force, state, depth)
@@ -242,7 +246,7 @@ def trace(
     moment, drag, depths = (np.concatenate(column) for column in zip(*columns, strict=True))
     loads = np.empty(times.size)
     for part in parts:
-        inside = times * scale.time >= part.start
+        inside = times >= part.start / scale.time
         loads[inside] = part.at(times[inside] * scale.time)[2] / scale.force
     return Trace(
         float(first.drag[0]),
@@ -256,12 +260,30 @@ def trace(
     )
 
 
+def _snapped(times: FloatArray, starts: FloatArray) -> FloatArray:
+    """Return times of which those that miss the start of a piece by rounding alone are at it."""
+    nearest = starts[np.abs(times[:, None] - starts).argmin(axis=1)]
+    found: FloatArray = np.where(np.abs(times - nearest) <= ROUNDING * nearest, nearest, times)
+    return found
+
+
+def _with_times(moments: FloatArray, times: FloatArray) -> FloatArray:
+    """Return moments among which are the times wanted; moments of the course that nearly meet one make way."""
+    inside = times[(times > moments[0]) & (times < moments[-1])]
+    if inside.size == 0:
+        return moments
+    gaps = np.diff(moments)
+    near = inside[np.clip(np.searchsorted(inside, moments), 0, inside.size - 1)]
+    before = inside[np.clip(np.searchsorted(inside, moments) - 1, 0, inside.size - 1)]
+    room = NEARLY * np.append(gaps[0], gaps)
+    apart = (np.abs(moments - near) > room) & (np.abs(moments - before) > room)
+    apart[[0, -1]] = True
+    return np.union1d(moments[apart], inside)
+
+
 def _at(times: FloatArray, moments: FloatArray, values: FloatArray) -> FloatArray:
-    """Interpolate linearly; at a jump the value after it."""
-    right = np.clip(np.searchsorted(moments, times, side="right"), 1, moments.size - 1)
-    width = moments[right] - moments[right - 1]
-    part = np.where(width > 0, (times - moments[right - 1]) / np.where(width > 0, width, 1), 1.0)
-    found: FloatArray = values[right - 1] + np.clip(part, 0, 1) * (values[right] - values[right - 1])
+    """Return the values at times that are moments; at a jump the value after it."""
+    found: FloatArray = values[np.searchsorted(moments, times, side="right") - 1]
     return found
 
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -16,19 +15,17 @@ from mdr_dask.models.base import Block, FloatArray, Model, Output, Parameters, R
 from mdr_dask.models.indenter import Indenter, Plane
 from mdr_dask.models.material import Material, fit_notes
 from mdr_dask.models.profile_file import ProfileFile
+from mdr_dask.models.rough_line import FINEST, Line, Task
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.sliding import Scheme, Steady
+    from mdr_dask.physics.sliding import Scheme
 
 IntArray = NDArray[np.intp]
 
 ACCURACY = 0.01  # where the campaign does not say
-FINEST = 64  # oversampling beyond which `auto` gives up
-SAFETY = 3.0  # see docs/friction.md for how honest it makes the estimate
-CLOSE = 0.005  # change of the depth between grids that is taken from the tangent
-SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
+POINT_LINE, POINT_SAMPLED = 2e-7, 2.5e-8  # and for every Nyquist point gone along from node to node
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 
 
@@ -95,122 +92,6 @@ OUTPUTS = (
 )
 
 
-@dataclass(frozen=True)
-class _Line:
-    """What fixes a line but for its phases, in units of its length and rms height."""
-
-    hurst: float
-    points: int
-    rolloff: float
-    longest: float
-    coefficient: float  # of the indenter c |x|^n, 0 for a plane
-    exponent: float
-
-    def amplitudes(self) -> FloatArray:
-        """Return the amplitudes of its harmonics."""
-        return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
-
-    def slope(self) -> float:
-        """Return the spectral rms slope."""
-        return _slope(self)
-
-
-@lru_cache(maxsize=32)
-def _amplitudes(modes: int, hurst: float, rolloff: float, longest: float) -> FloatArray:
-    from mdr_dask.physics import roughness
-
-    return roughness.amplitudes(modes, hurst, rolloff, longest)
-
-
-@lru_cache(maxsize=1024)
-def _slope(line: _Line) -> float:
-    from mdr_dask.physics import roughness
-
-    return roughness.spectral_slope(line.amplitudes())
-
-
-@dataclass(frozen=True)
-class _Task:
-    """Cases on one realisation of a line, in units of its length and rms height."""
-
-    line: _Line
-    turned: NDArray[np.complex128]  # exp(i phi) of its harmonics
-    scheme: Scheme
-    reaches: FloatArray  # v tau / L
-    loads: FloatArray  # F_N / (4 G L h)
-    contact: bool  # whether fraction and slope of the contact are wanted
-
-    def only(self, cases: NDArray[np.bool_]) -> _Task:
-        """Return some of the cases."""
-        return replace(self, reaches=self.reaches[cases], loads=self.loads[cases])
-
-    def nodes(self, oversampling: int, scheme: Scheme) -> tuple[FloatArray, FloatArray]:
-        """Return heights and slopes of the roughness on a grid; a scheme without slopes gets the heights again."""
-        from mdr_dask.physics import roughness
-
-        amplitude, count = self.line.amplitudes(), self.line.points * oversampling
-        height = roughness.turned_line(amplitude, self.turned, count)
-        slope = roughness.turned_line(amplitude, self.turned, count, 1) if scheme == "hermite" else height
-        if self.line.coefficient == 0:
-            return height, slope
-        return np.append(height, height[0]), np.append(slope, slope[0])
-
-    def solve(
-        self, nodes: tuple[FloatArray, FloatArray], scheme: Scheme, near: Steady | None = None, close: float = 0.0
-    ) -> Steady:
-        """Solve the cases on a grid, beginning near a solution on another one."""
-        from mdr_dask.physics import sliding
-
-        height, slope = nodes
-        guesses = None if near is None else near.depth
-        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
-        coefficient, exponent = self.line.coefficient, self.line.exponent
-        if coefficient == 0:
-            return sliding.steady_sliding(height, slope, *cases)
-        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
-
-    def on_grid(self, oversampling: int) -> Steady:
-        """Solve the cases on one grid, without an estimate of the error."""
-        return self.solve(self.nodes(oversampling, self.scheme), self.scheme)
-
-    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
-        """Solve the cases on one grid and estimate the relative error of their friction."""
-        steady = self.on_grid(oversampling)
-        return steady, self._error(steady, self.nodes(2 * oversampling, "hermite"))
-
-    def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
-        """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
-        oversampling = 2 if self.scheme == "hermite" else 1
-        steady = self.on_grid(oversampling)
-        finer = self.nodes(2 * oversampling, "hermite")
-        error = self._error(steady, finer)
-        while oversampling < FINEST:
-            wanting = ~(error <= accuracy) & (steady.status == 0)
-            if not np.any(wanting):
-                break
-            oversampling *= 2
-            some = self.only(wanting)
-            found = some.solve(finer, self.scheme, steady.only(wanting))
-            finer = self.nodes(2 * oversampling, "hermite")
-            error[wanting] = some._error(found, finer)
-            steady = steady.replaced(wanting, found)
-        return steady, error
-
-    def _error(self, steady: Steady, finer: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Compare a solution with the exact sweep over cubic cells of half the width.
-
-        The finer grid has a small part of the error of the coarser one; a coarser grid has many times its error.
-        """
-        return SAFETY * _difference(steady, self.solve(finer, "hermite", steady, CLOSE))
-
-
-def _difference(one: Steady, other: Steady) -> FloatArray:
-    with np.errstate(all="ignore"):
-        change = np.abs(one.drag / other.drag - 1)
-    # where a coarse grid has no solution nothing is known
-    return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
-
-
 def _number(block: Block[SlidingFriction], path: str) -> FloatArray:
     return np.asarray(block.column(path), dtype=np.float64)
 
@@ -230,11 +111,11 @@ class _Cases:
     reaches: FloatArray  # v tau / L
     height: FloatArray  # h
     length: FloatArray  # L
-    keys: list[tuple[_Line, int | str, Scheme]]
+    keys: list[tuple[Line, int | str, Scheme]]
 
-    def groups(self) -> Iterator[tuple[tuple[_Line, int | str, Scheme], IntArray]]:
+    def groups(self) -> Iterator[tuple[tuple[Line, int | str, Scheme], IntArray]]:
         """Yield the cases that share rough lines and grids."""
-        members: dict[tuple[_Line, int | str, Scheme], list[int]] = {}
+        members: dict[tuple[Line, int | str, Scheme], list[int]] = {}
         for j in np.flatnonzero(self.height > 0):
             members.setdefault(self.keys[j], []).append(int(j))
         for key, indices in members.items():
@@ -270,7 +151,7 @@ def _cases(block: Block[SlidingFriction]) -> _Cases:
         canonical(coefficient).tolist(),
         exponent.tolist(),
     )
-    lines = [_Line(*numbers) for numbers in zip(*columns, strict=True)]
+    lines = [Line(*numbers) for numbers in zip(*columns, strict=True)]
     keys = list(zip(lines, block.column("oversampling").tolist(), block.column("scheme").tolist(), strict=True))
     return _Cases(canonical(loads), canonical(reaches), height, length, keys)
 
@@ -358,7 +239,7 @@ def compute(block: Block[SlidingFriction]) -> Result:
 class _Group:
     """Cases that share rough lines and grids, each different one once."""
 
-    line: _Line
+    line: Line
     oversampling: int | str
     scheme: Scheme
     members: IntArray
@@ -369,7 +250,7 @@ class _Group:
     scale: FloatArray  # slope of a line of unit length and height
 
     @classmethod
-    def of(cls, line: _Line, oversampling: int | str, scheme: Scheme, members: IntArray, cases: _Cases) -> _Group:
+    def of(cls, line: Line, oversampling: int | str, scheme: Scheme, members: IntArray, cases: _Cases) -> _Group:
         """Collect the different cases among the members."""
         numbers = np.stack([cases.reaches[members], cases.loads[members]])
         (reaches, loads), which = np.unique(numbers, axis=1, return_inverse=True)
@@ -384,7 +265,7 @@ class _Group:
         block = answer.block
         turned = roughness.turns(block.seed, realisation, self.line.points // 2)
         contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
-        task = _Task(self.line, turned, self.scheme, self.reaches, self.loads, contact)
+        task = Task(self.line, turned, self.scheme, self.reaches, self.loads, contact)
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
         if self.oversampling == "auto":
             steady, error = task.to_accuracy(accuracy)
@@ -467,6 +348,9 @@ def seconds(block: Block[SlidingFriction]) -> float:
     for (line, oversampling, scheme), members in cases.groups():
         numbers = np.stack([cases.reaches[members], cases.loads[members]])
         solves = np.unique(numbers, axis=1).shape[1]
+        if oversampling == "auto" and scheme == "hermite" and line.sampled(block.accuracy or ACCURACY):
+            total += len(block.realisations) * line.points * (POINT_LINE + solves * POINT_SAMPLED)
+            continue
         grid = 4 if oversampling == "auto" else int(oversampling)
         checks = 3.5 if oversampling == "auto" or "discretisation_error" in block.outputs else 1
         nodes = line.points * grid

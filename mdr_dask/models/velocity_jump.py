@@ -290,10 +290,11 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
         if found[-1].status != CONVERGED:
             status = Status.NOT_CONVERGED if found[-1].status == NOT_CONVERGED else Status.FAILED
             return {}, status, found[-1].message
-    fine, coarse = found
+    fine, _ = found
     steep = case.rms_roughness / case.length
     load = case.normal_force / scale.force
-    largest = max(float(np.max(np.abs(fine.drag))), 1e-300)
+    friction, coarser = (np.append(along.drag / along.load, along.at / along.load_at) for along in found)
+    largest = max(float(np.max(np.abs(friction))), 1e-300)
     return (
         {
             "friction_coefficient_before": fine.before / load * steep,
@@ -302,7 +303,7 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
             "friction_coefficient": fine.drag / fine.load * steep,
             "indentation_depth": fine.depth * case.rms_roughness,
             "rms_slope": roughness.spectral_slope(amplitude) * steep,
-            "discretisation_error": float(np.max(np.abs(fine.drag - coarse.drag))) / largest,
+            "discretisation_error": float(np.max(np.abs(friction - coarser))) / largest,
         },
         Status.DONE,
         "",

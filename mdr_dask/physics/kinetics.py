@@ -90,41 +90,56 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float
     top : float
         Height of that point.
     """
-    n = height.size
     best, place, top = _summit(height, slope)
-    index = (np.arange(n + 2) + best) % n
-    height, slope = height[index] - top, slope[index]
-    enter, leave = slope[:-1] / n, slope[1:] / n
-    area = 0.5 * (height[1:] + height[:-1]) + (enter - leave) / 12
-    squared = enter**2
-    bend = (np.roll(slope[:-2], -1) ** 2 - np.roll(slope[:-2], 1) ** 2) / (24 * n**2)
-    bend = np.append(bend, [bend[0], bend[1]])
-    # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
-    square = 0.5 * (squared + leave**2) + bend[:-1] - bend[1:]
-    profile = Profile(
-        height,
-        slope,
-        np.concatenate([[0.0], np.cumsum(area)]) / n,
-        np.concatenate([[0.0], np.cumsum(square)]) * n,
-        1 / n,
-        place / n,
-        True,
-    )
-    return profile, top
+    n = height.size
+    heights, slopes, area, square = np.empty((4, n + 2))
+    _turned(height, slope, best, top, heights, slopes, area, square)
+    return Profile(heights, slopes, area, square, float(n), 1 / n, place / n, True), top
 
 
+@njit(nogil=True, cache=True)
+def _turned(
+    height: FloatArray,
+    slope: FloatArray,
+    best: int,
+    top: float,
+    heights: FloatArray,
+    slopes: FloatArray,
+    area: FloatArray,
+    square: FloatArray,
+) -> None:
+    """Write the columns of a profile that begins at cell `best`."""
+    n = height.size
+    for i in range(n + 2):
+        heights[i], slopes[i] = height[(best + i) % n] - top, slope[(best + i) % n]
+    area[0] = square[0] = 0.0
+    for i in range(n + 1):
+        enter, leave = slopes[i] / n, slopes[i + 1] / n
+        before, after = slope[(best + i - 1) % n] / n, slope[(best + i + 2) % n] / n
+        area[i + 1] = area[i] + (0.5 * (heights[i + 1] + heights[i]) + (enter - leave) / 12) / n
+        # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
+        bend = (leave**2 - before**2 - after**2 + enter**2) / 24
+        square[i + 1] = square[i] + (0.5 * (enter**2 + leave**2) + bend) * n
+
+
+@njit(nogil=True, cache=True)
 def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
     """Return the cell of the highest point, where in the cell it is, 0..1, and its height."""
     n = height.size
-    after = np.roll(height, -1)
-    enter, leave = slope / n, np.roll(slope, -1) / n
-    b, c = 3 * (after - height) - 2 * enter - leave, enter + leave - 2 * (after - height)
-    with np.errstate(all="ignore"):
-        place = -enter / (b - np.sqrt(np.maximum(b * b - 3 * enter * c, 0)))
-    place = np.where((enter > 0) & (leave < 0), np.nan_to_num(place), 0.0).clip(0, 1)
-    peak = height + place * (enter + place * (b + place * c))
-    best = int(np.argmax(peak))
-    return best, float(place[best]), float(peak[best])
+    best, best_place, highest = 0, 0.0, -np.inf
+    for i in range(n):
+        after, enter, leave = height[(i + 1) % n], slope[i] / n, slope[(i + 1) % n] / n
+        place = 0.0
+        if enter > 0 > leave:
+            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
+            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            b, c = b * place * place, c * place**3
+        else:
+            b, c = 0.0, 0.0
+        peak = height[i] + place * enter + b + c
+        if peak > highest:
+            best, best_place, highest = i, place, peak
+    return best, best_place, highest
 
 
 @njit(nogil=True, cache=True)
@@ -133,7 +148,7 @@ def _settle(
 ) -> tuple[Patches, bool]:
     """Find the steady state at a load, from a depth near it."""
     nothing = np.empty(0)
-    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
+    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0, np.zeros(1, np.int64))
     start, end = np.empty(floor.size), np.empty(floor.size)
     places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
@@ -171,7 +186,13 @@ def _settle(
     for k in range(pressed.size):
         pressed[k] = at[0] + height_at(profile, end[k])[0]
     return Patches(
-        start[: pressed.size].copy(), end[: pressed.size].copy(), pressed, pressed.size, at[0], reach
+        start[: pressed.size].copy(),
+        end[: pressed.size].copy(),
+        pressed,
+        pressed.size,
+        at[0],
+        reach,
+        np.zeros(1, np.int64),
     ), converged
 
 
@@ -394,7 +415,7 @@ def _relax(
 def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float, depth: float) -> Patches:
     """Return the steady state at a depth."""
     nothing = np.empty(0)
-    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0)
+    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0, np.zeros(1, np.int64))
     start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(SUMS)
     places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
@@ -404,7 +425,7 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
     pressed = np.empty(found)
     for k in range(found):
         pressed[k] = depth + height_at(profile, end[k])[0]
-    return Patches(start[:found].copy(), end[:found].copy(), pressed, found, depth, reach)
+    return Patches(start[:found].copy(), end[:found].copy(), pressed, found, depth, reach, np.zeros(1, np.int64))
 
 
 def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:

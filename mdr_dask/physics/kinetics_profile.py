@@ -13,8 +13,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 ROOT_STEPS = 60
+CLOSE = 1e-5  # of a cell: a step of Newton after which the next one is below rounding
+NEARBY = 8  # patches to look at one by one before halving
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS = range(6)
 SUMS = 6
 
@@ -28,6 +31,12 @@ def compiled(function: Kernel) -> Kernel:
     return cast(Kernel, compile_it(function))
 
 
+def inlined(function: Kernel) -> Kernel:
+    """Compile a function into its callers: handing over a profile, word by word, would take most of its time."""
+    compile_it = njit(nogil=True, cache=True, _nrt=False, forceinline=True)  # type: ignore[call-overload]
+    return cast(Kernel, compile_it(function))
+
+
 class Profile(NamedTuple):
     """A profile of cubic cells, from the cell of its highest point on where it is periodic.
 
@@ -37,8 +46,8 @@ class Profile(NamedTuple):
         Height into the elastomer and its derivative at the nodes.
     area, square : array, same shape
         Integrals of the height and of the slope squared up to each node.
-    cell : float
-        Length of a cell.
+    cells, cell : float
+        Number of cells of a line, and the length of one.
     origin : float
         Highest point, in the first cell, where a turn begins.
     periodic : bool
@@ -49,13 +58,17 @@ class Profile(NamedTuple):
     slope: FloatArray
     area: FloatArray
     square: FloatArray
+    cells: float
     cell: float
     origin: float
     periodic: bool
 
 
 class Patches(NamedTuple):
-    """Where the elements touch: patch k from ``start[k]`` to ``end[k]``, `count` of them, at one depth and reach."""
+    """Where the elements touch: patch k from ``start[k]`` to ``end[k]``, `count` of them, at one depth and reach.
+
+    ``cursor`` is where one of them was found last.
+    """
 
     start: FloatArray
     end: FloatArray
@@ -63,6 +76,7 @@ class Patches(NamedTuple):
     count: int  # type: ignore[assignment]
     depth: float
     reach: float
+    cursor: IntArray
 
 
 class Course(NamedTuple):
@@ -78,7 +92,7 @@ class Course(NamedTuple):
     stiff: float
 
 
-@compiled
+@inlined
 def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i over 0..1."""
     h = profile.height[i]
@@ -87,24 +101,48 @@ def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
     return h, enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
 
 
-@compiled
+@inlined
 def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
-    y = x / profile.cell
+    y = x * profile.cells
     i = min(max(int(y), 0), profile.height.size - 2)
     y -= i
     c0, c1, c2, c3 = _cubic(profile, i)
     return (
         c0 + y * (c1 + y * (c2 + y * c3)),
-        (c1 + y * (2 * c2 + y * 3 * c3)) / profile.cell,
-        (2 * c2 + 6 * y * c3) / profile.cell**2,
+        (c1 + y * (2 * c2 + y * 3 * c3)) * profile.cells,
+        (2 * c2 + 6 * y * c3) * (profile.cells * profile.cells),
     )
 
 
-@compiled
+@inlined
+def patch_before(patches: Patches, s: float) -> int:
+    """Return the last patch that begins at s or before, or the first one; those near the last one found come first."""
+    low, high = int(patches.cursor[0]), patches.count
+    if patches.start[low] <= s:
+        for _ in range(NEARBY):
+            if low + 1 >= high or patches.start[low + 1] > s:
+                patches.cursor[0] = low
+                return low
+            low += 1
+    else:
+        high, low = low, max(low - NEARBY, 0)
+        if patches.start[low] > s:
+            high, low = low, 0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if patches.start[middle] <= s:
+            low = middle
+        else:
+            high = middle
+    patches.cursor[0] = low
+    return low
+
+
+@inlined
 def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     """Return the height at x, its integral up to x and that of its slope squared."""
-    y = x / profile.cell
+    y = x * profile.cells
     i = min(max(int(y), 0), profile.height.size - 2)
     y -= i
     a, b, c, e = _cubic(profile, i)
@@ -113,11 +151,11 @@ def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
     return (
         a + y * (b + y * (c + y * e)),
         profile.area[i] + area * profile.cell,
-        profile.square[i] + square / profile.cell,
+        profile.square[i] + square * profile.cells,
     )
 
 
-@compiled
+@inlined
 def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
     h0, area0, square0 = integrals_at(profile, start)
@@ -128,28 +166,39 @@ def add_patch(profile: Profile, start: float, end: float, lift: float, reach: fl
     sums[TILT] += h1 - h0
 
 
-@compiled
+@inlined
 def unloading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
-    """Return where lift + p + reach p' falls through zero between low and high."""
-    x = 0.5 * (low + high)
+    """Return where lift + p + reach p' falls through zero between low and high, in one cell."""
+    i = min(max(int(0.5 * (low + high) * profile.cells), 0), profile.height.size - 2)
+    c0, c1, c2, c3 = _cubic(profile, i)
+    far = reach * profile.cells
+    # the force is a cubic itself
+    p, q, r = lift + c0 + far * c1, c1 + 2 * far * c2, c2 + 3 * far * c3
+    left, right = max(low * profile.cells - i, 0.0), min(high * profile.cells - i, 1.0)
+    first, last = left, right
+    end = p + right * (q + right * (r + right * c3))
+    begin = p + left * (q + left * (r + left * c3))
+    y = left + (right - left) * (begin / (begin - end) if begin > 0 > end else 0.5)
     for _ in range(ROOT_STEPS):
-        h, slope, curvature = height_at(profile, x)
-        force = lift + h + reach * slope
+        force = p + y * (q + y * (r + y * c3))
         if force > 0:
-            low = x
+            left = y
         else:
-            high = x
-        falls = slope + reach * curvature
-        step = x - force / falls if falls < 0 else 0.5 * (low + high)
-        if not low < step < high:
-            step = 0.5 * (low + high)
-        if abs(step - x) < 1e-9 * profile.cell:
-            return step
-        x = step
-    return x
+            right = y
+        falls = q + y * (2 * r + 3 * y * c3)
+        step = y - force / falls if falls < 0 else 0.5 * (left + right)
+        if abs(step - y) < CLOSE and falls < 0:
+            y = min(max(step, first), last)
+            break
+        if not left < step < right:
+            step = 0.5 * (left + right)
+        if right - left < 1e-12:
+            break
+        y = step
+    return (i + y) * profile.cell
 
 
-@compiled
+@inlined
 def loading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
     """Return where lift + p + reach p' rises through zero between low and high, by bisection."""
     for _ in range(ROOT_STEPS):

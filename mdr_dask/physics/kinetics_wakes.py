@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.physics.kinetics_profile import ROOT_STEPS, Course, Patches, Profile, compiled, height_at
+from mdr_dask.physics.kinetics_profile import ROOT_STEPS, Course, Patches, Profile, height_at, inlined, patch_before
 
 FloatArray = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube i
 MET = 3e-4  # of a cell: a last Newton step that is not checked
 
 
-@compiled
+@inlined
 def _moment(course: Course, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = course.count - 1
@@ -49,7 +49,7 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     )
 
 
-@compiled
+@inlined
 def _follows(course: Course, t: float) -> float:
     """Return the derivative of the depth at time t by the last depth."""
     last = course.count - 1
@@ -62,7 +62,7 @@ def _follows(course: Course, t: float) -> float:
     return float(y * y * (3 - 2 * y + course.stiff * step * (y - 1)))
 
 
-@compiled
+@inlined
 def _left_from(
     profile: Profile, course: Course, t: float, reach: float, x: float, place: float
 ) -> tuple[float, float, float]:
@@ -94,7 +94,7 @@ def _left_from(
     return best, best_slope, best_gain
 
 
-@compiled
+@inlined
 def left_before(profile: Profile, first: Patches, t: float, reach: float, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
     s = x - reach * t
@@ -102,13 +102,7 @@ def left_before(profile: Profile, first: Patches, t: float, reach: float, x: flo
         s -= np.floor(s - profile.origin)
     elif s < first.start[0]:
         return 0.0, 0.0
-    low, high = 0, first.count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if first.start[middle] <= s:
-            low = middle
-        else:
-            high = middle
+    low = patch_before(first, s)
     fade = np.exp(-t)
     if s <= first.end[low]:
         h, slope, _ = height_at(profile, s)
@@ -117,7 +111,7 @@ def left_before(profile: Profile, first: Patches, t: float, reach: float, x: flo
     return u, -u / first.reach
 
 
-@compiled
+@inlined
 def wake_at(
     profile: Profile,
     first: Patches,
@@ -142,7 +136,7 @@ def wake_at(
     return u, slope, gain
 
 
-@compiled
+@inlined
 def meeting(
     profile: Profile,
     first: Patches,
@@ -177,7 +171,7 @@ def meeting(
     return x, slope, 1 - gain
 
 
-@compiled
+@inlined
 def losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12 * profile.cell:
@@ -191,7 +185,7 @@ def losing(profile: Profile, first: Patches, t: float, reach: float, depth: floa
     return high
 
 
-@compiled
+@inlined
 def write_spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
     now = course.count - 1
@@ -205,7 +199,7 @@ def write_spreads(course: Course, t: float, reach: float, window: float, spreads
         spreads[k] = highest - lowest
 
 
-@compiled
+@inlined
 def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
     """Return the range of the depth while the profile went a distance."""
     k = 0
@@ -215,7 +209,7 @@ def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
     return float(spreads[k])
 
 
-@compiled
+@inlined
 def worth_keeping(
     profile: Profile,
     course: Course,
@@ -238,19 +232,13 @@ def worth_keeping(
     return kept
 
 
-@compiled
+@inlined
 def next_free_place(profile: Profile, first: Patches, t: float, reach: float, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
     s = x - reach * t
     turns = np.floor(s - profile.origin) if profile.periodic else 0.0
     s -= turns
-    low, high = 0, first.count
-    while high - low > 1:
-        middle = (low + high) // 2
-        if first.start[middle] <= s:
-            low = middle
-        else:
-            high = middle
+    low = patch_before(first, s)
     if not first.start[low] <= s <= first.end[low]:
         return x
     until = first.end[low]

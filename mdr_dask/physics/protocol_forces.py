@@ -160,7 +160,7 @@ def _forces(
 
 @njit(nogil=True, cache=True)
 def balance(
-    viscosity: float,
+    weight: float,
     gaps: FloatArray,
     pulls: FloatArray,
     slope: FloatArray,
@@ -173,18 +173,19 @@ def balance(
     force: FloatArray,
     power: FloatArray,
 ) -> tuple[float, float, float]:
-    """Return the rate of the depth that carries the load (of a dashpot), drag and fraction in contact.
+    """Return the rate at which the load is carried, drag and fraction in contact.
 
-    `pulls` are the forces without dashpot of the elements pressed to the line.
+    The force of an element pressed to the line is `pulls` and `weight` times ``rate + reach * slope``: with a dashpot
+    its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, reach 0.
     """
     carried, drag, length = 0.0, 0.0, 0.0
     for turn in range(60):
         for j in range(gaps.size):
-            force[j] = pulls[j] + viscosity * (rate + reach * slope[j])
+            force[j] = pulls[j] + weight * (rate + reach * slope[j])
             power[j] = force[j] * slope[j]
         carried, drag, length = _forces(gaps, force, power, slope, touching, edges, False, first)
-        if viscosity == 0 or length <= 0 or abs(carried - load) <= 1e-11 * load or turn == 59:
+        if length <= 0 or abs(carried - load) <= 1e-11 * load or turn == 59:
             break
-        rate += (load - carried) / (length * viscosity)
+        rate += (load - carried) / (length * weight)
     _forces(gaps, force, power, slope, touching, edges, True, first)
     return rate, drag, length

@@ -77,6 +77,18 @@ class Steady:
         return Steady(**columns)
 
 
+def unsolved(cases: int) -> Steady:
+    """Return what is known of cases before they are solved."""
+    nothing = np.full(cases, np.nan)
+    return Steady(nothing, nothing, nothing, nothing, np.full(cases, INVALID, np.int8))
+
+
+def valid(reaches: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
+    """Return which cases are numbers above zero."""
+    good: NDArray[np.bool_] = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
+    return good
+
+
 @njit(nogil=True, cache=True)
 def _floor(depth: float) -> float:
     """Return the lattice depth at or below a positive depth."""
@@ -302,7 +314,7 @@ def _steady(
     close: float,
 ) -> Steady:
     """Solve the cases that are numbers."""
-    good = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
+    good = valid(reaches, loads)
     good &= bool(np.all(np.isfinite(profile.height)) and np.all(np.isfinite(profile.enter)))
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, INVALID, np.int8)

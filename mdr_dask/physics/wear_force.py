@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 from mdr_dask.physics import wear_evolution as evolution
 from mdr_dask.physics.panels import graded_panels, interpolate
 from mdr_dask.physics.revolution import Profile, bisect
-from mdr_dask.physics.transforms import gauss
 from mdr_dask.physics.wear import Worn, check_stick_radius, worn_height, worn_volume
 from mdr_dask.physics.wear_exact import Fretted
-from mdr_dask.physics.wear_force_evolution import ForcedSlip, Pressed, forced_slip
+from mdr_dask.physics.wear_force_evolution import ForcedSlip, Pressed, forced_slip, virgin_areas
 
 FloatArray = NDArray[np.float64]
 
-#: The border stands as soon as y rises so far in the panel next to it, or a tenth of it and the border would return.
+#: The border stands when y rises so far in the panel next to it, or a tenth of it and the border would return.
 _JUMP = 0.1
+#: Stick radius below which the panels become no finer: the border soon leaves it.
+_NEAREST = 0.1
 #: Error over the distance from a solution with a four times wider tolerance.
 _SAFETY = 3.0
 #: Wider steps than this tolerance asks for do not follow the edge.
@@ -67,7 +68,7 @@ def exact_forced(
     -------
     list of Fretted
         In the order of `cycles`, with depth and border. The error is 3 times the distance from a solution with a
-        four times wider tolerance.
+        four times wider tolerance, or the tolerance if that is more.
 
     Raises
     ------
@@ -79,7 +80,7 @@ def exact_forced(
     check_stick_radius(stick_radius)
     wanted = sorted({float(n) for n in cycles})
     fine, coarse = (_forced(profile, stick_radius, wanted, t) for t in _tolerances(tolerance))
-    judged = {n: replace(fine[n], error=_SAFETY * _distance(fine[n], coarse[n])) for n in wanted}
+    judged = {n: replace(fine[n], error=_error(profile, fine[n], coarse[n], tolerance)) for n in wanted}
     return [judged[float(n)] for n in cycles]
 
 
@@ -95,7 +96,7 @@ def limit_forced(profile: Profile, stick_radius: float, tolerance: float = 1e-4)
     """
     check_stick_radius(stick_radius)
     fine, coarse = (_end(*_jumped(profile, stick_radius, t)) for t in _tolerances(tolerance))
-    return replace(fine, error=_SAFETY * _distance(fine, coarse))
+    return replace(fine, error=_error(profile, fine, coarse, tolerance))
 
 
 def _tolerances(tolerance: float) -> tuple[float, float]:
@@ -108,7 +109,7 @@ def _problem(profile: Profile, stick_radius: float, tolerance: float) -> ForcedS
     """Prepare the evolution, with panels fine enough for a tolerance."""
     digits = max(-np.log10(tolerance), 3.0)
     levels = round(2.7 * digits - 3.3)
-    near = round(-2.0 * np.log2(stick_radius))
+    near = round(-2.0 * np.log2(max(stick_radius, _NEAREST)))
     panels = graded_panels(levels + near + 5, levels, 4 if tolerance > 3e-5 else 6)
     return forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
 
@@ -117,9 +118,7 @@ def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return a radius that no contact under constant force exceeds: that of the end, had the border not moved."""
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
-    abscissa, weight = gauss(32)
-    force, stuck = (side * float((1.0 - profile.image(side * abscissa)) @ weight) for side in (1.0, stick_radius))
-    deepest = 1.0 + (force - stuck) / stick_radius
+    deepest = 1.0 + virgin_areas(profile, stick_radius)[1] / stick_radius
     radius = 2.0
     while float(profile.height(np.array([radius]))[0]) < deepest:
         radius *= 1.5
@@ -169,8 +168,7 @@ def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
     """Return what a contact ends in whose border stands from a moment on."""
     profile, c, eta = problem.profile, problem.virgin.inner_radius, problem.eta
     border, (reached, depths) = moment.border, _rising(moment.path)
-    abscissa, weight = gauss(32)
-    stuck = c * float(profile.image(c * abscissa) @ weight) + float(np.trapezoid(depths - eta, reached))
+    stuck = problem.virgin_area + float(np.trapezoid(depths - eta, reached))
     depth = (0.5 * problem.force + stuck) / border
 
     def change(x: FloatArray) -> FloatArray:
@@ -251,6 +249,12 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
+
+
+def _error(profile: Profile, fine: Worn, coarse: Worn, tolerance: float) -> float:
+    """Return the error expected of f: not below the tolerance, which both solutions may miss alike at the edge."""
+    eta = float(profile.rise(np.array(1.0), fine.stick_radius))
+    return max(_SAFETY * _distance(fine, coarse), _tolerances(tolerance)[0] * eta)
 
 
 def _distance(fine: Worn, coarse: Worn) -> float:

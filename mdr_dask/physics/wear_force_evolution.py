@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 
 
 #: How much more closely steps follow the border than the depth: f rises beyond it as a root.
-BORDER_WEIGHT = 100.0
+BORDER_WEIGHT = 30.0
 #: Floor of r^2 - c^2.
 SMALLEST = 1e-30
 
@@ -55,10 +55,11 @@ class ForcedSlip:
     """Slip outside the stick border under constant force.
 
     Unknowns: y = 1 - (d - g) / eta at the nodes but the last, a, d, and c unless `border` says where it stands; `stood`
-    is then the number of the pair of the path that it stands from.
+    is then the number of the pair of the path that it stands from. `virgin_area` is int g dx up to the first border.
     """
 
     virgin: PartialSlip
+    virgin_area: float
     force: float
     border: float | None = None
     stood: int = 0
@@ -221,12 +222,9 @@ class ForcedSlip:
 
     def sticking_force(self, path: FloatArray, border: float, depth: float) -> float:
         """Return the force on the stick zone, 2 int_0^c (d - g) dx."""
-        c0 = self.virgin.inner_radius
-        abscissa, weight = gauss(32)
-        virgin = c0 * float((depth - self.profile.image(c0 * abscissa)) @ weight)
         c, d = _onward(path, border, depth)
-        load = depth - (d - self.eta)
-        return 2.0 * (virgin + float(np.trapezoid(load, c)))
+        virgin = self.virgin.inner_radius * depth - self.virgin_area
+        return 2.0 * (virgin + float(np.trapezoid(depth - (d - self.eta), c)))
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return eta s at the nodes, the depth, and the border: what the error of a step is judged by."""
@@ -262,9 +260,20 @@ def _share(moment: Pressed, radius: FloatArray) -> FloatArray:
 
 def forced_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> ForcedSlip:
     """Prepare partial slip under the force of the virgin contact."""
+    area, slipping = virgin_areas(profile, stick_radius)
+    force = 2.0 * (stick_radius - area + slipping)
+    return ForcedSlip(partial_slip(profile, stick_radius, panels, reach), area, force, stick_radius)
+
+
+def virgin_areas(profile: Profile, stick_radius: float) -> tuple[float, float]:
+    """Return int_0^c g dx and int_c^1 (1 - g) dx of the virgin body; x = c t^4 smooths a power at the axis."""
+    c = stick_radius
     abscissa, weight = gauss(64)
-    force = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
-    return ForcedSlip(partial_slip(profile, stick_radius, panels, reach), force, stick_radius)
+    eta = float(profile.rise(np.array(1.0), c))
+    stuck = 4.0 * c * float((profile.image(c * abscissa**4) * abscissa**3) @ weight)
+    x = c + (1.0 - c) * abscissa**4
+    slipping = 4.0 * (1.0 - c) * float(((eta - profile.rise(x, c)) * abscissa**3) @ weight)
+    return stuck, slipping
 
 
 def plateau_rise(path: FloatArray, radius: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from mdr_dask.physics.revolution import Profile, bisect
 from mdr_dask.physics.transforms import gauss
 from mdr_dask.physics.wear import THESIS_XI, Worn, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear_force_evolution import virgin_areas
 
 FloatArray = NDArray[np.float64]
 
@@ -71,11 +72,11 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
         high = min(1.3 * high, profile.largest_radius)
     scar = bisect(lambda r: -float(worn_height(change, c, np.array([r]), breaks)[0]), 1.0, high) if cycles > 0 else 1.0
     edge = bisect(lambda x: float(share(np.array(x))[()]) - 1.0, border, scar) if scar > 1.0 else 1.0
-    abscissa, weight = gauss(64)
-    force = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
+    area, slipping = virgin_areas(profile, c)
+    force = 2.0 * (c - area + slipping)
     volume = worn_volume(change, c, scar, breaks)
     depth = 1.0 + eta * rise
-    return Worn(profile, c, scar, edge, volume, force, 1e-4, change, change_slope, breaks, depth=depth, border=border)
+    return Worn(profile, c, scar, edge, volume, force, 1e-5, change, change_slope, breaks, depth=depth, border=border)
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray]:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope
+from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics import laws
 from mdr_dask.plots.base import Plot
 
@@ -238,24 +238,29 @@ def _draw_indenter(series: Mapping[str, xr.Dataset]) -> Figure:
         "ξ = 8 G a τ v · slope / (√2 F_N)", "μ / (√2 · slope)", f"rough indenters against their law ({BAND})"
     )
     axes.set(xscale="log", yscale="log")
-    drawn = []
+    drawn, left_out = [], 0
     for (name, data), colour in zip(series.items(), _colours(len(series)), strict=False):
         slope = spectral_slope(data)
         mean, error = _moments(data["friction_coefficient"] / (np.sqrt(2) * slope))
-        columns = xr.broadcast(indenter_xi(data, slope), mean, error)
-        xi, height, bar = (column.values.ravel() for column in columns)
+        columns = xr.broadcast(indenter_xi(data, slope), mean, error, within_indenter_law(data, slope))
+        xi, height, bar, within = (column.values.ravel() for column in columns)
         known = np.isfinite(height) & (height > 0)
+        beyond, known = known & ~within, known & within
+        left_out += int(beyond.sum())
+        axes.plot(xi[beyond], height[beyond], ".", ms=2, color="0.85", zorder=1)
         axes.errorbar(
             xi[known], height[known], bar[known], fmt="o", ms=3, lw=0.8, color=colour, label=name or "simulated"
         )
-        drawn.append(xi[known])
+        drawn.append(xi[known | beyond])
+    if left_out:
+        axes.plot([], [], ".", color="0.7", label="steep or barely touching body, region IV")
     span = np.concatenate(drawn)
     if not span.size:
         raise DataError("expected a store with friction of a rough indenter, got none")
     fine = np.geomspace(span.min(), span.max(), 300)
     axes.plot(fine, laws.indenter(fine), "k-", lw=1, label="law (eq. 3.40), α = 1.5")
     axes.plot(fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
-    _legend(axes, len(drawn) + 2)
+    _legend(axes, len(drawn) + 3)
     return figure
 
 

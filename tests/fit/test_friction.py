@@ -3,7 +3,7 @@ import pytest
 from friction_store import store
 
 from mdr_dask.errors import FitError
-from mdr_dask.fit.friction import FITS
+from mdr_dask.fit.friction import FITS, within_indenter_law
 from mdr_dask.physics import laws
 
 FIT = {fit.name: fit.compute for fit in FITS}
@@ -83,6 +83,31 @@ def test_indenters_follow_their_law(shape):
     assert found["rms_error_stated"] < 0.06
     assert found["exponent_low"] < found["exponent"] < found["exponent_high"]
     assert found["exponent"] == pytest.approx(1.5, abs=0.3)
+
+
+def test_bodies_that_their_law_leaves_out_do_not_count():
+    """A cone on less and less roughness: its own hysteresis and region IV are not fitted."""
+    data = store(
+        {"rms_roughness": [1e-7, 1e-6, 5e-5], "velocity": np.geomspace(1e-3, 1e3, 13)},
+        realisations=4,
+        length=0.01,
+        points=2000,
+        oversampling=2,
+        hurst=0.4,
+        shear_modulus=1e6,
+        normal_force=10.0,
+        indenter={"shape": "cone", "angle": 0.17},
+    )
+    within = within_indenter_law(data, data["rms_slope"].mean("realisation"))
+    assert not np.any(within.isel(rms_roughness=[0, 1]))
+    assert np.all(within.isel(rms_roughness=2, velocity=slice(6)))
+    assert not within.isel(rms_roughness=2, velocity=-1)
+    found = FIT["indenter"]({"": data})
+    assert 6 <= found["cases"] < 13
+    assert found["rms_error_stated"] < 0.06
+    none = FIT["indenter"]({"": data.isel(rms_roughness=[0, 1])})
+    assert none["cases"] == 0
+    assert np.isnan(none["exponent"])
 
 
 def test_what_cannot_be_fitted_says_why(forces):

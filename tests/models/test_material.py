@@ -1,9 +1,11 @@
+import re
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.material import Material, solid_of
+from mdr_dask.models.material import Material, fit_error, fit_notes, solid_of
 from mdr_dask.physics.rheology import complex_modulus
 
 TABLE = "tests/data/dma/freq_user_raw.csv"
@@ -87,6 +89,19 @@ def test_table_needs_a_temperature_or_a_reference():
         solid_of(material(dma_table={"file": TABLE}))
     with pytest.raises(DataError, match="got no rows at 500 K"):
         solid_of(material(dma_table={"file": TABLE, "table_temperature": 500.0}))
+
+
+def test_the_fit_says_how_well_it_holds():
+    fitted = material(dma_table={"file": TABLE, "table_temperature": 298.0, "poisson_ratio": 0.5})
+    (note,) = fit_notes(fitted)
+    assert re.search(rf"table {TABLE}: \d+ arms for .* rad/s, rms error [\d.]+% in G', .*% in G'', largest .*%", note)
+    error = fit_error(fitted)
+    assert 0.005 < error < 0.05  # the scatter of the data is 2 %
+    denser = fitted.model_copy(update={"dma_table": fitted.dma_table.model_copy(update={"arms_per_decade": 3.0})})
+    assert fit_error(denser) < error
+    kelvin = material(kelvin={"shear_modulus": 1e6, "relaxation_time": 1e-3})
+    assert fit_error(kelvin) == 0
+    assert fit_notes(kelvin) == fit_notes(None) == ()
 
 
 def test_missing_file_is_named():

@@ -138,7 +138,8 @@ def test_finer_accuracy_takes_finer_grids_and_is_met():
         errors.append(np.abs(result.values["friction_coefficient"] / reference - 1))
         # 32 cases of an estimate that holds in 95 %: 1.6 misses are expected, five have a chance of 2 %
         assert np.count_nonzero(errors[-1] > estimate) <= 4
-    assert np.median(errors[1]) < np.median(errors[0])
+    # the accuracy bounds the largest error; half of the cases are in full contact and exact at any
+    assert np.max(errors[1]) < np.max(errors[0])
 
 
 def test_full_contact_is_exact_in_any_units():

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from mdr_dask.physics import rheology, roughness
 from mdr_dask.physics.element import Foundation
+from mdr_dask.physics.kinetics import velocity_jump
 from mdr_dask.physics.protocol import (
     KELVIN,
     Response,
@@ -22,6 +21,8 @@ from mdr_dask.physics.viscoelastic_sliding import steady_viscoelastic_sliding
 POINTS = 50
 STANDARD = foundation([3.0], [0.25], 0.0)
 SERIES = foundation([3.0, 2.0, 1.0], [0.03, 0.1, 0.25], 0.01)
+TIMES = np.geomspace(0.01, 1.4, 12)
+SECOND = 1.8  # an order, less what edges that cross elements add
 BALANCE = 1e-8  # of the work, as the issue asks; rounding is 1e-13
 
 
@@ -39,7 +40,7 @@ def bowl(nodes: int, coefficient: float = 10.0) -> Line:
 def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
     step = cells / nodes / reach
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
-    return np.concatenate([grown, np.arange(grown[-1] + step, last, step)])
+    return np.unique(np.concatenate([grown, np.arange(grown[-1] + step, last, step), TIMES[last > TIMES]]))
 
 
 def jump(
@@ -75,8 +76,43 @@ def test_work_is_that_of_drag_and_load() -> None:
         moments, found = jump(closed_line(*rough(oversampling)), KELVIN, (0.05, 0.06), 0.3, 2.0)
         power = 0.06 * found.drag + 0.3 * found.rate
         errors.append(abs(np.trapezoid(power, moments) / found.work[-1] - 1))
-    assert errors[1] < 1e-3
-    assert errors[1] < errors[0] / 4 + 2e-4  # edges that cross elements add noise
+    assert errors[1] < 3e-4
+    assert errors[1] < errors[0] / 4**SECOND
+
+
+def at_times(line: Line, solid: Foundation, reaches: tuple[float, float], cells: float = 0.5) -> np.ndarray:
+    """Return the drag at 0+ and at `TIMES`."""
+    moments, found = jump(line, solid, reaches, 0.3, 1.5, cells)
+    return found.drag[np.append(0, np.searchsorted(moments, TIMES))]
+
+
+@pytest.mark.parametrize("solid", [STANDARD, SERIES])
+def test_second_order_in_the_grid(solid: Foundation) -> None:
+    exact = at_times(closed_line(*rough(40)), solid, (0.1, 0.12))
+    found = [np.max(np.abs(at_times(closed_line(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
+    assert found[1] < 5e-4
+    assert found[1] < found[0] / 3**SECOND
+
+
+@pytest.mark.parametrize("change", [0.2, -0.2])
+def test_second_order_in_the_grid_against_the_march(change: float) -> None:
+    """The solver for one jump shares nothing with this one but the line; the immediate value at its own."""
+    reaches = 0.1, 0.1 * (1 + change)
+    march = velocity_jump(*rough(64), 0.3, reaches, TIMES, np.pi * POINTS, 96)
+    exact = np.append(march.at, march.trace)
+    found = [np.abs(at_times(closed_line(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
+    assert found[1][0] < 2e-4
+    assert found[1].max() < 2e-4
+    assert found[1].max() < found[0].max() / 4**SECOND
+
+
+@pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
+def test_second_order_in_the_step(solid: Foundation) -> None:
+    line = closed_line(*rough(8))
+    exact = at_times(line, solid, (0.1, 0.12), 1 / 16)
+    found = [np.max(np.abs(at_times(line, solid, (0.1, 0.12), cells) / exact - 1)) for cells in (2.0, 0.5)]
+    assert found[1] < (5e-5 if solid is KELVIN else 1e-3)
+    assert found[1] < found[0] / (1 if solid is KELVIN else 4**SECOND)  # without arms a step leaves next to nothing
 
 
 def test_every_course_keeps_the_balance() -> None:
@@ -140,38 +176,6 @@ def test_standard_solid_in_full_contact_is_exact() -> None:
     assert np.allclose(found.contact, 1)
 
 
-def test_parabola_against_an_independent_integration() -> None:
-    """Elements enter undeformed, so that the depth follows an ordinary differential equation."""
-    c, load, reaches = 10.0, 0.05, (0.05, 0.06)
-    node, weight = np.polynomial.legendre.leggauss(20)
-
-    def forces(d: float, rate: float, v: float) -> tuple[float, float]:
-        lead = -np.sqrt(d / c)
-        trail = max(-v + np.sqrt(v * v + (d + rate) / c), lead)
-        x, wide = 0.5 * (lead + trail) + 0.5 * (trail - lead) * node, 0.5 * (trail - lead) * weight
-        f = d - c * x * x + rate - 2 * c * v * x
-        return float(wide @ f), float(wide @ (f * -2 * c * x))
-
-    def rate_of(d: float, v: float) -> float:
-        return float(brentq(lambda rate: forces(d, rate, v)[0] - load, -0.5 * d, 0.5 * d, xtol=1e-15))
-
-    start = brentq(lambda d: forces(d, 0.0, reaches[0])[0] - load, 1e-3, 5, xtol=1e-15)
-    times = np.geomspace(0.02, 1.9, 10)
-    solved = solve_ivp(
-        lambda _, d: [rate_of(d[0], reaches[1])], (0, 2), [start], t_eval=times, rtol=1e-10, atol=1e-13, method="LSODA"
-    )
-    drag = np.array([forces(d, rate_of(d, reaches[1]), reaches[1])[1] for d in solved.y[0]])
-    errors = []
-    for nodes in (400, 1600):
-        moments, found = jump(bowl(nodes, c), KELVIN, reaches, load, 2.0)
-        depth = np.interp(times, moments, found.depth)
-        errors.append(np.max(np.abs(depth / solved.y[0] - 1)))
-    # the drag of a moment knows the leading edge to a part of an element only
-    assert np.max(np.abs(np.interp(times, moments, found.drag) / drag - 1)) < 5e-3
-    assert errors[1] < 1e-5
-    assert errors[1] < errors[0] / 4
-
-
 def test_contact_that_leaves_the_line_is_a_status() -> None:
     assert steady_start(bowl(100, 0.1), KELVIN, 0.05, 1.0)[2] == OUTSIDE_LINE
     line = bowl(100)
@@ -188,10 +192,11 @@ def test_rest_is_static() -> None:
     state, depth, _ = steady_start(line, STANDARD, 0.0, 0.05)
     moments = np.linspace(0, 1, 11)
     found = follow_line(line, STANDARD, moments, 0 * moments, 0 * moments, 0.05 + 0 * moments, state, depth)
-    assert np.allclose(found.depth, depth, rtol=1e-12)
+    assert np.allclose(found.depth, found.depth[0], rtol=1e-12)
     assert np.max(np.abs(found.drag)) < 1e-10
     exact = 10 * (3 * 0.05 / (4 * 10)) ** (2 / 3)  # F / (4 G) = (4 / 3) c a^3
-    assert depth == pytest.approx(exact, rel=1e-3)
+    assert found.depth[0] == pytest.approx(exact, rel=1e-5)
+    assert depth == pytest.approx(exact, rel=1e-4)  # a sum over the elements
 
 
 def test_elastic_solid_is_refused() -> None:

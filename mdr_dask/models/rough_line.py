@@ -1,0 +1,182 @@
+"""One realisation of a rough line and the cases on it, on the grids that their accuracy needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.models.base import FloatArray
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.sliding import Scheme, Steady
+
+FINEST = 64  # oversampling beyond which `auto` gives up
+SAFETY = 3.0  # see docs/friction.md for how honest it makes the estimate
+CLOSE = 0.005  # change of the depth between grids that is taken from the tangent
+SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
+RESTART = 4  # oversampling of the sweeps over what is left
+SAMPLED = 4  # oversampling of a line that cases go along from node to node
+REFINEMENTS = (1, 2, 4, 8, 16)  # of its cells where they are touched
+QUICKEST = 2e-3  # accuracy that needs more than that
+QUICK_SAFETY, QUICK_MEMORY = 0.8, 0.08  # of the last change between grids and of the one before; see docs/friction.md
+FEW = 10  # nodes in contact that are too few to go from node to node
+
+
+@dataclass(frozen=True)
+class Line:
+    """What fixes a line but for its phases, in units of its length and rms height."""
+
+    hurst: float
+    points: int
+    rolloff: float
+    longest: float
+    coefficient: float  # of the indenter c |x|^n, 0 for a plane
+    exponent: float
+
+    def amplitudes(self) -> FloatArray:
+        """Return the amplitudes of its harmonics."""
+        return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
+
+    def sampled(self, accuracy: float) -> bool:
+        """Return whether the cubic cells of `auto` are left to the cases that are too hard from node to node."""
+        return self.coefficient == 0 and accuracy >= QUICKEST
+
+    def slope(self) -> float:
+        """Return the spectral rms slope."""
+        return _slope(self)
+
+
+@lru_cache(maxsize=32)
+def _amplitudes(modes: int, hurst: float, rolloff: float, longest: float) -> FloatArray:
+    from mdr_dask.physics import roughness
+
+    return roughness.amplitudes(modes, hurst, rolloff, longest)
+
+
+@lru_cache(maxsize=1024)
+def _slope(line: Line) -> float:
+    from mdr_dask.physics import roughness
+
+    return roughness.spectral_slope(line.amplitudes())
+
+
+@dataclass(frozen=True)
+class Task:
+    """Cases on one realisation of a line, in units of its length and rms height."""
+
+    line: Line
+    turned: NDArray[np.complex128]  # exp(i phi) of its harmonics
+    scheme: Scheme
+    reaches: FloatArray  # v tau / L
+    loads: FloatArray  # F_N / (4 G L h)
+    contact: bool  # whether fraction and slope of the contact are wanted
+
+    def only(self, cases: NDArray[Any]) -> Task:
+        """Return some of the cases."""
+        return replace(self, reaches=self.reaches[cases], loads=self.loads[cases])
+
+    def nodes(self, oversampling: int, scheme: Scheme) -> tuple[FloatArray, FloatArray]:
+        """Return heights and slopes of the roughness on a grid; a scheme without slopes gets the heights again."""
+        from mdr_dask.physics import roughness
+
+        amplitude, count = self.line.amplitudes(), self.line.points * oversampling
+        height = roughness.turned_line(amplitude, self.turned, count)
+        slope = roughness.turned_line(amplitude, self.turned, count, 1) if scheme == "hermite" else height
+        if self.line.coefficient == 0:
+            return height, slope
+        return np.append(height, height[0]), np.append(slope, slope[0])
+
+    def solve(
+        self, nodes: tuple[FloatArray, FloatArray], scheme: Scheme, near: Steady | None = None, close: float = 0.0
+    ) -> Steady:
+        """Solve the cases on a grid, beginning near a solution on another one."""
+        from mdr_dask.physics import sliding
+
+        height, slope = nodes
+        guesses = None if near is None else near.depth
+        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
+        coefficient, exponent = self.line.coefficient, self.line.exponent
+        if coefficient == 0:
+            return sliding.steady_sliding(height, slope, *cases)
+        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
+
+    def on_grid(self, oversampling: int) -> Steady:
+        """Solve the cases on one grid, without an estimate of the error."""
+        return self.solve(self.nodes(oversampling, self.scheme), self.scheme)
+
+    def with_error(self, oversampling: int) -> tuple[Steady, FloatArray]:
+        """Solve the cases on one grid and estimate the relative error of their friction."""
+        steady = self.on_grid(oversampling)
+        return steady, self._error(steady, self.nodes(2 * oversampling, "hermite"))
+
+    def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
+        """Solve every case on the coarsest grid whose error estimate meets the accuracy."""
+        if self.scheme != "hermite":
+            return self._swept(accuracy, 1)
+        if not self.line.sampled(accuracy):
+            return self._swept(accuracy, 2)
+        steady, error = self._sampled(accuracy)
+        wanting = ~(error <= accuracy)
+        if np.any(wanting):
+            found, error[wanting] = self.only(wanting)._swept(accuracy, RESTART)
+            steady = steady.replaced(wanting, found)
+        return steady, error
+
+    def _sampled(self, accuracy: float) -> tuple[Steady, FloatArray]:
+        """Solve cases from node to node; the error is infinite where that gives nothing."""
+        from mdr_dask.physics import sampled, sliding
+
+        steady, error = sliding.unsolved(self.loads.size), np.full(self.loads.size, np.inf)
+        left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
+        height, slope = self.nodes(SAMPLED, "hermite")
+        line = sampled.nodes(height, slope, 1, True)
+        coarse = sampled.begin(height, slope, self.reaches[left], self.loads[left])
+        change = np.zeros(left.size)
+        for refinement in REFINEMENTS:
+            if not left.size:
+                break
+            fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
+            found, now = sampled.extrapolated(coarse, fine)
+            # two grids may agree by chance, hardly three
+            estimate = np.maximum(QUICK_SAFETY * now, QUICK_MEMORY * change) + fine.doubt
+            many = fine.contact_fraction * height.size * refinement > FEW
+            error[left] = np.where(many & np.isfinite(estimate), estimate, np.inf)
+            steady = steady.replaced(left, found)
+            still = ~(error[left] <= accuracy)
+            left, coarse, change = left[still], fine.only(still), now[still]
+        return steady, error
+
+    def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, FloatArray]:
+        """Solve every case by sweeps on the coarsest of finer and finer grids that meets the accuracy."""
+        steady = self.on_grid(oversampling)
+        finer = self.nodes(2 * oversampling, "hermite")
+        error = self._error(steady, finer)
+        while oversampling < FINEST:
+            wanting = ~(error <= accuracy) & (steady.status == 0)
+            if not np.any(wanting):
+                break
+            oversampling *= 2
+            some = self.only(wanting)
+            found = some.solve(finer, self.scheme, steady.only(wanting))
+            finer = self.nodes(2 * oversampling, "hermite")
+            error[wanting] = some._error(found, finer)
+            steady = steady.replaced(wanting, found)
+        return steady, error
+
+    def _error(self, steady: Steady, finer: tuple[FloatArray, FloatArray]) -> FloatArray:
+        """Compare a solution with the exact sweep over cubic cells of half the width.
+
+        The finer grid has a small part of the error of the coarser one; a coarser grid has many times its error.
+        """
+        return SAFETY * _difference(steady, self.solve(finer, "hermite", steady, CLOSE))
+
+
+def _difference(one: Steady, other: Steady) -> FloatArray:
+    with np.errstate(all="ignore"):
+        change = np.abs(one.drag / other.drag - 1)
+    # where a coarse grid has no solution nothing is known
+    return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
