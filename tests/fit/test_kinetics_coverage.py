@@ -93,7 +93,7 @@ def test_stretched_exponential() -> None:
 
 
 def test_power_of_the_rate_of_lines_that_all_velocities_share() -> None:
-    found = FIT["rate_power"].compute({"": studies(np.geomspace(1e-3, 1, 3), 120)}).sel(regime="above")
+    found = FIT["rate_power"].compute({"": studies(np.geomspace(1e-3, 1, 3), 100)}).sel(regime="above")
     assert np.all(found["cases"] == 3)
     assert LEAST < coverage(found, "power", 0.5) < MOST
     assert LEAST < coverage(found, "power_unweighted", 0.5) < MOST
