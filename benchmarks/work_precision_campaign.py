@@ -119,13 +119,13 @@ def draw(tables, path):
         for legend, rows in grids.items():
             errors, _, seconds = zip(*rows, strict=True)
             axes.loglog(seconds, np.maximum(errors, FLOOR), "o-", ms=4, lw=1, label=legend)
-        for accuracy, _, error, lines, seconds in accuracies:
+        for place, (accuracy, _, error, lines, seconds) in enumerate(accuracies):
             axes.loglog([seconds], [max(error, FLOOR)], "k*", ms=10)
             axes.annotate(
                 f"{accuracy:.0%}, {lines:.0f} lines",
                 (seconds, max(error, FLOOR)),
                 fontsize="x-small",
-                xytext=(5, 5),
+                xytext=(5, 5 + 9 * place),
                 textcoords="offset points",
             )
         axes.set(title=scene, xlabel="processor time of the campaign (s)", xlim=(0.02, 3), ylim=(FLOOR, 1))

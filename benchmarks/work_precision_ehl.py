@@ -27,9 +27,9 @@ STRESS = 100
 
 
 def timed(function, *arguments):
-    begin = time.perf_counter()
+    begin = time.process_time()
     value = function(*arguments)
-    return value, time.perf_counter() - begin
+    return value, time.process_time() - begin
 
 
 def extrapolated(case, accuracy):

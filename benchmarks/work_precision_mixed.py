@@ -40,9 +40,9 @@ def every_window(pair, window, level):
 
 
 def timed(function, *arguments):
-    begin = time.perf_counter()
+    begin = time.process_time()
     value = function(*arguments)
-    return value, time.perf_counter() - begin
+    return value, time.process_time() - begin
 
 
 def measure():

@@ -187,6 +187,8 @@ def _spelling(unit: str) -> str:
 
 
 def _nearest(word: str) -> str:
+    if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
+        return ", temperatures are in 'degC', '°C' or 'K'"
     common = "m mm um nm s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent"
     hint = did_you_mean(word, common.split())
     return hint if "mean" in hint else ""

@@ -97,13 +97,13 @@ def _prediction(parameters: FrettingWear, method: str) -> tuple[Callable[[float]
     depth = float(numbers.height[0, 0])
     profile = table_profile(parameters.shape, depth) if table else PowerProfile(float(numbers.exponent[0, 0]))
     stick = profile.inside(float(numbers.level[0, 0]))
-    columns = read_table(parameters)
+    columns, held = read_table(parameters), parameters.hold == "force"
     if "volume" in columns:
         measured, cycles = _volumes(columns, numbers)
-        curve = volume_curve(profile, stick, method, parameters.xi)
+        curve = volume_curve(profile, stick, method, parameters.xi, constant_force=held)
         return lambda factor: at_cycles(curve, factor * cycles), measured
     radius = columns["radius"] / float(numbers.length[0, 0])
-    curve = profile_curve(profile, stick, radius, method, parameters.xi)
+    curve = profile_curve(profile, stick, radius, method, parameters.xi, constant_force=held)
     total = float(numbers.cycles[0, 0])
     return lambda factor: at_cycles(curve, factor * total), columns["height"] / depth
 

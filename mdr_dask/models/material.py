@@ -254,8 +254,8 @@ def _columns(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, 
 def _temperatures(table: Table) -> FloatArray | None:
     if table.values.shape[1] < 4:
         return None
-    unit = table.units[3].strip("[]() ").lower() if table.units else "k"
-    return np.asarray(table.values[:, 3] + (0.0 if unit == "k" else 273.15), dtype=np.float64)
+    unit = table.units[3].strip("[]() ").lower() if table.units else ""
+    return np.asarray(table.values[:, 3] + (0.0 if unit in ("", "k") else 273.15), dtype=np.float64)
 
 
 def _superposed(

@@ -1,8 +1,9 @@
-"""Tables of numbers as people keep them: one row of names, perhaps one of units, comments and a byte-order mark."""
+"""Tables of numbers as people keep them: names with or without units, decimal commas, comments, a byte-order mark."""
 
 from __future__ import annotations
 
 import csv
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,10 @@ SCALES = {
     "s": 1.0,
 }
 """Units of lengths, moduli, times and frequencies that a row of units may hold, in SI (frequencies in rad/s)."""
+TEMPERATURES = ("k", "c", "°c", "degc")
+"""Units of temperatures, which are not scaled."""
+_WITH_UNIT = re.compile(r"(.*?)\s*[\[(]([^\])]*)[\])]\Z")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?\Z")
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Table:
     names : tuple of str
         Names of the columns; empty if the table has none.
     units : tuple of str
-        Units as written; empty if the table has none.
+        Units as written, in a row of their own or in brackets behind the names; empty if the table has none.
     values : array, shape (rows, columns)
         NaN where an entry is empty.
     """
@@ -57,7 +62,7 @@ class Table:
         DataError
             If the unit is not known.
         """
-        written = self.units[column].strip("[]() ") if self.units else unit
+        written = (self.units[column].strip("[]() ") if self.units else "") or unit
         if written.lower() not in SCALES:
             raise DataError(f"expected one of the units {', '.join(SCALES)}, got {written!r}")
         return SCALES[written.lower()]
@@ -84,13 +89,27 @@ def parse_table(text: str, source: str) -> Table:
         raise DataError(f"{source}: expected rows of numbers, got only names")
     width = len(headings[0]) if headings else len(rows[0][1])
     values = np.array([_numbers(row, width, f"{source}:{number}") for number, row in rows])
-    return Table(headings[0] if headings else (), headings[1] if len(headings) == 2 else (), values)
+    names = headings[0] if headings else ()
+    if len(headings) == 2:
+        return Table(names, headings[1], values)
+    return Table(*_with_units(names), values)
+
+
+def _with_units(names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Split names such as ``z [um]``, if the brackets of any of them hold a unit."""
+    parts = [match.groups() if (match := _WITH_UNIT.match(name)) else (name, "") for name in names]
+    if not any(unit.strip().lower() in (*SCALES, *TEMPERATURES) for _, unit in parts):
+        return names, ()
+    return tuple(name for name, _ in parts), tuple(unit for _, unit in parts)
 
 
 def _entries(line: str, separator: str | None) -> list[str]:
     if separator is None:
         return line.split()
-    return [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    entries = [entry.strip() for entry in next(csv.reader([line], delimiter=separator))]
+    if separator == ",":
+        return entries
+    return [entry.replace(",", ".") if _DECIMAL_COMMA.match(entry) else entry for entry in entries]
 
 
 def _is_number(text: str) -> bool:

@@ -1,5 +1,7 @@
 """One element of a viscoelastic foundation through one step: pressed at constant speed, or recovering without force.
 
+Functions take the arms of all elements, shape (n, arms), and the number i of theirs: a view costs more than most do.
+
 Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
 """
 
@@ -10,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from mdr_dask.physics.kinetics_profile import compiled
 
 FloatArray = NDArray[np.float64]
 
@@ -41,7 +45,7 @@ class Foundation(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Room for one element: modes, decay over part of a step, fading of the arms over it, arms, modes again."""
+    """Room for one element: modes, decay over part of a step, fading of the arms over it, and arms, shape (1, arms)."""
 
     modes: FloatArray
     decay: FloatArray
@@ -53,10 +57,10 @@ class Scratch(NamedTuple):
 def scratch_for(solid: Foundation) -> Scratch:
     """Return room for one element."""
     modes, arms = solid.rates.size, solid.times.size
-    return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty(arms))
+    return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
     """Write how modes decay and arms fade over a time."""
     for k in range(decay.size):
@@ -65,44 +69,44 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
         fades[m] = np.exp(-step / solid.times[m])
 
 
-@njit(nogil=True, cache=True)
-def fly(solid: Foundation, u: float, arms: FloatArray, decay: FloatArray, modes: FloatArray) -> float:
+@compiled
+def fly(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
     """Let an element recover without force; `arms` is overwritten."""
-    if arms.size == 0:
+    if solid.times.size == 0:
         return float(u * decay[0])
     extra = 1 if solid.viscosity > 0 else 0
     count = solid.rates.size
     for k in range(count):
         total = solid.inward[k, 0] * u if extra else 0.0
-        for m in range(arms.size):
-            total += solid.inward[k, m + extra] * arms[m]
+        for m in range(solid.times.size):
+            total += solid.inward[k, m + extra] * arms[i, m]
         modes[k] = total * decay[k]
-    for m in range(arms.size):
+    for m in range(solid.times.size):
         total = 0.0
         for k in range(count):
             total += solid.outward[m + extra, k] * modes[k]
-        arms[m] = total
+        arms[i, m] = total
     if extra:
         total = 0.0
         for k in range(count):
             total += solid.outward[0, k] * modes[k]
         return total
-    return at_rest(solid, arms)
+    return at_rest(solid, arms, i)
 
 
-@njit(nogil=True, cache=True)
-def at_rest(solid: Foundation, arms: FloatArray) -> float:
+@compiled
+def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
     """Return the displacement without force of an element that has no dashpot."""
     pull, glass = 0.0, 1.0
-    for m in range(arms.size):
-        pull += solid.moduli[m] * arms[m]
+    for m in range(solid.times.size):
+        pull += solid.moduli[m] * arms[i, m]
         glass += solid.moduli[m]
     return pull / glass
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def press(
-    solid: Foundation, u0: float, u1: float, arms: FloatArray, step: float, fades: FloatArray
+    solid: Foundation, u0: float, u1: float, arms: FloatArray, i: int, step: float, fades: FloatArray
 ) -> tuple[float, float]:
     """Move an element from u0 to u1 at constant speed; return work and loss, whose difference is stored exactly.
 
@@ -114,35 +118,35 @@ def press(
     speed = (u1 - u0) / step
     work = 0.5 * (u1 * u1 - u0 * u0) + solid.viscosity * speed * speed * step
     lost = solid.viscosity * speed * speed * step
-    for m in range(arms.size):
+    for m in range(solid.times.size):
         tau, fade = solid.times[m], fades[m]
         a = speed * tau
-        b = (u0 - arms[m]) - a
+        b = (u0 - arms[i, m]) - a
         work += solid.moduli[m] * speed * (a * step + b * tau * (1 - fade))
         lost += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
-        arms[m] = u1 - (a + b * fade)
+        arms[i, m] = u1 - (a + b * fade)
     return work, lost
 
 
-@njit(nogil=True, cache=True)
-def stored(solid: Foundation, u: float, arms: FloatArray) -> float:
+@compiled
+def stored(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     """Return the energy stored in an element."""
     energy = 0.5 * u * u
-    for m in range(arms.size):
-        energy += 0.5 * solid.moduli[m] * (u - arms[m]) ** 2
+    for m in range(solid.times.size):
+        energy += 0.5 * solid.moduli[m] * (u - arms[i, m]) ** 2
     return energy
 
 
-@njit(nogil=True, cache=True)
-def pull(solid: Foundation, u: float, arms: FloatArray) -> float:
+@compiled
+def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     """Return the force of springs and arms."""
     force = 1.0 * u
-    for m in range(arms.size):
-        force += solid.moduli[m] * (u - arms[m])
+    for m in range(solid.times.size):
+        force += solid.moduli[m] * (u - arms[i, m])
     return float(force)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def release(
     solid: Foundation,
     w0: float,
@@ -150,6 +154,7 @@ def release(
     rise0: float,
     rise1: float,
     arms: FloatArray,
+    i: int,
     step: float,
     fades: FloatArray,
     room: FloatArray,
@@ -158,12 +163,13 @@ def release(
 
     `rise0` and `rise1` are the rates of w at both ends; the force is taken as linear between them, w as cubic.
     """
-    begin = pull(solid, w0, arms) + solid.viscosity * rise0
+    begin = pull(solid, w0, arms, i) + solid.viscosity * rise0
     if begin <= 0:
         return 0.0, w0
-    room[:] = arms
-    press(solid, w0, w1, room, step, fades)
-    end = pull(solid, w1, room) + solid.viscosity * rise1
+    for m in range(solid.times.size):
+        room[0, m] = arms[i, m]
+    press(solid, w0, w1, room, 0, step, fades)
+    end = pull(solid, w1, room, 0) + solid.viscosity * rise1
     if end >= 0:
         return 1.0, w1
     part, change = begin / (begin - end), w1 - w0
@@ -171,11 +177,12 @@ def release(
     return part, w0 + part * change + part * (1 - part) * bend
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def flight(
     solid: Foundation,
     u0: float,
     arms: FloatArray,
+    i: int,
     part: float,
     leaves: float,
     step: float,
@@ -183,20 +190,22 @@ def flight(
     scratch: Scratch,
 ) -> float:
     """Return where an element is after a step if it is pressed to `leaves` for a part of it and free for the rest."""
-    scratch.arms[:] = arms
+    for m in range(solid.times.size):
+        scratch.arms[0, m] = arms[i, m]
     if part <= 0:
-        return fly(solid, u0, scratch.arms, decay, scratch.modes)
+        return fly(solid, u0, scratch.arms, 0, decay, scratch.modes)
     fading(solid, part * step, scratch.decay, scratch.fades)
-    press(solid, u0, leaves, scratch.arms, part * step, scratch.fades)
+    press(solid, u0, leaves, scratch.arms, 0, part * step, scratch.fades)
     fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
-    return fly(solid, leaves, scratch.arms, scratch.decay, scratch.modes)
+    return fly(solid, leaves, scratch.arms, 0, scratch.decay, scratch.modes)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def advance(
     solid: Foundation,
     u0: float,
     arms: FloatArray,
+    i: int,
     touching: bool,
     part: float,
     leaves: float,
@@ -212,25 +221,25 @@ def advance(
 
     `part` is after which part of the step it is let go if it is, `leaves` where, and `free` where it then ends.
     """
-    before = stored(solid, u0, arms)
+    before = stored(solid, u0, arms, i)
     if w1 > free:
         if touching:
-            work, lost = press(solid, u0, w1, arms, step, fades)
+            work, lost = press(solid, u0, w1, arms, i, step, fades)
             return w1, True, work, lost
         part = (u0 - w0) / ((u0 - w0) + (w1 - free)) if u0 > w0 else 0.0
         fading(solid, part * step, scratch.decay, scratch.fades)
-        u = fly(solid, u0, arms, scratch.decay, scratch.modes) if part > 0 else u0
-        loss = before - stored(solid, u, arms) if part > 0 else 0.0
+        u = fly(solid, u0, arms, i, scratch.decay, scratch.modes) if part > 0 else u0
+        loss = before - stored(solid, u, arms, i) if part > 0 else 0.0
         rest = (1 - part) * step
         fading(solid, rest, scratch.decay, scratch.fades)
-        work, lost = press(solid, u, w1, arms, rest, scratch.fades)
+        work, lost = press(solid, u, w1, arms, i, rest, scratch.fades)
         return w1, True, work, lost + loss
     if not touching or part <= 0:
-        u = fly(solid, u0, arms, decay, scratch.modes)
-        return u, False, 0.0, before - stored(solid, u, arms)
+        u = fly(solid, u0, arms, i, decay, scratch.modes)
+        return u, False, 0.0, before - stored(solid, u, arms, i)
     fading(solid, part * step, scratch.decay, scratch.fades)
-    work, lost = press(solid, u0, leaves, arms, part * step, scratch.fades)
+    work, lost = press(solid, u0, leaves, arms, i, part * step, scratch.fades)
     fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
-    before = stored(solid, leaves, arms)
-    u = fly(solid, leaves, arms, scratch.decay, scratch.modes)
-    return u, False, work, lost + before - stored(solid, u, arms)
+    before = stored(solid, leaves, arms, i)
+    u = fly(solid, leaves, arms, i, scratch.decay, scratch.modes)
+    return u, False, work, lost + before - stored(solid, u, arms, i)

@@ -96,15 +96,15 @@ def _instant(
     n = under.size
     mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
     for j in range(n):
-        state.free[j] = at_rest(solid, state.arms[j])
+        state.free[j] = at_rest(solid, state.arms, j)
         mean += state.free[j] / n
     depth, good = depth_for(under, state.free, mean + load / glass, depth)
     for j in range(n):
-        before = stored(solid, state.displacement[j], state.arms[j])
+        before = stored(solid, state.displacement[j], state.arms, j)
         w = depth + under[j]
         state.touching[j] = w > state.free[j]
         state.displacement[j] = max(w, state.free[j])
-        work += stored(solid, state.displacement[j], state.arms[j]) - before
+        work += stored(solid, state.displacement[j], state.arms, j) - before
     return depth, work / n, good
 
 
@@ -114,7 +114,7 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     n, lost = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
-            lost += stored(solid, state.displacement[j], state.arms[j])
+            lost += stored(solid, state.displacement[j], state.arms, j)
             state.displacement[j] = state.free[j] = 0.0
             state.arms[j, :] = 0.0
             state.edges.place[j] = -1.0
@@ -132,6 +132,7 @@ class Room(NamedTuple):
     old_under: FloatArray
     old_slope: FloatArray
     after: FloatArray
+    after_arms: FloatArray
     parts: FloatArray
     leaves: FloatArray
     gaps: FloatArray
@@ -152,6 +153,7 @@ def _room_for(solid: Foundation, n: int) -> Room:
         rows[2],
         rows[3],
         rows[4],
+        np.empty((n, solid.times.size)),
         rows[5],
         rows[6],
         rows[7],
@@ -178,20 +180,12 @@ def _let_go(
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             room.parts[j], room.leaves[j], room.after[j] = 1.0, w1, u * room.decay[0]
             continue
-        arms, scratch = state.arms[j], room.scratch
-        part, leaves = release(solid, u, w1, rise0, rise1, arms, step, room.fades, scratch.arms)
+        arms, scratch = state.arms, room.scratch
+        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, room.fades, scratch.arms)
+        if part < 1 or room.parts[j] < 1:
+            pressed = part if part < 1 else 0.0
+            room.after[j] = flight(solid, u, arms, j, pressed, leaves, step, room.decay, scratch)
         room.parts[j], room.leaves[j] = part, leaves
-        pressed = part if part < 1 else 0.0
-        room.after[j] = flight(solid, u, arms, pressed, leaves, step, room.decay, scratch)
-
-
-@njit(nogil=True, cache=True)
-def _remember_free(solid: Foundation, state: State, room: Room, j: int) -> None:
-    """Let an element go on without contact for a step, from where it is unless it is touched already."""
-    if not state.touching[j]:
-        state.free[j] = state.displacement[j]
-        state.free_arms[j, :] = state.arms[j]
-    state.free[j] = fly(solid, state.free[j], state.free_arms[j], room.decay, room.scratch.modes)
 
 
 @njit(nogil=True, cache=True)
@@ -203,24 +197,36 @@ def _move(
     u, touching, after = state.displacement, state.touching, room.after
     work, lost = 0.0, 0.0
     for j in range(n):
-        w0, w1 = old_depth + room.old_under[j], depth + room.under[j]
-        if plain and not touching[j] and w1 <= after[j]:
-            lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
-            u[j] = state.free[j] = after[j]
+        w0, w1, was = old_depth + room.old_under[j], depth + room.under[j], touching[j]
+        if not was:
+            state.free[j] = after[j]
+            for m in range(solid.times.size):
+                state.free_arms[j, m] = room.after_arms[j, m]
+        elif plain:
+            state.free[j] *= room.decay[0]
+        elif damping > 0:
+            state.free[j] = fly(solid, state.free[j], state.free_arms, j, room.decay, room.scratch.modes)
+        if not was and w1 <= after[j]:
+            if plain:
+                lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
+            else:
+                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], room.after_arms, j)
+            u[j] = after[j]
+            for m in range(solid.times.size):
+                state.arms[j, m] = room.after_arms[j, m]
             continue
-        if plain and touching[j] and w1 > after[j]:
+        if was and plain and w1 > after[j]:
             gone = damping * (w1 - u[j]) ** 2 / step
             work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
             lost += gone
-            u[j], state.free[j] = w1, state.free[j] * room.decay[0]
+            u[j] = w1
             continue
-        if damping > 0:
-            _remember_free(solid, state, room, j)
         u[j], touching[j], done, gone = advance(
             solid,
             u[j],
-            state.arms[j],
-            touching[j],
+            state.arms,
+            j,
+            was,
             room.parts[j],
             room.leaves[j],
             after[j],
@@ -251,14 +257,15 @@ def _step(
     step: float,
 ) -> tuple[float, float, float, bool]:
     """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
+    plain = solid.times.size == 0
     for j in range(room.under.size):
-        room.parts[j] = 0.0
-        if solid.times.size == 0:
+        room.parts[j] = 1.0 if state.touching[j] else 0.0
+        if plain:
             room.after[j] = state.displacement[j] * room.decay[0]
-        else:
-            room.after[j] = flight(
-                solid, state.displacement[j], state.arms[j], 0.0, 0.0, step, room.decay, room.scratch
-            )
+            continue
+        for m in range(solid.times.size):
+            room.after_arms[j, m] = state.arms[j, m]
+        room.after[j] = fly(solid, state.displacement[j], room.after_arms, j, room.decay, room.scratch.modes)
     depth = guess
     for _ in range(CORRECTIONS):
         depth, good = depth_for(room.under, room.after, mean, depth)
@@ -280,7 +287,7 @@ def _state_energy(solid: Foundation, state: State) -> float:
             energy += 0.5 * state.displacement[j] * state.displacement[j] / n
         return energy
     for j in range(n):
-        energy += stored(solid, state.displacement[j], state.arms[j]) / n
+        energy += stored(solid, state.displacement[j], state.arms, j) / n
     return energy
 
 
@@ -303,7 +310,7 @@ def forces_now(
     plain = solid.times.size == 0
     for j in range(room.under.size):
         w = depth + room.under[j]
-        room.pulls[j] = w if plain else pull(solid, w, state.arms[j])
+        room.pulls[j] = w if plain else pull(solid, w, state.arms, j)
         room.gaps[j] = w - state.free[j] if solid.viscosity > 0 else room.pulls[j]
     edges, force, power = state.edges, room.force, room.power
     if solid.viscosity > 0:
@@ -392,37 +399,37 @@ def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: Stat
     step = 1 / (n * reach)
     decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
     fading(solid, step, decay, fades)
-    arms, last, free_arms = np.zeros(solid.times.size), np.zeros(solid.times.size), np.zeros(solid.times.size)
+    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
     w0 = depth + line.height[top]
     u, touching = max(w0, 0.0), w0 > 0
     free = 0.0
     for _ in range(turns if line.periodic else 1):
-        last[:] = arms
+        last[:] = arms[0]
         before = u
         for cell in range(n):
             i = (top + cell) % n
             if not touching:
                 free = u
-                free_arms[:] = arms
+                free_arms[0, :] = arms[0]
             if i % every == 0:
                 j = i // every
                 state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.arms[j, :] = arms
-                state.free_arms[j, :] = free_arms
+                state.arms[j, :] = arms[0]
+                state.free_arms[j, :] = free_arms[0]
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             rise0, rise1 = reach * line.slope[i], reach * line.slope[i + 1]
             part, leaves = 0.0, u
             if touching:
-                part, leaves = release(solid, w0, w1, rise0, rise1, arms, step, fades, scratch.arms)
-            after = flight(solid, u, arms, part if part < 1 else 0.0, leaves, step, decay, scratch)
-            free = fly(solid, free, free_arms, decay, scratch.modes)
+                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
+            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
+            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
             u, touching, _, _ = advance(
-                solid, u, arms, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
+                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
             )
         change = abs(u - before)
         for m in range(arms.size):
-            change = max(change, abs(arms[m] - last[m]))
+            change = max(change, abs(arms[0, m] - last[m]))
         if line.periodic and change <= 1e-13 * abs(u):
             return True, u
     return not line.periodic, u

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.errors import DataError
+from mdr_dask.physics.shift_posterior import sample
 from mdr_dask.physics.shift_problem import Problem
 from mdr_dask.physics.shift_system import Settled, System
 
@@ -131,7 +132,7 @@ def superpose(
     if vertical:
         problem = replace(problem, vertical=True)
         shifts, settled = _fit(problem, np.append(shifts, np.zeros(values.size - 1)), None)
-    result = _result(problem, shifts, settled, values)
+    result = _result(problem, shifts, settled, values, seed)
     _require_overlap(result)
     if draws:
         result = replace(result, draws=_bootstrap(problem, shifts, settled, draws, seed))
@@ -176,13 +177,18 @@ def _fit(
     return shifts, choice
 
 
-def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: FloatArray) -> Superposition:
+def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: FloatArray, seed: int) -> Superposition:
     system = System.at(problem, shifts, settled)
     solution, covariance, noise, freedom = system.posterior(settled.weight)
+    spread = covariance[system.splines :, system.splines :]
+    if problem.vertical:
+        shifts, spread = _walked(problem, shifts, settled, spread, freedom, seed)
+        system = System.at(problem, shifts, settled)
+        solution = np.append(system.solve(settled.weight)[: system.splines], shifts)
     horizontal, vertical = problem.split(shifts)
     full = np.zeros((2 * problem.curves, 2 * problem.curves))
     places = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][: problem.free]
-    full[np.ix_(places, places)] = covariance[system.splines :, system.splines :]
+    full[np.ix_(places, places)] = spread
     x, y = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
     order = np.argsort(x, kind="stable")
     grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
@@ -207,6 +213,15 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
         (float(own.min()), float(own.max())),
         np.empty((0, 2 * problem.curves)),
     )
+
+
+def _walked(
+    problem: Problem, shifts: FloatArray, settled: Settled, spread: FloatArray, freedom: float, seed: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean and covariance of the posterior, the latter as the square of a scale for Student's t."""
+    visited = sample(problem, shifts, settled, spread, seed)
+    narrower = (freedom - 2) / freedom if freedom > 4 else 0.5
+    return visited.mean(axis=0), np.atleast_2d(np.cov(visited.T)) * narrower
 
 
 def _bootstrap(problem: Problem, shifts: FloatArray, settled: Settled, draws: int, seed: int) -> FloatArray:

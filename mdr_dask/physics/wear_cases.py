@@ -14,6 +14,8 @@ from mdr_dask.physics.wear import LAYER_GROWTH, SMALLEST_REST
 FloatArray = NDArray[np.float64]
 
 _NODES = 16
+#: Error of the scar's integral, over eta.
+SCAR_ERROR = 1e-10
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -72,20 +74,30 @@ def _power(x: float, n: float) -> float:
 
 @njit(nogil=True, cache=True)
 def _limits(n, c, abscissa, weight, result):  # type: ignore[no-untyped-def]
-    """Find a(c) by bracketed Newton steps; then volume and force."""
+    """Find a(c) by false position with halved ends (Illinois); then volume and force."""
     for case in range(n.size):
-        low, high = 1.0, 1.0
-        while _plateau(n[case], c[case], high, abscissa, weight, 0) > 0.0 or high == 1.0:
+        low, high = 1.0, 1.5
+        low_value = _plateau(n[case], c[case], low, abscissa, weight, 0)
+        high_value = _plateau(n[case], c[case], high, abscissa, weight, 0)
+        while high_value > 0.0:
+            low, low_value = high, high_value
             high *= 1.5
-        for _ in range(100):
-            middle = 0.5 * (low + high)
-            if high - low < 4e-16 * middle or middle in (low, high):
+            high_value = _plateau(n[case], c[case], high, abscissa, weight, 0)
+        a, side = low, 0
+        for _ in range(200):
+            last = a
+            a = (low * high_value - high * low_value) / (high_value - low_value)
+            if abs(a - last) < 4e-16 * a or not low < a < high:
                 break
-            if _plateau(n[case], c[case], middle, abscissa, weight, 0) > 0.0:
-                low = middle
+            value = _plateau(n[case], c[case], a, abscissa, weight, 0)
+            if value > 0.0:
+                low, low_value = a, value
+                high_value *= 0.5 if side == 1 else 1.0
+                side = 1
             else:
-                high = middle
-        a = 0.5 * (low + high)
+                high, high_value = a, value
+                low_value *= 0.5 if side == -1 else 1.0
+                side = -1
         result[0, case] = a
         result[1, case] = 4.0 * _plateau(n[case], c[case], a, abscissa, weight, 1)
         result[2, case] = 2.0 * (c[case] - c[case] * _power(c[case], n[case]) / (n[case] + 1.0))
@@ -156,22 +168,22 @@ def _fasts(n, c, cycles, xi, limit, abscissa, weight, result):  # type: ignore[n
         low, high = 1.0, limit[case]
         low_value = _scar_integral(low, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
         high_value = _scar_integral(high, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-        if high_value >= 0.0 or low_value <= 0.0:
-            low = high
-        for _ in range(60):
-            if high - low <= 1e-13 * high:
-                break
-            trial = (low * high_value - high * low_value) / (high_value - low_value)
-            value = _scar_integral(trial, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-            if abs(value) < 1e-14 * eta:
-                low = high = trial
-            elif value > 0.0:
-                low, low_value = trial, value
-                high_value *= 0.5
-            else:
-                high, high_value = trial, value
-                low_value *= 0.5
-        radius = 0.5 * (low + high)
+        radius = high
+        if high_value < 0.0 < low_value:
+            side = 0
+            for _ in range(60):
+                radius = (low * high_value - high * low_value) / (high_value - low_value)
+                value = _scar_integral(radius, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
+                if abs(value) < SCAR_ERROR * eta or high - low <= 1e-13 * high:
+                    break
+                if value > 0.0:
+                    low, low_value = radius, value
+                    high_value *= 0.5 if side == 1 else 1.0
+                    side = 1
+                else:
+                    high, high_value = radius, value
+                    low_value *= 0.5 if side == -1 else 1.0
+                    side = -1
         volume = _scar_integral(radius, 1, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
         result[0, case], result[1, case] = radius, 4.0 * volume
         worn = 0.0

@@ -13,6 +13,7 @@ from mdr_dask.physics.panels import Panels, graded_panels, interpolate
 from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.transforms import gauss
 from mdr_dask.physics.wear import Worn, check_stick_radius, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear_gross import GrossSlip
 
 FloatArray = NDArray[np.float64]
 
@@ -162,9 +163,9 @@ def _sliding(profile: Profile, paths: Sequence[float], constant_force: bool, tol
     if constant_force:
         doubled = round(2.0 * max(-np.log10(tolerance), 2.0))
         panels, step_error = graded_panels(doubled + 1, doubled + 4, 4), tolerance
-        virgin = evolution.GrossSlip(profile, panels)
+        virgin = GrossSlip(profile, panels)
         force = virgin.normal_force(virgin.start().unknowns)
-    problem = evolution.GrossSlip(profile, panels, force)
+    problem = GrossSlip(profile, panels, force)
     history = evolution.march(problem, max(paths), step_error)
     loads = evolution.integral_along(history, [problem.normal_force(m.unknowns) for m in history])
     return [
@@ -177,7 +178,7 @@ def _slid_distance(fine: Slid, coarse: Slid) -> float:
     return float(np.max(np.abs(fine.height - coarse.curve("height", fine.radius))))
 
 
-def _slid(problem: evolution.GrossSlip, unknowns: FloatArray, force_path: float) -> Slid:
+def _slid(problem: GrossSlip, unknowns: FloatArray, force_path: float) -> Slid:
     image, a, depth = problem.split(unknowns)
     gathered = problem.gathered(unknowns)
     return Slid(

@@ -14,11 +14,14 @@ from scipy.stats import t as student
 from mdr_dask.physics import wear
 from mdr_dask.physics.revolution import Profile
 from mdr_dask.physics.wear_exact import exact
+from mdr_dask.physics.wear_force import exact_forced
+from mdr_dask.physics.wear_force_fast import fast_forced
 
 FloatArray = NDArray[np.float64]
 
-#: N at which every profile has reached its limit to a millionth of d0.
+#: N at which every profile has reached its limit to a millionth of d0, and later under constant force.
 _ENOUGH = 60.0
+_ENOUGH_FORCED = 400.0
 
 
 class Factor(NamedTuple):
@@ -31,7 +34,9 @@ class Factor(NamedTuple):
     explained: float
 
 
-def volume_curve(profile: Profile, stick_radius: float, method: str = "exact", xi: float = 1.0) -> CubicSpline:
+def volume_curve(
+    profile: Profile, stick_radius: float, method: str = "exact", xi: float = 1.0, *, constant_force: bool = False
+) -> CubicSpline:
     """Return V(N), by the exact or the fast rule, as a curve over ln(1 + N / 0.01).
 
     Parameters
@@ -44,24 +49,32 @@ def volume_curve(profile: Profile, stick_radius: float, method: str = "exact", x
         The rule.
     xi : float
         Factor of the fast rule.
+    constant_force : bool
+        Keep the force of the virgin contact instead of its depth.
     """
-    cycles = _cycles()
-    contacts = _contacts(profile, stick_radius, method, xi, cycles)
+    cycles = _cycles(constant_force)
+    contacts = _contacts(profile, stick_radius, method, xi, cycles, constant_force)
     return CubicSpline(_stretch(cycles), [contact.wear_volume for contact in contacts])
 
 
 def profile_curve(
-    profile: Profile, stick_radius: float, radius: ArrayLike, method: str = "exact", xi: float = 1.0
+    profile: Profile,
+    stick_radius: float,
+    radius: ArrayLike,
+    method: str = "exact",
+    xi: float = 1.0,
+    *,
+    constant_force: bool = False,
 ) -> CubicSpline:
     """Return f(r; N) at given radii as `volume_curve` does."""
-    cycles = _cycles()
-    contacts = _contacts(profile, stick_radius, method, xi, cycles)
+    cycles = _cycles(constant_force)
+    contacts = _contacts(profile, stick_radius, method, xi, cycles, constant_force)
     return CubicSpline(_stretch(cycles), np.array([contact.height(radius) for contact in contacts]))
 
 
 def at_cycles(curve: CubicSpline, cycles: ArrayLike) -> FloatArray:
     """Evaluate one of the curves; beyond its end the body has reached its limit."""
-    return np.asarray(curve(_stretch(np.minimum(np.asarray(cycles, dtype=float), _ENOUGH))))
+    return np.asarray(curve(np.minimum(_stretch(np.asarray(cycles, dtype=float)), curve.x[-1])))
 
 
 def fit_factor(predict: Callable[[float], FloatArray], measured: ArrayLike) -> Factor:
@@ -108,15 +121,20 @@ def fit_factor(predict: Callable[[float], FloatArray], measured: ArrayLike) -> F
     return Factor(float(np.exp(value)), float(np.exp(value - half)), float(np.exp(value + half)), residual, explained)
 
 
-def _cycles() -> FloatArray:
-    return np.append(0.0, np.geomspace(1e-3, _ENOUGH, 80))
+def _cycles(constant_force: bool) -> FloatArray:
+    return np.append(0.0, np.geomspace(1e-3, _ENOUGH_FORCED if constant_force else _ENOUGH, 80))
 
 
 def _stretch(cycles: FloatArray) -> FloatArray:
     return np.log1p(cycles / 0.01)
 
 
-def _contacts(profile: Profile, c: float, method: str, xi: float, cycles: FloatArray) -> list[wear.Worn]:
+def _contacts(
+    profile: Profile, c: float, method: str, xi: float, cycles: FloatArray, constant_force: bool
+) -> list[wear.Worn]:
     if method == "fast":
-        return [wear.fast(profile, c, float(n), xi) for n in cycles]
+        rule = fast_forced if constant_force else wear.fast
+        return [rule(profile, c, float(n), xi) for n in cycles]
+    if constant_force:
+        return list(exact_forced(profile, c, [float(n) for n in cycles], 1e-3))
     return list(exact(profile, c, [float(n) for n in cycles], 1e-4))

@@ -68,7 +68,7 @@ def exact_forced(
     -------
     list of Fretted
         In the order of `cycles`, with depth and border. The error is 3 times the distance from a solution with a
-        four times wider tolerance.
+        four times wider tolerance, or the tolerance if that is more.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def exact_forced(
     check_stick_radius(stick_radius)
     wanted = sorted({float(n) for n in cycles})
     fine, coarse = (_forced(profile, stick_radius, wanted, t) for t in _tolerances(tolerance))
-    judged = {n: replace(fine[n], error=_SAFETY * _distance(fine[n], coarse[n])) for n in wanted}
+    judged = {n: replace(fine[n], error=_error(profile, fine[n], coarse[n], tolerance)) for n in wanted}
     return [judged[float(n)] for n in cycles]
 
 
@@ -96,7 +96,7 @@ def limit_forced(profile: Profile, stick_radius: float, tolerance: float = 1e-4)
     """
     check_stick_radius(stick_radius)
     fine, coarse = (_end(*_jumped(profile, stick_radius, t)) for t in _tolerances(tolerance))
-    return replace(fine, error=_SAFETY * _distance(fine, coarse))
+    return replace(fine, error=_error(profile, fine, coarse, tolerance))
 
 
 def _tolerances(tolerance: float) -> tuple[float, float]:
@@ -249,6 +249,12 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
+
+
+def _error(profile: Profile, fine: Worn, coarse: Worn, tolerance: float) -> float:
+    """Return the error expected of f: not below the tolerance, which both solutions may miss alike at the edge."""
+    eta = float(profile.rise(np.array(1.0), fine.stick_radius))
+    return max(_SAFETY * _distance(fine, coarse), _tolerances(tolerance)[0] * eta)
 
 
 def _distance(fine: Worn, coarse: Worn) -> float:

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics.revolution import Profile, bisect
 from mdr_dask.physics.transforms import gauss
-from mdr_dask.physics.wear_force_evolution import virgin_areas
 from mdr_dask.physics.wear import THESIS_XI, Worn, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear_force_evolution import virgin_areas
 
 FloatArray = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     force = 2.0 * (c - area + slipping)
     volume = worn_volume(change, c, scar, breaks)
     depth = 1.0 + eta * rise
-    return Worn(profile, c, scar, edge, volume, force, 1e-4, change, change_slope, breaks, depth=depth, border=border)
+    return Worn(profile, c, scar, edge, volume, force, 1e-5, change, change_slope, breaks, depth=depth, border=border)
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray]:

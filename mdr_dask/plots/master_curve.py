@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from mdr_dask.plots.base import Plot
 
@@ -107,10 +108,24 @@ def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: flo
         exponent = float(curve["power_exponent"])
         axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
         axes.set_xscale("log")
+        _plain_ticks(axes, groups)
     axes.set_xlabel(_label(by, curve[by]))
     axes.set_ylabel(f"shift of log10 {str(curve.attrs['abscissa']).replace('_', ' ')} (decades)")
     axes.set_title("shift factors")
     axes.legend(fontsize="small")
+
+
+def _plain_ticks(axes: Axes, groups: NDArray[np.float64]) -> None:
+    """Name three or four of the groups on a logarithmic axis: within a decade its own labels run into each other."""
+    from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+
+    if np.ptp(np.log10(groups)) >= 2:
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        return
+    named = np.unique(np.linspace(0, groups.size - 1, min(groups.size, 4)).round().astype(int))
+    axes.xaxis.set_major_locator(FixedLocator(groups[named]))
+    axes.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
+    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def _of_store(series: Mapping[str, xr.Dataset]) -> Figure:

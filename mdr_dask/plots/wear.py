@@ -203,7 +203,8 @@ def _label(axes: Axes, name: str, data: xr.Dataset) -> None:
     axes.set_xlabel("r / $a_0$" if profile else "x / $a_0$")
     axes.set_ylabel(_axis_text("f(r)" if profile else "g(x)", "m", "d_0", data))
     if _dimensionless(data):
-        axes.set_ylim(0.0, 1.25)
+        deepest = float(data["block_depth"].max()) if "block_depth" in data else 1.0
+        axes.set_ylim(0.0, deepest + 0.25)
 
 
 def _axis_text(what: str, unit: str, symbol: str, data: xr.Dataset) -> str:

@@ -26,9 +26,9 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     Returns
     -------
     dict of str to Dataset
-        Every group by series name (``""`` for a study without series, ``"-"`` if series were added to it), numeric axes in
-        ascending order. Arrays are
-        loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays, reduced chunk by chunk.
+        Every group by series name (``""`` for a study without series, ``"-"`` if series were added to it), numeric
+        axes in ascending order. Arrays are loaded when used; those of a group larger than `LAZY_BYTES` are Dask arrays,
+        reduced chunk by chunk.
 
     Raises
     ------

@@ -12,6 +12,8 @@ from mdr_dask.models.fretting_wear.parameters import FrettingWear
 from mdr_dask.physics import wear
 from mdr_dask.physics.revolution import PowerProfile
 from mdr_dask.physics.wear_fit import at_cycles, fit_factor, volume_curve
+from mdr_dask.physics.wear_force import exact_forced
+from mdr_dask.physics.wear_force_fast import fast_forced
 
 PARABOLA = PowerProfile(2.0)
 
@@ -115,3 +117,15 @@ def test_no_table_and_bad_tables(tmp_path):
 def test_parameters_come_back_from_a_store():
     text = FrettingWear(stick_radius=0.4, shape="cone").model_dump_json()
     assert FrettingWear.model_validate(json.loads(text)).shape == "cone"
+
+
+@pytest.mark.parametrize("method", ["fast", "exact"])
+def test_volume_curve_under_constant_force(method):
+    """As the model has it, and far beyond the limit of constant depth."""
+    curve = volume_curve(PARABOLA, 0.5, method, 0.8, constant_force=True)
+    if method == "fast":
+        expected = [fast_forced(PARABOLA, 0.5, n, 0.8).wear_volume for n in (2.0, 30.0)]
+    else:
+        expected = [worn.wear_volume for worn in exact_forced(PARABOLA, 0.5, [2.0, 30.0], 1e-3)]
+    np.testing.assert_allclose(at_cycles(curve, [2.0, 30.0]), expected, rtol=2e-3)  # a spline over 80 values of N
+    assert expected[1] > 1.2 * wear.limit(PARABOLA, 0.5).wear_volume

@@ -207,3 +207,13 @@ def test_distinct_and_seconds_are_cheap_estimates():
     assert MODEL.distinct is not None
     assert MODEL.distinct(block) == 3
     assert MODEL.seconds(block) > 0
+
+
+def test_an_evolution_that_cannot_be_followed_is_a_value():
+    """Under constant force the border leaves a flat bottom next to gross slip too fast for the panels."""
+    result = run(
+        FrettingWear(shape=PowerShape(exponent=5.0), stick_radius=0.05, cycles=1.0, method="exact", hold="force")
+    )
+    assert result.status[0, 0] == Status.NOT_CONVERGED
+    assert "the wear law could not be advanced" in result.messages[0, 0]
+    assert np.isnan(result.values["wear_volume"][0, 0])

@@ -95,3 +95,20 @@ def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
     (tmp_path / "noise.nc").write_bytes(b"nothing" * 10)
     with pytest.raises(DataError, match=r"noise.nc: SurfaceTopography cannot read it"):
         line_of(ProfileFile.model_validate(str(tmp_path / "noise.nc")))
+
+
+@pytest.mark.parametrize(
+    ("names", "separator", "mark"),
+    [("x [um];z [nm]", ";", ","), ("x (um)\tz (nm)", "\t", ","), ("x,z\num,nm", ",", ".")],
+    ids=["semicolons", "tabs", "row of units"],
+)
+def test_decimal_commas_and_units_behind_names_are_understood(tmp_path, names, separator, mark):
+    rows = "\n".join(f"{2 * i}.0{separator}{z:.6f}".replace(".", mark) for i, z in enumerate(HEIGHT))
+    (tmp_path / "line.csv").write_text(f"% instrument 7\n{names}\n{rows}\n")
+    line = line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
+    assert line.length == pytest.approx(32e-6)
+    np.testing.assert_allclose(line.height, 1e-9 * HEIGHT, atol=1e-15)
+
+
+def test_brackets_without_a_unit_are_names(tmp_path):
+    assert line_of(write(tmp_path / "line.csv", "x (left),z (top)\n")).length == 16

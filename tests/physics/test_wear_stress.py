@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 from mdr_dask.physics import wear, wear_cases
 from mdr_dask.physics.revolution import PowerProfile, from_table
 from mdr_dask.physics.wear_exact import exact, gross
+from mdr_dask.physics.wear_force import exact_forced, limit_forced
+from mdr_dask.physics.wear_force_fast import fast_forced
 
 EXPONENTS = st.floats(0.3, 20.0)
 STICKS = st.floats(0.001, 0.999)
@@ -76,3 +78,44 @@ def test_sliding(exponent, constant_force):
         assert slid.wear_volume == pytest.approx(slid.force_path, rel=3e-3, abs=3e-3)
         assert slid.contact_radius >= 1.0
         assert np.all(np.isfinite(slid.pressure))
+
+
+@pytest.mark.parametrize(
+    ("exponent", "c"),
+    [
+        (0.3, 0.98),
+        (0.5, 0.1),
+        (1.0, 0.05),
+        (2.0, 0.05),
+        (2.0, 0.99),
+        (3.0, 0.2),
+        (5.0, 0.4),
+        (8.0, 0.5),
+        (20.0, 0.99),
+    ],
+)
+def test_constant_force(exponent, c):
+    """Force and energy are kept, f rises only, depth and border stay below those of the end; c^n >= 0.0025."""
+    profile, eta = PowerProfile(exponent), 1.0 - c**exponent
+    limit = limit_forced(profile, c, 1e-3)
+    for worn in exact_forced(profile, c, [1e-3, 3.0, 100.0], 1e-3):
+        assert worn.normal_force == pytest.approx(limit.normal_force, rel=2e-4)
+        assert worn.wear_volume == pytest.approx(worn.energy_volume, rel=0.01, abs=1e-3 * eta)
+        assert 1.0 - 1e-6 <= worn.depth <= limit.depth * (1.0 + 1e-3)
+        assert c <= worn.stick_border <= limit.stick_border * 1.0002
+        assert worn.wear_volume <= limit.wear_volume * 1.003
+        r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
+        assert np.all(worn.height(r) >= profile.height(r) - 1e-3 * eta)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(0.3, 20.0), st.floats(0.01, 0.999), CYCLES, st.floats(0.3, 1.5))
+@example(20.0, 0.1, 1e4, 0.8)
+@example(0.3, 0.01, 1e4, 0.8)
+def test_fast_rule_under_constant_force(exponent, c, cycles, xi):
+    """Finite and ordered everywhere: the border moves outwards, the depth grows, the body loses material."""
+    worn = fast_forced(PowerProfile(exponent), c, cycles, xi)
+    assert np.isfinite(worn.wear_volume)
+    assert worn.wear_volume >= -1e-12
+    assert worn.depth >= 1.0
+    assert c <= worn.stick_border <= 1.0 <= worn.contact_radius

@@ -189,6 +189,7 @@ MODEL = Model(
         "pressure_viscosity",
         "layer_thickness",
         "layer_shear_strength",
+        "film_formula",
         "film_thickness",
     ),
     coordinates=coordinates,

@@ -1,0 +1,106 @@
+"""Extremes of protocols: a value right to its own estimate, or a status with a sentence."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+
+EVERY = tuple(output.name for output in MODEL.outputs)
+BASE = {
+    "length": 0.002,
+    "points": 16,
+    "oversampling": 4,
+    "rms_roughness": 2e-6,
+    "shear_modulus": 1e7,
+    "relaxation_time": 1e-3,
+    "normal_force": 0.1,
+    "velocity": 0.05,
+    "relaxation_times": (0.0, 0.05, 0.5, 1.0, 2.0),
+}
+ARMS = {
+    "prony": {
+        "static_modulus": 1e7,
+        "moduli": [1e6 * (1 + m % 3) for m in range(50)],
+        "times": [float(t) for t in np.geomspace(1e-7, 1e-3, 50)],
+    }
+}
+
+
+def solved(**changes: object) -> tuple[dict[str, np.ndarray], int, str]:
+    kept = {name: value for name, value in (BASE | changes).items() if value is not None}
+    result = compute(Block(VelocityJump.model_validate(kept), {}, 1, (0, 1), 5, EVERY))
+    return {k: v[0, 0] for k, v in result.values.items()}, int(result.status[0, 0]), result.messages.get((0, 0), "")
+
+
+def check(**changes: object) -> None:
+    values, status, message = solved(**changes)
+    if status == Status.DONE:
+        assert np.all(np.isfinite(values["friction_coefficient"]))
+        assert values["discretisation_error"] >= 0
+    else:
+        assert message
+        assert np.all(np.isnan(values["friction_coefficient"]))
+
+
+def powers(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda x: float(10**x))
+
+
+SPEEDS = st.one_of(st.just(0.0), powers(-6, 0), powers(-3, 0).map(lambda v: -v))
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    speeds=st.lists(SPEEDS, min_size=3, max_size=3),
+    forces=st.lists(powers(-5, 3), min_size=3, max_size=3),
+    start=st.sampled_from(["rest", "steady"]),
+    body=st.sampled_from(["kelvin", "standard_solid", "prony"]),
+)
+def test_steps_of_velocity_and_load(speeds: list[float], forces: list[float], start: str, body: str) -> None:
+    """Phases at rest and backwards, loads that jump by up to eight decades, from one point to full contact."""
+    steps = {"shape": "steps", "start": start, "times": [0.0, 5e-4, 1e-3], "velocities": speeds, "forces": forces}
+    check(protocol=steps, **of(body))
+
+
+def of(body: str) -> dict[str, object]:
+    if body == "kelvin":
+        return {}
+    solid = {"standard_solid": {"static_modulus": 1e7, "glass_modulus": 1e9, "relaxation_time": 1e-3}}
+    return {"shear_modulus": None, "relaxation_time": None, "material": solid if body == "standard_solid" else ARMS}
+
+
+@settings(max_examples=12, deadline=None, derandomize=True)
+@given(frequency=powers(0, 5), part=st.floats(0, 3), load=st.floats(0, 0.999), force=powers(-5, 2))
+def test_oscillation_slower_and_faster_than_relaxation(
+    frequency: float, part: float, load: float, force: float
+) -> None:
+    swing = {
+        "shape": "oscillation",
+        "amplitude": 0.05 * part,
+        "frequency": frequency,
+        "force_amplitude": force * load,
+    }
+    check(protocol=swing, normal_force=force)
+
+
+@pytest.mark.parametrize("velocity", [1e-6, 0.05, 10.0])
+@pytest.mark.parametrize("duration", [1e-9, 1.0])
+def test_ramps_like_jumps_and_like_nothing(velocity: float, duration: float) -> None:
+    check(protocol={"shape": "ramp", "start": "rest", "duration": duration, "velocity": velocity, "force": 1e-6})
+
+
+@pytest.mark.parametrize("hurst", [0.0, 1.0])
+@pytest.mark.parametrize("roughness", [1e-12, 1e-3])
+def test_nearly_flat_and_very_rough_lines(hurst: float, roughness: float) -> None:
+    steps = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
+    check(protocol=steps, hurst=hurst, rms_roughness=roughness)
+
+
+def test_fifty_arms_end_in_their_steady_state() -> None:
+    steps = {"shape": "steps", "times": [0.0], "velocities": [0.06]}
+    values, status, _ = solved(protocol=steps, relaxation_times=(1.0, 40.0), oversampling=8, **of("prony"))
+    assert status == Status.DONE
+    assert values["friction_coefficient"][-1] == pytest.approx(values["friction_coefficient_after"], rel=1e-2)
