@@ -48,7 +48,7 @@ class VelocityJump(Parameters):
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
     oversampling: int = quantity("1", "grid points for every Nyquist point", default=4, ge=2, le=256, multiple_of=2)
-    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=12, ge=6, le=400)
+    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
     hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
     rolloff_wavelength: float | None = quantity(
