@@ -44,7 +44,7 @@ def relaxing(found):
 
 
 def honesty(cases=200, seed=0, oversampling=4, steps=8):
-    """Return true errors and estimates, over mu_2, and the largest relaxing part; NaN where a march did not converge."""
+    """Return true errors, estimates and largest relaxing parts, over mu_2; NaN where a march did not converge."""
     generator = np.random.default_rng(seed)
     rows = np.full((cases, 3), np.nan)
     for k in range(cases):
@@ -76,7 +76,7 @@ if __name__ == "__main__":
         some = part > 1e-8
         print(
             f"oversampling {grid}, {pace} steps: {done.sum()} of {number} converged, {share:.1%} below the estimate, "
-            f"{np.median(estimate[some] / np.maximum(error[some], 1e-12)):.1f} times too large (median); error over mu_2 "
-            f"median {np.median(error):.1e}, 95 % {np.quantile(error, 0.95):.1e}; over the relaxing part median "
+            f"{np.median(estimate[some] / np.maximum(error[some], 1e-12)):.1f} times too large (median); error over "
+            f"mu_2 median {np.median(error):.1e}, 95 % {np.quantile(error, 0.95):.1e}; over the relaxing part median "
             f"{np.median(error[some] / part[some]):.1e}"
         )

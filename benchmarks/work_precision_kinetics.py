@@ -3,8 +3,8 @@
     python -m benchmarks.work_precision_kinetics [FIGURE]
 
 One realisation of the case of Fig. 4.3 at a tenth of its length (500 Nyquist points); error is the largest difference
-of mu - mu_2 at 20 moments over mu_2. The truth owes nothing to the march: every element is followed from the steady state
-at v_1 on two fine grids, and the two results are extrapolated at second order.
+of mu - mu_2 at 20 moments over mu_2. The truth owes nothing to the march: every element is followed from rest on two
+fine grids, and the two results are extrapolated at second order.
 """
 
 from __future__ import annotations
