@@ -261,7 +261,7 @@ def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="ehl_line",
-    version=1,
+    version=2,
     summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
     parameters=EhlLineParameters,
     outputs=OUTPUTS,
