@@ -16,16 +16,15 @@ from mdr_dask.models.base import (
     FloatArray,
     Model,
     Output,
-    Parameters,
     Result,
     Status,
     canonical,
     quantity,
 )
-from mdr_dask.models.indenter import Indenter, Plane
-from mdr_dask.models.material import Material, solid_of
-from mdr_dask.models.profile_file import ProfileFile, line_of
+from mdr_dask.models.material import solid_of
+from mdr_dask.models.profile_file import line_of
 from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
+from mdr_dask.models.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
@@ -40,33 +39,14 @@ SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of th
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
-class VelocityJump(Parameters):
+class VelocityJump(SlidingBody):
     """A Kelvin body under a constant load on a self-affine line, whose velocity jumps from v_1 to v_1 + dv."""
 
-    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
-    points: int = quantity(
-        "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
-    )
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
     oversampling: int = quantity("1", "grid points for every Nyquist point", default=4, ge=2, le=256, multiple_of=2)
     steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
-    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
-    rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
-    )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
-    shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
-    )
-    relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
-    )
-    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
     protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
         "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
@@ -83,14 +63,6 @@ class VelocityJump(Parameters):
     def _changes(self) -> VelocityJump:
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
-        generated = self.length is not None and self.rms_roughness is not None
-        partly = self.length is not None or self.rms_roughness is not None
-        if (self.profile is None and not generated) or (self.profile is not None and partly):
-            raise ValueError("expected length with rms_roughness, or profile")
         return self
 
     @property
