@@ -11,6 +11,8 @@ from mdr_dask.physics.panels import graded_panels
 from mdr_dask.physics.revolution import PowerProfile
 from mdr_dask.physics.transforms import inverse_transform
 from mdr_dask.physics.wear_exact import exact_without_error
+from mdr_dask.physics.wear_force import exact_forced, limit_forced
+from mdr_dask.physics.wear_force_fast import fast_forced
 from mdr_dask.physics.wear_literal import literal
 
 PARABOLA = PowerProfile(2.0)
@@ -31,6 +33,20 @@ def test_exact(benchmark, tolerance):
 
 def test_literal(benchmark):
     assert benchmark.pedantic(literal, (PARABOLA, 0.455, 0.5), {"cells": 60, "substeps": 16}).wear_volume > 0
+
+
+@pytest.mark.parametrize("method", [limit_forced, fast_forced, exact_forced, literal])
+def test_constant_force(benchmark, method):
+    """The four methods at N = 2, c = 0.455: tolerance 1e-3, 100 cells."""
+    arguments = {
+        limit_forced: ((1e-3,), {}),
+        fast_forced: ((2.0,), {}),
+        exact_forced: (([2.0], 1e-3), {}),
+        literal: ((2.0,), {"cells": 100, "substeps": 16, "constant_force": True}),
+    }
+    values, names = arguments[method]
+    worn = benchmark.pedantic(method, (PARABOLA, 0.455, *values), names)
+    assert np.ravel([worn])[0].depth > 1.0
 
 
 def test_inverse_transform(benchmark):

@@ -48,7 +48,7 @@ def random_case(generator: np.random.Generator) -> dict[str, object]:
     ]
     return {
         "length": 0.002,
-        "points": 32,
+        "points": 20,
         "oversampling": 8,
         "hurst": generator.uniform(0.3, 1),
         "rms_roughness": 2e-6,

@@ -10,7 +10,8 @@ import sys
 import numpy as np
 
 from mdr_dask.models.base import Block
-from mdr_dask.models.sliding_friction import MODEL, Cone, Parabola, SlidingFriction
+from mdr_dask.models.indenter import Cone, Parabola
+from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics import indenter, laws, roughness
 
 LENGTH, HURST, RMS, POINTS, FORCE, MODULUS, TAU = 0.01, 0.4, 5e-5, 2000, 10.0, 1e6, 1e-3

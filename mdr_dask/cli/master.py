@@ -47,8 +47,8 @@ def master_curve(
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
-    SOURCE is a store, a table (CSV with a row of names, perhaps one of units) or a result kept by --keep, which
-    is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
+    SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by
+    --keep, which is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
@@ -78,8 +78,9 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
     from mdr_dask import store
     from mdr_dask.fit.master_curve import friction_of_roughness, read_table
 
-    if Path(source).is_file():
-        return read_table(source)
+    path = Path("/dev/stdin" if source == "-" else source)
+    if path.is_file() or path.is_fifo() or source == "-":
+        return read_table(path)
     groups = store.datasets(source)
     if series is None and len(groups) > 1:
         return selection.select(friction_of_roughness(groups), selections)

@@ -118,17 +118,19 @@ def _relaxation(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *_needed())
     samples, goodness = _relaxations(cases)
     samples |= _lengths(cases, samples["rate"])
-    result = xr.Dataset(cases.constants(samples, RATE_FIELDS | LENGTH_FIELDS, POSITIVE))
+    constants = cases.constants(samples, RATE_FIELDS | LENGTH_FIELDS, POSITIVE)
     law = law_rate(cases.passing, cases.column("hurst"))
-    result["passing_number"] = cases.found(cases.passing, "1", "v_1 tau q_max")
-    result["law_rate"] = cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12")
-    for name in ("window", "unexplained", "probability"):
-        result[name] = cases.found(goodness[name], *GOODNESS_FIELDS[name])
     left, probability = goodness["unexplained"], goodness["probability"]
     enough = np.where(one_is_enough(left, probability), "yes", np.where(np.isnan(left), "nothing relaxes", "no"))
-    result["one_is_enough"] = cases.found(enough, "1", "whether one exponential is enough")
-    result.attrs["window"] = WINDOW_TEXT
-    return result
+    first = {"passing_number": cases.found(cases.passing, "1", "v_1 tau q_max")}
+    measures = {
+        "law_rate": cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12"),
+        "one_is_enough": cases.found(enough, "1", "whether one exponential is enough"),
+    }
+    measures |= {name: cases.found(goodness[name], *GOODNESS_FIELDS[name]) for name in ("unexplained", "probability")}
+    first |= {name: constants[name] for name in ("rate", "rate_low", "rate_high")}
+    window = {"window": cases.found(goodness["window"], *GOODNESS_FIELDS["window"])}
+    return xr.Dataset(first | measures | constants | window, attrs={"window": WINDOW_TEXT})
 
 
 def _shape(series: Series) -> xr.Dataset:
@@ -177,7 +179,7 @@ def _jump_law(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *LEVELS, "rms_slope")
     numbers = _numbers(cases)
     before, jump = numbers["before_over_slope"], numbers["jump_over_slope"]
-    known = np.isfinite(before[0]) & np.all(before > 0, axis=0) & np.all(jump > 0, axis=0)
+    known = _rising(cases, numbers) & np.all(before > 0, axis=0) & np.all(jump > 0, axis=0)
     if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
         raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
     rows = _rows_of(cases.column("hurst"))
@@ -194,8 +196,15 @@ def _jump_law(series: Series) -> xr.Dataset:
     result = xr.Dataset({name: ("hurst", column, {"units": "1"}) for name, column in table.items()})
     result["deviation"].attrs["long_name"] = "rms of the relative deviations from the law with the constant fitted"
     result.attrs["law"] = f"d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2), s = rms_slope; thesis: c = {LAW}"
-    result.attrs["window"] = "all cases that succeeded, equal weights of the relative deviations"
+    result.attrs["window"] = "regions I to III, where friction does not fall; equal weights of the relative deviations"
     return result.assign_coords(hurst=[label for label, _ in rows])
+
+
+def _rising(cases: Cases, numbers: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
+    """Return which cases lie in regions I to III, those of eqs. 4.9-4.11: friction does not fall with velocity."""
+    highest = bootstrap.interval(numbers["xi"], cases.count)[1]
+    rising: NDArray[np.bool_] = np.isfinite(highest) & (highest >= 0)
+    return rising
 
 
 def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
@@ -232,7 +241,7 @@ def _jump_limits(series: Series) -> xr.Dataset:
     law = jump_law(before, LAW)
     limits = {
         "region I": (before < REGION_ONE, numbers["zeta"], 1.0, law / before),
-        "plateau": (before > PLATEAU, numbers["jump_over_slope"], LAW, law),
+        "plateau": ((before > PLATEAU) & _rising(cases, numbers), numbers["jump_over_slope"], LAW, law),
     }
     if not any(np.any(inside) for inside, *_ in limits.values()):
         raise FitError(f"expected cases with mu_1 / rms_slope below {REGION_ONE} or above {PLATEAU}")
@@ -249,7 +258,7 @@ def _jump_limits(series: Series) -> xr.Dataset:
         {"hurst": [label for label, _ in rows], "limit": list(limits)},
     )
     result.attrs["law"] = f"eq. 4.9: zeta = 1 in region I; eq. 4.10: d_mu_0 v_1 / (dv rms_slope) = {LAW} on the plateau"
-    result.attrs["window"] = f"region I: mu_1 / rms_slope < {REGION_ONE}; plateau: > {PLATEAU}"
+    result.attrs["window"] = f"region I: mu_1 / rms_slope < {REGION_ONE}; plateau: > {PLATEAU}, and not falling"
     return result
 
 

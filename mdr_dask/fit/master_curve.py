@@ -102,9 +102,9 @@ def master_curve(
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
     if second is not None:
-        if vertical or draws:
-            raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors and bootstrap")
-        return _of_two_groups(frame, over, values, (by, second), reference)
+        if vertical:
+            raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors")
+        return _of_two_groups(frame, over, values, (by, second), reference, draws)
     groups, curves = _curves(frame, over, values, by)
     nearest = None if reference is None else _nearest(groups, reference)
     result = superposition.superpose(groups, curves, vertical, nearest, draws)
@@ -174,7 +174,7 @@ def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 
 
 def _of_two_groups(
-    frame: pd.DataFrame, over: str, values: str, by: tuple[str, str], reference: float | None
+    frame: pd.DataFrame, over: str, values: str, by: tuple[str, str], reference: float | None, draws: int
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
@@ -191,7 +191,7 @@ def _of_two_groups(
         curves.append(curve)
     a, b = np.array(keys).T
     zero = _nearest(np.unique(a), np.unique(a)[np.unique(a).size // 2] if reference is None else reference)
-    found = two_shifts.superpose_twice(a, b, curves, (zero, float(np.unique(b)[np.unique(b).size // 2])))
+    found = two_shifts.superpose_twice(a, b, curves, (zero, float(np.unique(b)[np.unique(b).size // 2])), draws)
     units = frame.attrs.get("units", {})
     dataset = _dataset(found.first, over, values, by[0], units)
     dataset["point_shift"] = (
@@ -203,6 +203,8 @@ def _of_two_groups(
     extra = _dataset(found.second, over, values, by[1], units)
     for part in ("", "_error", "_low", "_high"):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
+    if draws:
+        dataset["second_draws"] = extra["draws"]
     laws = _laws(found.first, over, by[0], units.get(by[0], "")) | _laws(
         found.second, over, by[1], units.get(by[1], "")
     )

@@ -22,8 +22,9 @@ RESTART = 4  # oversampling of the sweeps over what is left
 SAMPLED = 4  # oversampling of a line that cases go along from node to node
 REFINEMENTS = (1, 2, 4, 8, 16)  # of its cells where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
-QUICK_SAFETY, QUICK_MEMORY = 0.8, 0.08  # of the last change between grids and of the one before; see docs/friction.md
+QUICK_SAFETY, QUICK_MEMORY = 1.0, 0.1  # of the last change between grids and of the one before; see docs/friction.md
 FEW = 10  # nodes in contact that are too few to go from node to node
+MANY, SAFETY_OF_MANY = 1000, 0.6  # nodes in contact whose errors are an average
 
 
 @dataclass(frozen=True)
@@ -142,9 +143,10 @@ class Task:
             fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
             found, now = sampled.extrapolated(coarse, fine)
             # two grids may agree by chance, hardly three
-            estimate = np.maximum(QUICK_SAFETY * now, QUICK_MEMORY * change) + fine.doubt
-            many = fine.contact_fraction * height.size * refinement > FEW
-            error[left] = np.where(many & np.isfinite(estimate), estimate, np.inf)
+            touching = fine.contact_fraction * height.size * refinement
+            safety = np.where(touching > MANY, SAFETY_OF_MANY, QUICK_SAFETY)
+            estimate = np.maximum(safety * now, QUICK_MEMORY * change) + fine.doubt
+            error[left] = np.where((touching > FEW) & np.isfinite(estimate), estimate, np.inf)
             steady = steady.replaced(left, found)
             still = ~(error[left] <= accuracy)
             left, coarse, change = left[still], fine.only(still), now[still]

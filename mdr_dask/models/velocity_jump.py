@@ -16,53 +16,37 @@ from mdr_dask.models.base import (
     FloatArray,
     Model,
     Output,
-    Parameters,
     Result,
     Status,
     canonical,
     quantity,
 )
-from mdr_dask.models.indenter import Indenter, Plane
-from mdr_dask.models.material import Material, solid_of
+from mdr_dask.models.material import solid_of
+from mdr_dask.models.profile_file import line_of
 from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
+from mdr_dask.models.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
     from mdr_dask.physics.protocol_forces import Line
 
-SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 7e-9  # for every node of a line, and of a moment
+SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 2.7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
+FLAT = 1e-12  # of the largest height
+SAFETY = 1.4  # see docs/kinetics.md for how honest it makes the estimate
 SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of the line
 
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
-class VelocityJump(Parameters):
+class VelocityJump(SlidingBody):
     """A Kelvin body under a constant load on a self-affine line, whose velocity jumps from v_1 to v_1 + dv."""
 
-    length: float = quantity("m", "length L of the line, and period of its roughness", gt=0)
-    points: int = quantity(
-        "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
-    )
-    oversampling: int = quantity("1", "grid points for every Nyquist point", default=4, ge=2, le=256, multiple_of=2)
-    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=12, ge=6, le=400)
-    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float = quantity("m", "rms height h of the roughness", gt=0)
-    rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
-    )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
-    )
-    relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
-    )
-    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
+    oversampling: int = quantity("1", "grid points for every Nyquist point", default=4, ge=2, le=256, multiple_of=2)
+    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
     protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
         "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
@@ -79,16 +63,13 @@ class VelocityJump(Parameters):
     def _changes(self) -> VelocityJump:
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
         return self
 
     @property
     def is_general(self) -> bool:
-        """Whether it is beyond one jump of a Kelvin body on a periodic line."""
-        return self.material is not None or self.indenter.shape != "plane" or self.protocol.shape != "jump"
+        """Whether it is beyond one jump of a Kelvin body on a generated periodic line."""
+        other = self.material is not None or self.profile is not None
+        return other or self.indenter.shape != "plane" or self.protocol.shape != "jump"
 
 
 OUTPUTS = (
@@ -133,6 +114,8 @@ class _Case:
 def _case(case: VelocityJump) -> _Case:
     assert case.shear_modulus is not None
     assert case.relaxation_time is not None
+    assert case.length is not None
+    assert case.rms_roughness is not None
     return _Case(
         case.hurst,
         case.points,
@@ -168,9 +151,11 @@ def _solve(
 
 
 def _error(fine: Relaxation, coarse: Relaxation) -> float:
-    """Return the largest difference of the relaxing parts over the final friction."""
+    """Return the largest difference of the relaxing parts over the final friction, with a margin."""
+    if coarse.status:
+        return float("inf")  # where a coarse grid has no solution nothing is known
     parts = [np.append(jump.trace, jump.at) - jump.after for jump in (fine, coarse)]
-    return float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
+    return SAFETY * float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
 
 
 def compute(block: Block[VelocityJump]) -> Result:
@@ -184,7 +169,7 @@ def compute(block: Block[VelocityJump]) -> Result:
     messages: dict[tuple[int, int], str] = {}
     solves = 0
     parameters = [block.case(j) for j in range(block.cases)]
-    scales = [case.rms_roughness / case.length for case in parameters]
+    scales = [(case.rms_roughness or 0.0) / (case.length or 1.0) for case in parameters]
     groups = _grouped(parameters)
     lines: dict[tuple[object, ...], list[_Case]] = {}
     for case in groups:
@@ -223,9 +208,9 @@ def _line_results(
     found: list[dict[str, float | FloatArray]] = [{"rms_slope": slope_rms} for _ in cases]
     if not FROM_JUMP.intersection(block.outputs):
         return [kinetics.CONVERGED] * len(cases), found
-    phase = roughness.phases(block.seed, realisation, cases[0].points // 2)
+    turned = roughness.turns(block.seed, realisation, cases[0].points // 2)
     nodes = cases[0].points * cases[0].oversampling
-    line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
+    line = roughness.turned_line(amplitude, turned, nodes), roughness.turned_line(amplitude, turned, nodes, 1)
     accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
     resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
     jumps = _solve(cases, *line, resolutions, False)
@@ -268,30 +253,28 @@ def _follow(
 
 def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | FloatArray], int, str]:
     """Follow a line through a course; return outputs, status and a sentence where it fails."""
-    from mdr_dask.physics import roughness
     from mdr_dask.physics.protocol import foundation
     from mdr_dask.physics.protocol_kernels import CONVERGED, NOT_CONVERGED
 
     try:
-        amplitude = _amplitudes(case)
+        surface = _surface(case, phase)
         static, moduli, relaxation, viscosity = _solid(case)
         course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
         unit = time_unit(case)
         solid = foundation(np.array(moduli) / static, np.array(relaxation) / unit, viscosity / static / unit)
     except (DataError, ValueError) as problem:
         return {}, Status.FAILED, str(problem)
-    scale = Scale(unit, case.length, 4 * static * case.length * case.rms_roughness)
-    nodes, times = case.points * case.oversampling, np.array(case.relaxation_times)
-    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    scale = Scale(unit, surface.length, 4 * static * surface.length * surface.rms)
+    times = np.array(case.relaxation_times)
     found: list[Trace] = []
     for every in (1, 2):
-        line = _under(case, height[::every], slope[::every])
+        line = _under(case, surface, every)
         found.append(trace(line, solid, course, case.normal_force, scale, times, case.steps_per_decade / every))
         if found[-1].status != CONVERGED:
             status = Status.NOT_CONVERGED if found[-1].status == NOT_CONVERGED else Status.FAILED
             return {}, status, found[-1].message
     fine, _ = found
-    steep = case.rms_roughness / case.length
+    steep = surface.rms / surface.length
     load = case.normal_force / scale.force
     friction, coarser = (np.append(along.drag / along.load, along.at / along.load_at) for along in found)
     largest = max(float(np.max(np.abs(friction))), 1e-300)
@@ -301,8 +284,8 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
             "friction_coefficient_jump": (fine.at / fine.load_at - fine.before / load) * steep,
             "friction_coefficient_after": fine.after * steep,
             "friction_coefficient": fine.drag / fine.load * steep,
-            "indentation_depth": fine.depth * case.rms_roughness,
-            "rms_slope": roughness.spectral_slope(amplitude) * steep,
+            "indentation_depth": fine.depth * surface.rms,
+            "rms_slope": surface.slope_rms * steep,
             "discretisation_error": float(np.max(np.abs(friction - coarser))) / largest,
         },
         Status.DONE,
@@ -310,12 +293,42 @@ def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | Flo
     )
 
 
-def _amplitudes(case: VelocityJump) -> FloatArray:
-    from mdr_dask.physics import roughness
+@dataclass(frozen=True)
+class _Surface:
+    """A line of length L and rms height h, SI, with heights over h and slopes over h / L."""
 
+    length: float
+    rms: float
+    height: FloatArray
+    slope: FloatArray
+    slope_rms: float
+
+
+def _surface(case: VelocityJump, phase: FloatArray) -> _Surface:
+    """Return the line of a case.
+
+    Raises
+    ------
+    DataError, ValueError
+        If there is none, or it is flat.
+    """
+    from mdr_dask.physics import measured, roughness
+
+    if case.profile is not None:
+        found = line_of(case.profile)
+        rms = measured.rms_height(found.height)
+        if not rms > FLAT * float(np.max(np.abs(found.height), initial=0.0)):
+            raise DataError(f"expected a rough line, got {case.profile.file.name}, which is flat")
+        even = measured.resampled((found.height - found.height.mean()) / rms, found.height.size * case.oversampling)
+        return _Surface(found.length, rms, even, measured.spectral_derivative(even, 1.0), measured.rms_slope(even, 1.0))
+    assert case.length is not None
+    assert case.rms_roughness is not None
     rolloff = case.length / case.rolloff_wavelength if case.rolloff_wavelength else 0.0
     longest = case.length / case.longest_wavelength if case.longest_wavelength else 0.0
-    return roughness.amplitudes(case.points // 2, case.hurst, rolloff, longest)
+    amplitude = roughness.amplitudes(case.points // 2, case.hurst, rolloff, longest)
+    nodes = case.points * case.oversampling
+    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    return _Surface(case.length, case.rms_roughness, height, slope, roughness.spectral_slope(amplitude))
 
 
 def _solid(case: VelocityJump) -> tuple[float, tuple[float, ...], tuple[float, ...], float]:
@@ -334,15 +347,16 @@ def time_unit(case: VelocityJump) -> float:
     return max([viscosity / static, *relaxation])
 
 
-def _under(case: VelocityJump, height: FloatArray, slope: FloatArray) -> Line:
-    """Return the line in units of its length and the rms height, with the indenter."""
+def _under(case: VelocityJump, surface: _Surface, every: int) -> Line:
+    """Return every so many nodes of a line in units of its length and the rms height, with the indenter."""
     from mdr_dask.physics.indenter import mapped
     from mdr_dask.physics.protocol import closed_line, indented_line
 
+    height, slope = surface.height[::every], surface.slope[::every]
     if case.indenter.shape == "plane":
         return closed_line(height, slope)
     coefficient, exponent = case.indenter.power_law()
-    steep = mapped(exponent) * coefficient * case.length**exponent / case.rms_roughness
+    steep = mapped(exponent) * coefficient * surface.length**exponent / surface.rms
     return indented_line(np.append(height, height[0]), np.append(slope, slope[0]), steep, exponent)
 
 
@@ -368,7 +382,9 @@ def distinct(block: Block[VelocityJump]) -> int:
 
 def seconds(block: Block[VelocityJump]) -> float:
     """Estimate the time of a block from nodes and moments."""
-    nodes = np.asarray(block.column("points") * block.column("oversampling"), dtype=np.float64)
+    profile = block.parameters.profile
+    points = block.column("points") if profile is None else line_of(profile).height.size
+    nodes = np.asarray(points * block.column("oversampling"), dtype=np.float64)
     per_case = float(np.mean(nodes)) * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS)
     if "discretisation_error" in block.outputs:
         per_case *= 1.4

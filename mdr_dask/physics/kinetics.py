@@ -38,12 +38,14 @@ MESSAGES = {
 STEPS_PER_DECADE = 24
 MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
 NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
-NEWTON = 0.003  # of the change of depth: the step of Newton whose square is left out
+NEWTON = 0.03  # of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer
 EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
 LONG, STRAY = 15.0, 0.02  # relaxation times after which friction has come so near to its end, of all its changes
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
+LONG_LINE = 40_000  # nodes from which on depths are looked for on every other one first
+DOUBT = 2e-3  # of the depth: how far off it may be there
 
 
 class Jump(NamedTuple):
@@ -111,11 +113,13 @@ def _turned(
     """Write the columns of a profile that begins at cell `best`."""
     n = height.size
     for i in range(n + 2):
-        heights[i], slopes[i] = height[(best + i) % n] - top, slope[(best + i) % n]
+        node = best + i if best + i < n else best + i - n
+        node = node if node < n else node - n
+        heights[i], slopes[i] = height[node] - top, slope[node]
     area[0] = square[0] = 0.0
     for i in range(n + 1):
         enter, leave = slopes[i] / n, slopes[i + 1] / n
-        before, after = slope[(best + i - 1) % n] / n, slope[(best + i + 2) % n] / n
+        before, after = slopes[i - 1 if i > 0 else n - 1] / n, slopes[i + 2 if i < n else 2] / n
         area[i + 1] = area[i] + (0.5 * (heights[i + 1] + heights[i]) + (enter - leave) / 12) / n
         # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
         bend = (leave**2 - before**2 - after**2 + enter**2) / 24
@@ -128,7 +132,8 @@ def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
     n = height.size
     best, best_place, highest = 0, 0.0, -np.inf
     for i in range(n):
-        after, enter, leave = height[(i + 1) % n], slope[i] / n, slope[(i + 1) % n] / n
+        following = i + 1 if i + 1 < n else 0
+        after, enter, leave = height[following], slope[i] / n, slope[following] / n
         place = 0.0
         if enter > 0 > leave:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
@@ -261,7 +266,8 @@ def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, 
     finer = STEPS_PER_DECADE / per_decade
     first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
     scale = max(abs(change), NEGLIGIBLE * load)
-    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, NEWTON * scale, last)
+    close = NEWTON * min(1.0, (8 / per_decade) ** 2)
+    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, close * scale, last)
 
 
 def velocity_jump(
@@ -329,7 +335,8 @@ def velocity_jumps(
     failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, INVALID)
     if not np.all(np.isfinite(height)):
         return [failed] * loads.size
-    steady = steady_sliding(height, slope, reaches.ravel(), np.repeat(loads, 2), contact=False)
+    every = 2 if height.size >= LONG_LINE and height.size % 2 == 0 else 1
+    steady = steady_sliding(height[::every], slope[::every], reaches.ravel(), np.repeat(loads, 2), contact=False)
     depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
     profile, top = cubic_profile(height, slope)
     equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
@@ -340,7 +347,7 @@ def velocity_jumps(
             continue
         change = float(depths[k, 1] - depths[k, 0])
         pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
-        ends = float(resolutions[k]), equilibrium
+        ends = float(resolutions[k]), equilibrium, DOUBT if every > 1 else 0.0
         jump = _relax(
             profile, float(loads[k]), (float(reaches[k, 0]), float(reaches[k, 1])), depths[k] + top, times, pace, ends
         )
@@ -355,14 +362,15 @@ def _relax(
     depths: FloatArray,
     times: FloatArray,
     pace: Pace,
-    ends: tuple[float, float],
+    ends: tuple[float, float, float],
 ) -> Jump:
     """Solve both steady states on one profile and march between them."""
     sums = np.empty(SUMS)
     failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
     floor = np.zeros(profile.height.size)
     low, high = float(depths.min()), float(depths.max())
-    margin = 0.25 * (high - low) + NEGLIGIBLE * load
+    resolution, equilibrium, doubt = ends
+    margin = 0.25 * (high - low) + NEGLIGIBLE * load + doubt * high
     for _ in range(WIDENINGS):
         floor[:] = 0.0
         everywhere = _reachable(profile, floor, high + margin)
@@ -373,7 +381,8 @@ def _relax(
         before = sums[DRAG]
         last, good_last = _settle(profile, runs, floor, reaches[1], load, float(depths[1]), sums)
         after = sums[DRAG]
-        if not (good_first and good_last):
+        known = low - margin <= min(first.depth, last.depth) and max(first.depth, last.depth) <= high + margin
+        if not (good_first and good_last and known):
             margin *= 4
             continue
         if _full(first, profile) and _full(last, profile):
@@ -383,7 +392,6 @@ def _relax(
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed
-        resolution, equilibrium = ends
         settled = min(max(equilibrium, resolution / max(abs(sums[DRAG] - after), 1e-300)), 1.0)
         course = np.empty((4, MOMENTS))
         course[:, 0] = 0.0, first.depth, rate, sums[DRAG]

@@ -26,6 +26,7 @@ IntArray = NDArray[np.int64]
 
 TRIALS = 80
 EXACT = 1e-11  # of the load
+MANY, CAREFUL = 100, 0.1  # with fewer patches than many the load bends more with the depth: smaller steps are trusted
 SETTLED = 2.5  # times the time since when a march has been near its end: where it ends
 
 
@@ -109,7 +110,7 @@ def _balance(
             low = guess
         else:
             high = guess
-        if abs(step) <= close or abs(off) <= EXACT * load:
+        if abs(step) <= (close if found >= MANY else CAREFUL * close) or abs(off) <= EXACT * load:
             guess += step
             course.depth[now], course.rate[now] = guess, a * guess + b
             return 0, sums[DRAG] + step * sums[DRAG_STIFFNESS]

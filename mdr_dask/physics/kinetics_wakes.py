@@ -225,6 +225,8 @@ def worth_keeping(
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0
     for k in range(count):
+        if t * reach <= x - places[k]:
+            continue
         u = _left_from(profile, course, t, reach, x, places[k])[0]
         if u + 2 * spread_over(spreads, window, 2 * (x - places[k]) + window) >= pressed:
             places[kept] = places[k]

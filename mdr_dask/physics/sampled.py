@@ -30,8 +30,8 @@ VECTOR = 8
 ITERATIONS = 25
 COARSENING = 4
 COARSEST = 64  # nodes of the grid that the search for the depth starts on
-NEAR = 0.02  # relative step of the depth that a secant is trusted with,
-TRUSTED = 1e-3  # and what that may cost
+# relative step of the depth that a secant is trusted with, and what that may cost: on a grid, and to start the next
+ANSWER, START = (0.02, 1e-3), (0.1, 0.03)
 EXTRAPOLATED = 1 / 7  # of the change between grids: the error falls by 8 where the cells are halved
 DOUBTED = 0.1  # of the last step of the drag, which is taken along the secant
 EXACT_STEP, ROUNDING = 1e-12, 3e-12
@@ -360,6 +360,8 @@ def _solve(
     weights: FloatArray,
     reaches: FloatArray,
     loads: FloatArray,
+    near_step: float,
+    trusted: float,
     depths: FloatArray,
     rates: FloatArray,
     results: FloatArray,
@@ -374,6 +376,8 @@ def _solve(
         From `_weights`.
     reaches, loads : array, shape (cases,)
         v tau / L, and F_N / (4 G L) in the unit of height.
+    near_step, trusted : float
+        Bounds of the last relative step of the depth and of what it costs.
     depths, rates : array, shape (cases,)
         Penetration of the highest node, and change of the drag with it, NaN where it is not known; read and written.
     results : array, shape (cases, 4)
@@ -408,7 +412,7 @@ def _solve(
                 doubt = DOUBTED * abs(rate * step / drag)
                 if size < EXACT_STEP:
                     rate, doubt = (rate if math.isfinite(rate) else 0.0), 0.0
-                if size <= NEAR and doubt <= TRUSTED:
+                if size <= near_step and doubt <= trusted:
                     depths[case], rates[case] = depth + step, rate
                     length, stretch = room[LENGTH * LANES + k], room[STRETCH * LANES + k]
                     results[case, 0] = drag + rate * step
@@ -441,7 +445,9 @@ def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: Flo
     rates = np.full(loads.size, np.nan)
     for stride in reversed(strides):
         line = nodes(height, slope, stride, stride <= strides[1])
-        _solve(line, _weights(1), reaches, loads, depths, rates, results)
+        if stride == 2:
+            rates[:] = np.nan
+        _solve(line, _weights(1), reaches, loads, *(ANSWER if stride == 2 else START), depths, rates, results)
     return _sampled(line, depths, rates, results)
 
 
@@ -460,7 +466,7 @@ def settle(line: Nodes, refinement: int, reaches: FloatArray, loads: FloatArray,
         The states on a coarser grid.
     """
     depths, rates, results = near.depth + line.top, near.rate.copy(), np.empty((loads.size, 4))
-    _solve(line, _weights(refinement), reaches, loads, depths, rates, results)
+    _solve(line, _weights(refinement), reaches, loads, *ANSWER, depths, rates, results)
     return _sampled(line, depths, rates, results)
 
 

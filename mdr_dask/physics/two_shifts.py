@@ -42,6 +42,8 @@ def superpose_twice(
     second: ArrayLike,
     curves: Sequence[tuple[ArrayLike, ArrayLike]],
     references: tuple[float, float] | None = None,
+    draws: int = 0,
+    seed: int = 0,
 ) -> TwoShifts:
     """Shift curves that differ in two things into one, and split the factors into a sum of two.
 
@@ -56,6 +58,8 @@ def superpose_twice(
         log10 of abscissa and ordinate.
     references : pair of float, optional
         Groups whose factors are zero; the middle ones if not given.
+    draws, seed : int
+        Bootstrap samples, as of `superpose`; each is split into a sum as the factors are.
 
     Raises
     ------
@@ -67,7 +71,7 @@ def superpose_twice(
     if min(group.size for group in groups) < 2:
         raise DataError("two shifts need two or more values of each group")
     order = _serpentine(places[0], places[1])
-    free = superpose(np.arange(order.size), [curves[k] for k in order], reference=0.0)
+    free = superpose(np.arange(order.size), [curves[k] for k in order], reference=0.0, draws=draws, seed=seed)
     zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
     return _split(free, groups, [place[order] for place in places], zeros)
 
@@ -86,6 +90,8 @@ def _split(
     projected, target = whiten @ rows, whiten @ free.horizontal[1:]
     spread = np.linalg.inv(projected.T @ projected)
     found = spread @ (projected.T @ target)
+    drawn = np.zeros((free.draws.shape[0], design.shape[1]))
+    drawn[:, columns] = free.draws[:, 1 : len(places[0])] @ (spread @ projected.T @ whiten).T
     freedom = rows.shape[0] - columns.size
     misfit = float(np.sum((target - projected @ found) ** 2))
     reduced = misfit / freedom if freedom else 0.0
@@ -99,7 +105,8 @@ def _split(
     moved = replace(free, x=x, curve_x=free.curve_x + offset, measured=(float(own.min()), float(own.max())))
     parts = slice(size), slice(size, None)
     one, other = (
-        _one(moved, groups[i], zeros[i], both[part], covariance[part, part], places[i]) for i, part in enumerate(parts)
+        _one(moved, groups[i], zeros[i], both[part], covariance[part, part], places[i], drawn[:, part])
+        for i, part in enumerate(parts)
     )
     return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
 
@@ -111,6 +118,7 @@ def _one(
     factors: FloatArray,
     covariance: FloatArray,
     place: NDArray[np.intp],
+    drawn: FloatArray,
 ) -> Superposition:
     """Return the superposition as seen by one of the groups."""
     full = np.zeros((2 * groups.size, 2 * groups.size))
@@ -123,7 +131,7 @@ def _one(
         covariance=full,
         reference=float(groups[zero]),
         member=place[moved.member],
-        draws=np.empty((0, 2 * groups.size)),
+        draws=np.hstack([drawn, np.zeros_like(drawn)]),
     )
 
 

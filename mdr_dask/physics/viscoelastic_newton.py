@@ -295,9 +295,9 @@ def solve_sliding(
             scale[arms] = totals[3]
             newton_step(residual, scale, swept, basis, triangle, rotations, scratch, step)
         else:
-            residual[:arms], residual[arms] = 0.0, 1.0  # a unit of depth
+            residual[:] = 1.0  # a unit of depth while the memory stays: elements enter at rest
             follow(residual, swept, False, turned, scratch)
-            step[arms] = (strain_area - totals[0] - totals[5]) / turned[arms]
+            step[arms] = (strain_area - totals[1]) / turned[arms]
         largest = 0.0
         for j in range(size):
             weight = min(1.0, moduli[j]) if j < arms else 1.0  # a soft arm cannot matter

@@ -20,7 +20,7 @@ def store(
     x = speeds * TAU * np.pi * POINTS / LENGTH
     before = np.minimum(0.05 * x**0.7, 1.3)[:, None] * (1 + 0.1 * rng.standard_normal((speeds.size, realisations)))
     jump = 0.2 * jump_law(before, 0.42)
-    relaxing = 0.01 * (1 + noise * rng.standard_normal((speeds.size, realisations)))
+    relaxing = 0.2 * jump.mean(axis=1, keepdims=True) * (1 + noise * rng.standard_normal((speeds.size, realisations)))
     after = before + jump - relaxing
     decay = np.exp(-((x[:, None] ** power * TIMES) ** shape))
     trace = after[..., None] + relaxing[..., None] * decay[:, None, :]

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+from mdr_dask.physics import roughness
 
 EVERY = tuple(output.name for output in MODEL.outputs)
 BASE = {
@@ -129,3 +130,37 @@ def test_extremes_are_values_or_a_status(change: dict[str, object]) -> None:
 def test_impossible_courses_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         block(**change)
+
+
+def written_line(tmp_path: Path, nodes: int) -> str:
+    """Write the generated line of realisation 0 as a file, in m."""
+    amplitude, phase = roughness.amplitudes(50, 0.7), roughness.phases(5, 0, 50)
+    x = np.arange(nodes) / nodes * 0.002
+    file = tmp_path / "line.csv"
+    np.savetxt(file, np.column_stack([x, 2e-6 * roughness.line(amplitude, phase, nodes)]), delimiter=",", fmt="%.17g")
+    return str(file)
+
+
+@pytest.mark.parametrize("protocol", [{"shape": "jump"}, STEP])
+def test_measured_line_is_the_generated_one(tmp_path: Path, protocol: dict[str, object]) -> None:
+    """A file of its own nodes; in the quick solution of a jump they are cells of the same kind."""
+    whole = block(protocol=protocol, oversampling=8)
+    line = written_line(tmp_path, 400)
+    read = compute(block(protocol=protocol, oversampling=2, profile=line, length=None, rms_roughness=None))
+    assert np.all(read.status == Status.DONE), read.messages
+    for name in ("friction_coefficient", "friction_coefficient_jump", "rms_slope"):
+        wanted = compute(whole).values[name][0, 0]
+        assert np.allclose(read.values[name][0, 0], wanted, rtol=5e-3), name
+
+
+def test_flat_measured_line_is_a_status(tmp_path: Path) -> None:
+    file = tmp_path / "flat.csv"
+    np.savetxt(file, np.column_stack([np.arange(20) * 1e-6, np.zeros(20)]), delimiter=",")
+    found = compute(block(profile=str(file), length=None, rms_roughness=None))
+    assert np.all(found.status == Status.FAILED)
+    assert all("which is flat" in message for message in found.messages.values())
+
+
+def test_a_line_is_generated_or_measured() -> None:
+    with pytest.raises(ValidationError, match="expected length with rms_roughness, or profile"):
+        block(length=None)

@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from mdr_dask.physics import roughness
+from mdr_dask.physics import kinetics, roughness
 from mdr_dask.physics.kinetics import CONVERGED, INVALID, Jump, velocity_jump
 from mdr_dask.physics.protocol import follow
 from mdr_dask.physics.sliding import steady_sliding
@@ -192,3 +192,16 @@ def test_resolution_stops_the_march_at_equilibrium() -> None:
     short = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 24, 1e-3 * long.after)
     assert short.moments < long.moments
     assert np.max(np.abs(short.trace - long.trace)) < 1e-3 * long.after
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.7])
+def test_depths_of_every_other_node_lead_to_the_same_jump(monkeypatch: pytest.MonkeyPatch, hurst: float) -> None:
+    height, slope = line(hurst)
+    reaches = REACH, 1.2 * REACH
+    whole = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 12)
+    monkeypatch.setattr(kinetics, "LONG_LINE", 0)
+    found = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 12)
+    assert found.status == CONVERGED
+    # both solve the depths on all nodes in the end; the steps follow the depths looked for, and differ a little
+    assert np.allclose([found.before, found.at, found.after], [whole.before, whole.at, whole.after], rtol=1e-10)
+    assert np.max(np.abs(found.trace - whole.trace)) < 1e-2 * np.max(np.abs(whole.trace - whole.after))

@@ -161,17 +161,29 @@ def test_fast_arm_is_a_dashpot() -> None:
     assert errors[1] < 0.02
 
 
-def test_standard_solid_in_full_contact_is_exact() -> None:
-    """One wave in full contact: the stretch of the arm is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
-    nodes, modulus, tau = 1000, 3.0, 0.25
+def test_limits_of_a_general_body() -> None:
+    """An arm of no stiffness beside the dashpot is the Kelvin body; two arms of one time are one arm."""
+    line = closed_line(*rough(4))
+    pairs = [
+        (KELVIN, foundation([1e-10], [0.3], 1.0)),
+        (STANDARD, foundation([1.0, 2.0], [0.25, 0.25 * (1 + 1e-9)], 0.0)),
+    ]
+    for plain, general in pairs:
+        drags = [at_times(line, solid, (0.1, 0.12)) for solid in (plain, general)]
+        assert np.allclose(*drags, rtol=1e-7)
+
+
+@pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
+def test_full_contact_is_exact(solid: Foundation) -> None:
+    """One wave in full contact: the stretch of an arm is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
+    nodes, k, before, after = 1000, 2 * np.pi, 0.05, 0.08
     x = np.arange(nodes) / nodes
-    k, before, after = 2 * np.pi, 0.05, 0.08
-    solid = foundation([modulus], [tau], 0.0)
     moments, found = jump(closed_line(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
-    first = 1j * k * before / (1j * k * before + 1 / tau)
-    last = 1j * k * after / (1j * k * after + 1 / tau)
-    wave = last + (first - last) * np.exp(-(1j * k * after + 1 / tau) * moments)
-    exact = 0.5 * modulus * np.real(wave * np.conj(1j * k))
+    exact = 0.5 * solid.viscosity * after * k * k * np.ones(moments.size)
+    for modulus, tau in zip(solid.moduli, solid.times, strict=True):
+        first, last = (1j * k * reach / (1j * k * reach + 1 / tau) for reach in (before, after))
+        wave = last + (first - last) * np.exp(-(1j * k * after + 1 / tau) * moments)
+        exact += 0.5 * modulus * np.real(wave * np.conj(1j * k))
     assert np.allclose(found.drag, exact, rtol=1e-5)  # chords of a wave of 1000 nodes
     assert np.allclose(found.contact, 1)
 

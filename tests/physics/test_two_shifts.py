@@ -37,6 +37,19 @@ def test_both_shifts_are_found_within_their_bars():
     assert 0.3 < np.mean(chances) < 0.7  # uniform if the chi-squared is right; 30 of them are known to 0.05
 
 
+def test_bootstrap_of_a_sum_agrees_with_its_covariance():
+    first, second, curves, _, _ = family(4)
+    found = superpose_twice(first, second, curves, draws=60, seed=1)
+    for part in (found.first, found.second):
+        known = part.horizontal_error > 0
+        spread = part.draws[:, : part.groups.size].std(axis=0)
+        assert np.all(spread[~known] == 0)
+        # standard deviation of 60 draws: 9 %; residuals differ from curve to curve
+        assert np.median(spread[known] / part.horizontal_error[known]) == pytest.approx(1, abs=0.4)
+    again = superpose_twice(first, second, curves, draws=60, seed=1)
+    assert np.array_equal(found.first.draws, again.first.draws)
+
+
 def test_a_shift_that_is_no_sum_is_told():
     first, second, curves, *_ = family(1, cross=0.05)
     assert superpose_twice(first, second, curves).probability < 1e-3

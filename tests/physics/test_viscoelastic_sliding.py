@@ -202,6 +202,21 @@ def test_smooth_parabola_is_its_closed_form(velocity):
     assert state.error < 0.01
 
 
+def test_rough_indenters_are_solved_in_a_few_sweeps():
+    """The derivative by the depth is exact, and arms that recover far beyond the line do not hide the load."""
+    random = np.random.default_rng(4)
+    for realisation in range(40):
+        arms = random.integers(1, 6)
+        solid = prony(1.0, 10 ** random.uniform(-2, 2, arms), 10 ** random.uniform(-6, 3, arms))
+        height, spacing, _ = line(8, random.uniform(0, 1), realisation)
+        place = (np.arange(height.size + 1) - height.size // 2) * spacing
+        body = np.append(height, height[0]) - 50 * RMS * np.abs(2 * place / LENGTH) ** random.uniform(1, 4)
+        force = 4 * LENGTH * 50 * RMS * 10 ** random.uniform(-4, -1.5)
+        state = steady_viscoelastic_sliding(body, spacing, solid, 10 ** random.uniform(-5, 2), force, periodic=False)
+        assert state.status == sliding.CONVERGED
+        assert state.sweeps <= 16
+
+
 def test_contact_that_leaves_the_line_is_said_so():
     x = np.linspace(-1e-3, 1e-3, 401)
     state = steady_viscoelastic_sliding(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), 0.1, 10.0, periodic=False)

@@ -82,8 +82,8 @@ def test_every_step_conserves_energy_while_the_border_moves():
         rise = np.array([plateau_rise(path, r[k : k + 1])[0] for k, path in enumerate(paths)])
         stuck = (moment.border - 0.455) * float(weight @ (2 * np.pi * r * (rise - moving.virgin_slip(r))))
         volumes.append(slipping + stuck)
-    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=2e-6)  # of steps of 2e-5
-    np.testing.assert_allclose(volumes, energy, atol=6e-6)  # gathered over them
+    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
+    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # gathered over them
 
 
 def test_convergence_with_the_tolerance():
