@@ -246,7 +246,7 @@ def distinct(block: Block[EhlLineParameters]) -> int:
 def seconds(block: Block[EhlLineParameters]) -> float:
     """Return the estimated time of `compute`: a solution takes about 20 ms, more for a tighter accuracy."""
     accuracy = block.accuracy or ACCURACY
-    return 0.02 * block.cases * max(1.0, (ACCURACY / accuracy) ** 0.4)
+    return 0.02 * block.cases * float(max(1.0, (ACCURACY / accuracy) ** 0.4))
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
