@@ -131,7 +131,7 @@ def _case(case: VelocityJump) -> _Case:
 
 
 def _solve(
-    cases: list[_Case], height: FloatArray, slope: FloatArray, resolution: FloatArray, coarser: bool
+    cases: list[_Case], height: FloatArray, slope: FloatArray, accuracies: FloatArray, coarser: bool
 ) -> list[Relaxation]:
     """Solve the cases of one line on the nodes given, or on every other one with half as many steps."""
     from mdr_dask.physics.kinetics import velocity_jumps
@@ -146,16 +146,16 @@ def _solve(
         np.array(shared.times),
         np.pi * shared.points,
         steps,
-        resolution,
+        accuracies,
     )
 
 
 def _error(fine: Relaxation, coarse: Relaxation) -> float:
-    """Return the largest difference of the relaxing parts over the final friction, with a margin."""
+    """Return the largest difference of the relaxing parts, or what is left out, over mu_2, with a margin."""
     if coarse.status:
         return float("inf")  # where a coarse grid has no solution nothing is known
     parts = [np.append(jump.trace, jump.at) - jump.after for jump in (fine, coarse)]
-    return SAFETY * float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
+    return SAFETY * max(float(np.max(np.abs(parts[0] - parts[1]))), fine.left_out) / fine.after
 
 
 def compute(block: Block[VelocityJump]) -> Result:
@@ -211,13 +211,12 @@ def _line_results(
     turned = roughness.turns(block.seed, realisation, cases[0].points // 2)
     nodes = cases[0].points * cases[0].oversampling
     line = roughness.turned_line(amplitude, turned, nodes), roughness.turned_line(amplitude, turned, nodes, 1)
-    accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
-    resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
-    jumps = _solve(cases, *line, resolutions, False)
+    jumps = _solve(cases, *line, np.full(len(cases), block.accuracy or 0.0), False)
     for case, jump, row in zip(cases, jumps, found, strict=True):
         row |= _outputs(case, jump)
     if "discretisation_error" in block.outputs:
-        for fine, coarse, row in zip(jumps, _solve(cases, *line, 0 * resolutions, True), found, strict=True):
+        alike = np.array([np.inf if jump.left_out > 0 else 0.0 for jump in jumps])
+        for fine, coarse, row in zip(jumps, _solve(cases, *line, alike, True), found, strict=True):
             row["discretisation_error"] = _error(fine, coarse)
     return [jump.status for jump in jumps], found
 
