@@ -218,12 +218,18 @@ def _print_outcome(url: str, progress: Progress, resources: Resources, form: str
     spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
     click.echo(f"{url}: {kept}{progress.done} done, {progress.failed} failed{spared}")
     click.echo(
-        f"{seconds(progress.wall_seconds)}: {progress.solves} solves in {progress.blocks} blocks, "
+        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {progress.blocks} blocks, "
         f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
         err=True,
     )
     if progress.failed:
         click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+
+
+def _shared(progress: Progress) -> str:
+    """Return the share of the results that needed no solve of their own."""
+    share = 1 - progress.solves / max(progress.done + progress.failed, 1)
+    return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""
 
 
 @click.command()

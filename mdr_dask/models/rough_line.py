@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.models.base import FloatArray
 
 if TYPE_CHECKING:
+    from mdr_dask.physics.sampled import Change
     from mdr_dask.physics.sliding import Scheme, Steady
 
 FINEST = 64  # oversampling beyond which `auto` gives up
@@ -20,11 +21,15 @@ CLOSE = 0.005  # change of the depth between grids that is taken from the tangen
 SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
 RESTART = 4  # oversampling of the sweeps over what is left
 SAMPLED = 4  # oversampling of a line that cases go along from node to node
-REFINEMENTS = (1, 2, 4, 8, 16)  # of its cells where they are touched
+REFINEMENTS = (1, 2, 4, 8, 16, 32)  # of the cells of the first of these grids, where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
-QUICK_SAFETY, QUICK_MEMORY = 1.0, 0.1  # of the last change between grids and of the one before; see docs/friction.md
+# of the last change of the drag between grids, and of the one before; see docs/friction.md
+QUICK_SAFETY, QUICK_MEMORY = 1.0, 0.1
 FEW = 10  # nodes in contact that are too few to go from node to node
 MANY, SAFETY_OF_MANY = 1000, 0.6  # nodes in contact whose errors are an average
+# then on the first three grids: of the last changes of drag and contact, and of the changes before
+OF_DRAG, OF_CONTACT, OF_DRAG_BEFORE, OF_CONTACT_BEFORE = 0.12, 0.1, 0.01, 0.03
+OF_FIRST_CONTACT = 0.5  # of the change of the contact on the first two
 
 
 @dataclass(frozen=True)
@@ -135,21 +140,19 @@ class Task:
         left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
         height, slope = self.nodes(SAMPLED, "hermite")
         line = sampled.nodes(height, slope, 1, True)
-        coarse = sampled.begin(height, slope, self.reaches[left], self.loads[left])
-        change = np.zeros(left.size)
-        for refinement in REFINEMENTS:
-            if not left.size:
-                break
-            fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
-            found, now = sampled.extrapolated(coarse, fine)
-            # two grids may agree by chance, hardly three
-            touching = fine.contact_fraction * height.size * refinement
-            safety = np.where(touching > MANY, SAFETY_OF_MANY, QUICK_SAFETY)
-            estimate = np.maximum(safety * now, QUICK_MEMORY * change) + fine.doubt
-            error[left] = np.where((touching > FEW) & np.isfinite(estimate), estimate, np.inf)
+        coarse, fine = sampled.begin(height, slope, self.reaches[left], self.loads[left])
+        before = sampled.Change(np.zeros(left.size), np.zeros(left.size))
+        for grids, refinement in enumerate(REFINEMENTS, 2):
+            found, change = sampled.extrapolated(coarse, fine)
+            touching = fine.contact_fraction * self.line.points * 2 * refinement
+            estimate = _estimate(grids, touching, change, before) + fine.doubt
+            error[left] = np.where(np.isfinite(estimate), estimate, np.inf)
             steady = steady.replaced(left, found)
             still = ~(error[left] <= accuracy)
-            left, coarse, change = left[still], fine.only(still), now[still]
+            left, coarse, before = left[still], fine.only(still), change.only(still)
+            if not left.size or refinement == REFINEMENTS[-1]:
+                break
+            fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
         return steady, error
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, FloatArray]:
@@ -182,3 +185,21 @@ def _difference(one: Steady, other: Steady) -> FloatArray:
         change = np.abs(one.drag / other.drag - 1)
     # where a coarse grid has no solution nothing is known
     return np.where(np.isnan(change) & (other.status == 0), np.inf, np.maximum(change, SEARCH))
+
+
+def _estimate(grids: int, touching: FloatArray, change: Change, before: Change) -> FloatArray:
+    """Return the relative error of the drag extrapolated from the last of some grids, infinite if too few nodes touch.
+
+    Two grids may agree by chance, hardly three, and hardly in the length in contact as well.
+    """
+    many = touching > MANY
+    if grids == 2:
+        estimate = np.maximum(QUICK_SAFETY * change.drag, OF_FIRST_CONTACT * change.contact)
+        return np.where(many, estimate, np.inf)
+    safety = np.where(many, SAFETY_OF_MANY, QUICK_SAFETY)
+    estimate = np.maximum(safety * change.drag, QUICK_MEMORY * before.drag)
+    if grids == 3:
+        now = np.maximum(OF_DRAG * change.drag, OF_CONTACT * change.contact)
+        memory = np.maximum(OF_DRAG_BEFORE * before.drag, OF_CONTACT_BEFORE * before.contact)
+        estimate = np.where(many, np.maximum(now, memory), QUICK_SAFETY * change.drag)
+    return np.where(touching > FEW, estimate, np.inf)

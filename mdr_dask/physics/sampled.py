@@ -75,6 +75,18 @@ class Sampled:
         return Sampled(**{name: column[cases] for name, column in vars(self).items()})
 
 
+@dataclass(frozen=True)
+class Change:
+    """Relative changes between two grids of the drag and of the length in contact, one entry for every case."""
+
+    drag: FloatArray
+    contact: FloatArray
+
+    def only(self, cases: NDArray[np.bool_]) -> Change:
+        """Return some of the cases."""
+        return Change(self.drag[cases], self.contact[cases])
+
+
 class Nodes(NamedTuple):
     """A periodic line from its highest node on a grid of n cells.
 
@@ -427,8 +439,10 @@ def _solve(
             count = kept
 
 
-def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: FloatArray) -> Sampled:
-    """Return the steady states on every other node of a periodic line, beginning with a few of them.
+def begin(
+    height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: FloatArray
+) -> tuple[Sampled, Sampled]:
+    """Return the steady states on every fourth node of a periodic line, found roughly, and on every other node.
 
     Parameters
     ----------
@@ -443,12 +457,15 @@ def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: Flo
         strides.append(strides[-1] * COARSENING)
     depths, results = np.maximum(loads, loads ** (2 / 3)), np.empty((loads.size, 4))
     rates = np.full(loads.size, np.nan)
+    found = []
     for stride in reversed(strides):
         line = nodes(height, slope, stride, stride <= strides[1])
         if stride == 2:
             rates[:] = np.nan
         _solve(line, _weights(1), reaches, loads, *(ANSWER if stride == 2 else START), depths, rates, results)
-    return _sampled(line, depths, rates, results)
+        if stride <= strides[1]:
+            found.append(_sampled(line, depths, rates, results.copy()))
+    return found[0], found[1]
 
 
 def settle(line: Nodes, refinement: int, reaches: FloatArray, loads: FloatArray, near: Sampled) -> Sampled:
@@ -475,16 +492,17 @@ def _sampled(line: Nodes, depths: FloatArray, rates: FloatArray, results: FloatA
     return Sampled(depths - line.top, rates, drag, fraction, slope, doubt)
 
 
-def extrapolated(coarse: Sampled, fine: Sampled) -> tuple[Steady, FloatArray]:
-    """Return the states on a grid with the drag extrapolated from one of twice its cells, and its relative change.
+def extrapolated(coarse: Sampled, fine: Sampled) -> tuple[Steady, Change]:
+    """Return the states on a grid with the drag extrapolated from one of twice its cells, and what changed between them.
 
     The change is infinite where either grid has no solution.
     """
     with np.errstate(all="ignore"):
-        change = np.abs(fine.drag / coarse.drag - 1)
         drag = fine.drag + EXTRAPOLATED * (fine.drag - coarse.drag)
-    good = np.isfinite(change) & (drag > 0)
+        change = np.abs(fine.drag / coarse.drag - 1), np.abs(fine.contact_fraction / coarse.contact_fraction - 1)
+    good = np.isfinite(change[0]) & (drag > 0)
     status = np.where(good, CONVERGED, NOT_CONVERGED).astype(np.int8)
     known = (fine.depth, fine.contact_fraction, fine.contact_slope)
     depth, fraction, slope = (np.where(good, column, np.nan) for column in known)
-    return Steady(np.where(good, drag, np.nan), depth, fraction, slope, status), np.where(good, change, np.inf)
+    known_change = Change(*(np.where(good & np.isfinite(part), part, np.inf) for part in change))
+    return Steady(np.where(good, drag, np.nan), depth, fraction, slope, status), known_change
