@@ -17,6 +17,7 @@ import xarray as xr
 from test_execute import digests
 
 from mdr_dask.cli import main
+from mdr_dask.cli.campaigns import _shared
 from mdr_dask.execute import Progress
 
 CAMPAIGN = """\
@@ -58,6 +59,11 @@ def test_run_then_run_again(campaign, capsys):
     assert "blocks" in first.err
     assert main(["run", str(campaign)]) == 0
     assert capsys.readouterr().out == "results/small.zarr: all 64 results are there already; nothing to do\n"
+
+
+@pytest.mark.parametrize(("solves", "said"), [(10, ""), (4, " (60.0% of the results needed none of their own)")])
+def test_the_outcome_tells_the_share_of_results_without_a_solve(solves, said):
+    assert _shared(Progress(done=8, failed=2, solves=solves)) == said
 
 
 def test_dry_run_says_what_would_be_done_and_writes_nothing(campaign, capsys):

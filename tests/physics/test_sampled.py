@@ -22,13 +22,13 @@ def cases():
 def settled(refinement, hurst=0.7):
     height, slope, _ = line(hurst)
     reaches, loads = cases()
-    state = sampled.begin(height, slope, reaches, loads)
+    states = sampled.begin(height, slope, reaches, loads, 5e-3)
     whole = sampled.nodes(height, slope, 1, True)
     grid = 1
     while grid <= refinement:
-        state = sampled.settle(whole, grid, reaches, loads, state)
+        states = states[-1], sampled.settle(whole, grid, reaches, loads, states, 1e-3)
         grid *= 2
-    return state
+    return states[-1]
 
 
 def test_grids_converge_to_the_exact_sweep():
@@ -40,17 +40,17 @@ def test_grids_converge_to_the_exact_sweep():
     for refinement in (1, 4):
         state = settled(refinement)
         errors.append(np.abs(state.drag / exact.drag - 1)[many])
-        # the last step of the depth, up to 2 %, is taken along the tangent
+        # the last step of the depth, up to 3 %, is taken along the tangent
         assert state.depth[many] == pytest.approx(exact.depth[many], abs=0.02, rel=0.004)
     # third order: 64 times less, and the search that may cost 1e-3; full contact is exact on both
-    assert np.max(errors[0]) < 0.05
+    assert np.max(errors[0]) < 0.06
     assert np.max(errors[1]) < 0.005
 
 
 def test_full_contact_is_exact_on_any_grid():
     height, slope, rms = line()
     reaches, loads = np.array([1e-4, 1e-3]), np.array([50.0, 300.0])
-    state = sampled.begin(height, slope, reaches, loads)
+    _, state = sampled.begin(height, slope, reaches, loads, 5e-3)
     assert state.drag == pytest.approx(reaches * rms**2, rel=1e-11)
     assert state.contact_fraction == pytest.approx(1.0)
     assert state.contact_slope == pytest.approx(rms, rel=1e-11)
@@ -78,8 +78,8 @@ def test_a_case_is_the_same_among_any_others(count):
     whole = sampled.nodes(height, slope, 1, True)
 
     def solve(some):
-        state = sampled.begin(height, slope, reaches[some], loads[some])
-        return sampled.settle(whole, 2, reaches[some], loads[some], state)
+        states = sampled.begin(height, slope, reaches[some], loads[some], 5e-3)
+        return sampled.settle(whole, 2, reaches[some], loads[some], states, 1e-3)
 
     everything = solve(np.arange(loads.size))
     some = np.random.default_rng(count).permutation(loads.size)[:count]
@@ -94,7 +94,8 @@ def test_a_line_that_does_not_divide_by_the_blocks():
     height, slope = (roughness.line(amplitude, phase, 208, order) for order in (0, 1))
     fine = [roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)]
     reaches, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
-    state = sampled.begin(height, slope, reaches, loads)
+    states = sampled.begin(height, slope, reaches, loads, 5e-3)
+    whole = sampled.nodes(height, slope, 1, True)
     for refinement in (1, 2, 4):
-        state = sampled.settle(sampled.nodes(height, slope, 1, True), refinement, reaches, loads, state)
-    assert state.drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
+        states = states[-1], sampled.settle(whole, refinement, reaches, loads, states, 1e-3)
+    assert states[-1].drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
