@@ -1,7 +1,8 @@
 """Where the time of a film goes on grids for tight accuracies: ``python -m benchmarks.kernel_ehl``.
 
-Processor time of `solve` over the accuracy asked for, and of it the share that fills the deformation matrices; then one
-filling, one product and one elimination over the number of nodes. Takes about a quarter of a minute.
+Processor time of `solve` over the accuracy asked for, and of it the share that fills the deformation kernels; then one
+filling, one product and one Newton step over the number of nodes, with the dense matrix and by blocks. Takes about
+half a minute, most of it in the dense steps.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ import time
 
 import numpy as np
 
-from mdr_dask.physics import ehl_levels
+from mdr_dask.physics import ehl_grid, ehl_levels
 from mdr_dask.physics.deformation import influence_matrix
-from mdr_dask.physics.ehl_newton import nodal_film, solve_linear
+from mdr_dask.physics.ehl_blocks import newton_by_blocks
+from mdr_dask.physics.ehl_newton import newton, nodal_film
 from mdr_dask.physics.line_contact import line_contact, solve
+from mdr_dask.physics.line_kernel import deform, line_kernel
 
 E_STAR = 115.385e9
 CASES = {
@@ -22,51 +25,70 @@ CASES = {
     "soft and thin": (5e-4, 1e-13, 500.0),
     "rigid": (2e-6, 1e-9, 500.0),
 }
+#: Nodes of the largest dense matrix.
+DENSE = 5121
 
 
 def seconds(function, *arguments):
-    function(*arguments)
     begin = time.process_time()
-    function(*arguments)
-    return time.process_time() - begin
+    result = function(*arguments)
+    return time.process_time() - begin, result
 
 
 def shares():
     """Print error, nodes, time and share of the kernel over cases and accuracies."""
     spent = [0.0]
 
-    def clocked(*arguments):
-        begin = time.process_time()
-        matrix = influence_matrix(*arguments)
-        spent[0] += time.process_time() - begin
-        return matrix
+    def clocked(fill):
+        def clock(*arguments):
+            duration, kernel = seconds(fill, *arguments)
+            spent[0] += duration
+            return kernel
 
-    ehl_levels.influence_matrix = clocked
-    print("| case | accuracy asked | estimated error | nodes | time [s] | kernel |\n|---|---|---|---|---|---|")
+        return clock
+
+    ehl_levels.influence_matrix = clocked(influence_matrix)
+    ehl_levels.line_kernel = clocked(line_kernel)
+    solve(line_contact(*CASES["rigid"], E_STAR), 1e-5)
+    print(
+        "| case | accuracy asked | estimated error | nodes | order | time [s] | kernel |\n|---|---|---|---|---|---|---|"
+    )
     for name, numbers in CASES.items():
-        case = line_contact(*numbers, E_STAR)
-        solve(case)
         for accuracy in (1e-3, 1e-4, 1e-5, 1e-6):
-            spent[0], begin = 0.0, time.process_time()
-            found = solve(case, accuracy)
-            total = time.process_time() - begin
-            share = f"{100 * spent[0] / total:.0f} %"
-            print(f"| {name} | {accuracy:.0e} | {found.error:.1e} | {found.nodes.size} | {total:.3f} | {share} |")
+            spent[0] = 0.0
+            total, found = seconds(solve, line_contact(*numbers, E_STAR), accuracy)
+            end = f"{found.order:.2f} | {total:.3f} | {100 * spent[0] / total:.0f} %"
+            print(f"| {name} | {accuracy:.0e} | {found.error:.1e} | {found.nodes.size} | {end} |")
 
 
 def parts():
-    """Print the time of each part of a Newton step over the number of nodes."""
-    print("\n| nodes | filling [ms] | product [ms] | elimination [ms] |\n|---|---|---|---|")
-    random = np.random.default_rng(0)
-    for count in (161, 321, 641, 1281):
-        nodes, film = np.linspace(-4, 1.5, count), np.empty(count)
-        matrix = influence_matrix(nodes, nodes)
-        pressure = np.sqrt(np.maximum(1 - nodes**2, 0))
-        system = random.normal(size=(count, count))
-        filling = seconds(influence_matrix, nodes, nodes)
-        product = seconds(nodal_film, nodes, matrix, pressure, 1.0, film)
-        elimination = seconds(lambda A=system: solve_linear(A.copy(), np.ones(A.shape[0]), A.shape[0]))
-        print(f"| {count} | {1e3 * filling:.2f} | {1e3 * product:.3f} | {1e3 * elimination:.1f} |")
+    """Print the time of each part, dense and by blocks, and how far a Newton step of both differs."""
+    case = line_contact(*CASES["checked figure"], E_STAR)
+    state = solve(case).fine
+    density = ehl_grid.adapted_density(state.nodes, state.pressure, state.film, state.central)
+    print("\n| nodes | filling [ms] | | product [ms] | | Newton step [ms] | | gain | difference |")
+    print("|---|---|---|---|---|---|---|---|---|\n| | dense | blocks | dense | blocks | dense | blocks | | |")
+    for count in (161, 321, 641, 1281, 2561, 5121, 10241):
+        nodes, film = ehl_grid.sample(state.nodes, density, count), np.empty(count)
+        guess = np.interp(nodes, state.nodes, state.pressure)
+        guess[[0, -1]] = 0.0
+        rest = (case.liquid, case.film_number)
+        block_fill, kernel = seconds(line_kernel, nodes)
+        block_product, _ = seconds(deform, kernel, guess, film)
+        P = guess.copy()
+        block_step, _ = seconds(newton_by_blocks, kernel, *rest, P, state.central, 0.12, 1e-8, 1)
+        if count > DENSE:
+            print(
+                f"| {count} | | {1e3 * block_fill:.0f} | | {1e3 * block_product:.2f} | | {1e3 * block_step:.1f} | | |"
+            )
+            continue
+        fill, matrix = seconds(influence_matrix, nodes, nodes)
+        product, _ = seconds(nodal_film, nodes, matrix, guess, state.central, film)
+        Q = guess.copy()
+        step, _ = seconds(newton, nodes, matrix, kernel.weights, *rest, Q, state.central, 0.12, 1e-8, 1)
+        times = (fill, block_fill, product, block_product, step, block_step)
+        line = " | ".join(f"{1e3 * value:.3g}" for value in times)
+        print(f"| {count} | {line} | {step / block_step:.1f} | {np.max(np.abs(P - Q)):.0e} |")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -12,13 +11,13 @@ from numpy.typing import NDArray
 
 from mdr_dask.errors import FitError
 from mdr_dask.fit.base import Fit
+from mdr_dask.fit.bootstrap import weights
 from mdr_dask.physics import indenter, laws, roughness
 
 FloatArray = NDArray[np.float64]
 Series = Mapping[str, xr.Dataset]
 
 MODELS = ("sliding_friction",)
-RESAMPLES = 400
 INTERVAL = (0.025, 0.975)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
@@ -56,18 +55,12 @@ def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]
     return data["friction_coefficient"] / slope, xr.DataArray(force), xr.DataArray(velocity)
 
 
-@lru_cache(maxsize=4)
-def _weights(count: int) -> FloatArray:
-    generator = np.random.Generator(np.random.Philox(0))
-    return np.vstack([np.ones(count), generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)])
-
-
 def _resampled(values: FloatArray) -> FloatArray:
-    """Return means over the last axis, realisations: of all of them first, then of `RESAMPLES` bootstrap samples."""
-    weights = _weights(values.shape[-1])
+    """Return means over the last axis, realisations: of all of them first, then of bootstrap samples."""
+    drawn = weights(values.shape[-1]).T
     known = np.isfinite(values)
-    total = np.where(known, values, 0.0) @ weights.T
-    number = known @ weights.T
+    total = np.where(known, values, 0.0) @ drawn
+    number = known @ drawn
     with np.errstate(invalid="ignore", divide="ignore"):
         means: FloatArray = np.moveaxis(total / number, -1, 0)
     return means

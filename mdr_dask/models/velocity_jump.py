@@ -16,16 +16,15 @@ from mdr_dask.models.base import (
     FloatArray,
     Model,
     Output,
-    Parameters,
     Result,
     Status,
     canonical,
     quantity,
 )
-from mdr_dask.models.indenter import Indenter, Plane
-from mdr_dask.models.material import Material, solid_of
-from mdr_dask.models.profile_file import ProfileFile, line_of
+from mdr_dask.models.material import solid_of
+from mdr_dask.models.profile_file import line_of
 from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
+from mdr_dask.models.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
     from mdr_dask.physics.kinetics import Jump as Relaxation
@@ -40,33 +39,14 @@ SECONDS_STEPPED = 3e-7  # for every node in square: a course of some turns of th
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
 
-class VelocityJump(Parameters):
+class VelocityJump(SlidingBody):
     """A Kelvin body under a constant load on a self-affine line, whose velocity jumps from v_1 to v_1 + dv."""
 
-    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
-    points: int = quantity(
-        "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
-    )
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
     oversampling: int = quantity("1", "grid points for every Nyquist point", default=4, ge=2, le=256, multiple_of=2)
     steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
-    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
-    rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
-    )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
-    shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
-    )
-    relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
-    )
-    material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
     protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
         "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
@@ -83,14 +63,6 @@ class VelocityJump(Parameters):
     def _changes(self) -> VelocityJump:
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
-        generated = self.length is not None and self.rms_roughness is not None
-        partly = self.length is not None or self.rms_roughness is not None
-        if (self.profile is None and not generated) or (self.profile is not None and partly):
-            raise ValueError("expected length with rms_roughness, or profile")
         return self
 
     @property
@@ -159,7 +131,7 @@ def _case(case: VelocityJump) -> _Case:
 
 
 def _solve(
-    cases: list[_Case], height: FloatArray, slope: FloatArray, resolution: FloatArray, coarser: bool
+    cases: list[_Case], height: FloatArray, slope: FloatArray, accuracies: FloatArray, coarser: bool
 ) -> list[Relaxation]:
     """Solve the cases of one line on the nodes given, or on every other one with half as many steps."""
     from mdr_dask.physics.kinetics import velocity_jumps
@@ -174,16 +146,16 @@ def _solve(
         np.array(shared.times),
         np.pi * shared.points,
         steps,
-        resolution,
+        accuracies,
     )
 
 
 def _error(fine: Relaxation, coarse: Relaxation) -> float:
-    """Return the largest difference of the relaxing parts over the final friction, with a margin."""
+    """Return the largest difference of the relaxing parts, or what is left out, over mu_2, with a margin."""
     if coarse.status:
         return float("inf")  # where a coarse grid has no solution nothing is known
     parts = [np.append(jump.trace, jump.at) - jump.after for jump in (fine, coarse)]
-    return SAFETY * float(np.max(np.abs(parts[0] - parts[1])) / fine.after)
+    return SAFETY * max(float(np.max(np.abs(parts[0] - parts[1]))), fine.left_out) / fine.after
 
 
 def compute(block: Block[VelocityJump]) -> Result:
@@ -239,13 +211,12 @@ def _line_results(
     turned = roughness.turns(block.seed, realisation, cases[0].points // 2)
     nodes = cases[0].points * cases[0].oversampling
     line = roughness.turned_line(amplitude, turned, nodes), roughness.turned_line(amplitude, turned, nodes, 1)
-    accuracy = 0.0 if block.accuracy is None else 1e-3 * block.accuracy
-    resolutions = accuracy * slope_rms * np.array([case.load for case in cases])
-    jumps = _solve(cases, *line, resolutions, False)
+    jumps = _solve(cases, *line, np.full(len(cases), block.accuracy or 0.0), False)
     for case, jump, row in zip(cases, jumps, found, strict=True):
         row |= _outputs(case, jump)
     if "discretisation_error" in block.outputs:
-        for fine, coarse, row in zip(jumps, _solve(cases, *line, 0 * resolutions, True), found, strict=True):
+        alike = np.array([np.inf if jump.left_out > 0 else 0.0 for jump in jumps])
+        for fine, coarse, row in zip(jumps, _solve(cases, *line, alike, True), found, strict=True):
             row["discretisation_error"] = _error(fine, coarse)
     return [jump.status for jump in jumps], found
 

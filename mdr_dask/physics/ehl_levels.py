@@ -5,6 +5,8 @@ Hertz units, see :mod:`mdr_dask.physics.line_contact`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,13 +14,17 @@ from numpy.typing import NDArray
 
 from mdr_dask.physics import ehl_grid
 from mdr_dask.physics.deformation import influence_matrix
+from mdr_dask.physics.ehl_blocks import film_of, newton_by_blocks
 from mdr_dask.physics.ehl_newton import CONVERGED, TOO_MANY_STEPS, newton, nodal_film
 from mdr_dask.physics.film import limiting_films
+from mdr_dask.physics.line_kernel import line_kernel
 
 if TYPE_CHECKING:
     from mdr_dask.physics.line_contact import LineContact
 
 FloatArray = NDArray[np.float64]
+_Films = Callable[[FloatArray, float, FloatArray], None]
+_Iterate = Callable[[FloatArray, float, float, float, int], tuple[int, int, float, FloatArray]]
 
 #: Least ratio of successive changes that an error estimate believes in.
 _SLOWEST = 1.2
@@ -35,7 +41,9 @@ _ATTEMPTS = (
 PACES = ((0.12, 30), (0.05, 80), (0.02, 250))
 #: Numbers of nodes: of the grids that are placed by a solution, and of those whose films are compared.
 ADAPTED_NODES = 121
-NODES = (41, 81, 161, 321, 641, 1281)
+NODES = (41, 81, 161, 321, 641, 1281, 2561, 5121, 10241)
+#: From this number of nodes on the Newton equations are solved by blocks, below it by dense elimination.
+BLOCK_NODES = 600
 #: Rounds of placing the nodes by the solution before the grids are compared.
 _ADAPTATIONS = 2
 _TOLERANCE = 1e-8
@@ -96,27 +104,37 @@ def solve_on(
     case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, paces: tuple[tuple[float, int], ...]
 ) -> tuple[int, GridSolution]:
     """Solve on one grid from a guess of the pressure at its nodes, at the first pace that converges."""
-    width = np.diff(nodes)
-    weights = np.zeros_like(nodes)
-    weights[:-1] += width / 2
-    weights[1:] += width / 2
-    matrix = influence_matrix(nodes, nodes)
+    films, iterate = _by_blocks(case, nodes) if nodes.size >= BLOCK_NODES else _by_elimination(case, nodes)
     gap = np.empty_like(nodes)
     status, total, state = TOO_MANY_STEPS, 0, GridSolution(nodes, pressure, pressure, central, 0)
     for clip, most in paces:
         trial = pressure.copy()
         trial[0] = trial[-1] = 0.0
         # a guess that leaves no film has no Newton step
-        nodal_film(nodes, matrix, trial, central, gap)
+        films(trial, central, gap)
         lift = max(0.0, 0.1 * central - float(gap.min()))
-        status, steps, found, film = newton(
-            nodes, matrix, weights, case.liquid, case.film_number, trial, central + lift, clip, _TOLERANCE, most
-        )
+        status, steps, found, film = iterate(trial, central + lift, clip, _TOLERANCE, most)
         total += steps
         state = GridSolution(nodes, trial, film, found, total)
         if status == CONVERGED:
             break
     return status, state
+
+
+def _by_elimination(case: LineContact, nodes: FloatArray) -> tuple[_Films, _Iterate]:
+    """Return what fills the films at the nodes, and the Newton iteration, with a dense matrix."""
+    width = np.diff(nodes)
+    weights = np.zeros_like(nodes)
+    weights[:-1] += width / 2
+    weights[1:] += width / 2
+    matrix = influence_matrix(nodes, nodes)
+    return partial(nodal_film, nodes, matrix), partial(newton, nodes, matrix, weights, case.liquid, case.film_number)
+
+
+def _by_blocks(case: LineContact, nodes: FloatArray) -> tuple[_Films, _Iterate]:
+    """Return what fills the films at the nodes, and the Newton iteration, in blocks of low rank."""
+    kernel = line_kernel(nodes)
+    return partial(film_of, kernel), partial(newton_by_blocks, kernel, case.liquid, case.film_number)
 
 
 def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:

@@ -101,7 +101,7 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
 
 
 @njit(nogil=True, cache=True)
-def _balance(
+def balance(
     nodes: FloatArray,
     liquid: Liquid,
     K: float,
@@ -240,19 +240,30 @@ def nodal_film(nodes: FloatArray, matrix: FloatArray, P: FloatArray, central: fl
 
 
 @njit(nogil=True, cache=True)
-def _step_length(
-    matrix: FloatArray, P: FloatArray, H: FloatArray, step: FloatArray, central: float, clip: float
-) -> float:
+def _fill_film_step(matrix: FloatArray, step: FloatArray, central: float, film_step: FloatArray) -> None:
+    """Fill the change of the film at the nodes by a step of the pressures and of the film at ``X = 0``."""
+    for i in range(step.size):
+        change = central
+        for j in range(step.size):
+            change += matrix[i, j] * step[j]
+        film_step[i] = change
+
+
+@njit(nogil=True, cache=True)
+def step_length(film_step: FloatArray, P: FloatArray, H: FloatArray, step: FloatArray, clip: float) -> float:
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
     for i in range(P.size):
-        change = central
-        for j in range(P.size):
-            change += matrix[i, j] * step[j]
-        if change < 0.0:
-            share = min(share, -_FILM_SHARE * H[i] / change)
+        if film_step[i] < 0.0:
+            share = min(share, -_FILM_SHARE * H[i] / film_step[i])
     return share
+
+
+@njit(nogil=True, cache=True)
+def is_settled(P: FloatArray, step: FloatArray, central: float, change: float, tolerance: float) -> bool:
+    """Return whether a step changes pressure and central film by less than the tolerance."""
+    return bool(np.max(np.abs(step)) < tolerance * np.max(P) and abs(change) < tolerance * central)
 
 
 @njit(nogil=True, cache=True)
@@ -338,7 +349,7 @@ def newton(
     A, b, active = np.empty((n, n)), np.empty(n), np.empty(n, np.int64)
     nodal_film(nodes, matrix, P, central, H)
     for steps in range(1, most + 1):
-        _balance(nodes, liquid, K, P, H, state, R, by_pressure, by_film)
+        balance(nodes, liquid, K, P, H, state, R, by_pressure, by_film)
         for i in range(1, n - 1):
             scale[i] = abs(by_pressure[i, 2])
             for k in range(4):
@@ -352,10 +363,11 @@ def newton(
         for k in range(count):
             step[active[k]] = b[k]
         change = b[count]
-        share = _step_length(matrix, P, H, step, change, clip)
+        _fill_film_step(matrix, step, change, row)
+        share = step_length(row, P, H, step, clip)
         if not share > 1e-9:
             return FILM_COLLAPSED, steps, central, H
-        done = share == 1.0 and np.max(np.abs(step)) < tolerance * np.max(P) and abs(change) < tolerance * central
+        done = share == 1.0 and is_settled(P, step, central, change, tolerance)
         for i in range(n):
             P[i] = max(0.0, P[i] + share * step[i])
         central += share * change

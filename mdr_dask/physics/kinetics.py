@@ -13,10 +13,12 @@ from mdr_dask.physics.kinetics_kernels import BLOCK, CANDIDATES, WINDOWS, block_
 from mdr_dask.physics.kinetics_march import Pace, march
 from mdr_dask.physics.kinetics_profile import (
     DRAG,
+    DRAG_STIFFNESS,
     LENGTH,
     LOAD,
     STIFFNESS,
     SUMS,
+    TILT,
     Course,
     Patches,
     Profile,
@@ -41,6 +43,7 @@ NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no fin
 NEWTON = 0.03  # of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer
 EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
 MOMENTS = 3000
+SHARE = 0.1  # of the accuracy: how near to its end friction is left
 LONG, STRAY = 15.0, 0.02  # relaxation times after which friction has come so near to its end, of all its changes
 FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
 WIDENINGS = 3
@@ -61,6 +64,8 @@ class Jump(NamedTuple):
         Depth before and after.
     moments : int
         Number of moments computed; the rest is in equilibrium.
+    left_out : float
+        Estimated size of a transient that is not computed, because all of it lies within the accuracy.
     status : int
         `CONVERGED` or a key of `MESSAGES`.
     """
@@ -71,6 +76,7 @@ class Jump(NamedTuple):
     trace: FloatArray
     depth: FloatArray
     moments: int
+    left_out: float
     status: int
 
 
@@ -278,7 +284,7 @@ def velocity_jump(
     times: FloatArray,
     wavenumber: float,
     per_decade: float = STEPS_PER_DECADE,
-    resolution: float = 0.0,
+    accuracy: float = 0.0,
 ) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
 
@@ -300,8 +306,9 @@ def velocity_jump(
         q_max L, which fixes the first step.
     per_decade : float
         Steps in a factor ten of the time.
-    resolution : float
-        The march ends when drag and depth have been this near to their end for eight moments.
+    accuracy : float
+        Error allowed for the trace, over the friction at the end: a transient that is smaller is not computed, another
+        one ends when drag and depth have stayed within a tenth of it.
 
     Returns
     -------
@@ -309,7 +316,7 @@ def velocity_jump(
         With ``mu = drag / load`` times height over length.
     """
     cases = np.array([load]), np.array([reaches])
-    return velocity_jumps(height, slope, *cases, times, wavenumber, per_decade, np.array([resolution]))[0]
+    return velocity_jumps(height, slope, *cases, times, wavenumber, per_decade, np.array([accuracy]))[0]
 
 
 def velocity_jumps(
@@ -320,19 +327,19 @@ def velocity_jumps(
     times: FloatArray,
     wavenumber: float,
     per_decade: float,
-    resolutions: FloatArray,
+    accuracies: FloatArray,
 ) -> list[Jump]:
     """Return the jumps of many cases on one line, whose steady states are found together; see :func:`velocity_jump`.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
-    loads, resolutions : array, shape (cases,)
+    loads, accuracies : array, shape (cases,)
     reaches : array, shape (cases, 2)
     times, wavenumber, per_decade
         As of one case, which does not depend on the others.
     """
-    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, INVALID)
+    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, 0.0, INVALID)
     if not np.all(np.isfinite(height)):
         return [failed] * loads.size
     every = 2 if height.size >= LONG_LINE and height.size % 2 == 0 else 1
@@ -347,7 +354,7 @@ def velocity_jumps(
             continue
         change = float(depths[k, 1] - depths[k, 0])
         pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
-        ends = float(resolutions[k]), equilibrium, DOUBT if every > 1 else 0.0
+        ends = float(accuracies[k]), equilibrium, DOUBT if every > 1 else 0.0
         jump = _relax(
             profile, float(loads[k]), (float(reaches[k, 0]), float(reaches[k, 1])), depths[k] + top, times, pace, ends
         )
@@ -366,10 +373,10 @@ def _relax(
 ) -> Jump:
     """Solve both steady states on one profile and march between them."""
     sums = np.empty(SUMS)
-    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, NOT_CONVERGED)
+    failed = Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, 0.0, NOT_CONVERGED)
     floor = np.zeros(profile.height.size)
     low, high = float(depths.min()), float(depths.max())
-    resolution, equilibrium, doubt = ends
+    accuracy, equilibrium, doubt = ends
     margin = 0.25 * (high - low) + NEGLIGIBLE * load + doubt * high
     for _ in range(WIDENINGS):
         floor[:] = 0.0
@@ -380,21 +387,26 @@ def _relax(
         first, good_first = _settle(profile, runs, floor, reaches[0], load, float(depths[0]), sums)
         before = sums[DRAG]
         last, good_last = _settle(profile, runs, floor, reaches[1], load, float(depths[1]), sums)
-        after = sums[DRAG]
+        after, by_depth = sums[DRAG], abs(sums[DRAG_STIFFNESS] * (last.depth - first.depth))
         known = low - margin <= min(first.depth, last.depth) and max(first.depth, last.depth) <= high + margin
         if not (good_first and good_last and known):
             margin *= 4
             continue
+        ended = np.array([first.depth, last.depth])
         if _full(first, profile) and _full(last, profile):
-            return Jump(
-                before, after, after, np.full(times.size, after), np.array([first.depth, last.depth]), 0, CONVERGED
-            )
+            return Jump(before, after, after, np.full(times.size, after), ended, 0, 0.0, CONVERGED)
         rate, good = _release(profile, first, reaches[1], load, sums)
         if not good:
             return failed
-        settled = min(max(equilibrium, resolution / max(abs(sums[DRAG] - after), 1e-300)), 1.0)
+        at = sums[DRAG]
+        # the difference of its ends alone does not bound a transient, which may cross its end
+        transient = abs(at - after) + abs(rate * sums[TILT]) + by_depth
+        if transient <= accuracy * after:
+            trace = np.where(times > 0, after, at)
+            return Jump(before, at, after, trace, ended, 0, transient, CONVERGED)
+        settled = max(equilibrium, SHARE * accuracy * after / max(transient, 1e-300))
         course = np.empty((4, MOMENTS))
-        course[:, 0] = 0.0, first.depth, rate, sums[DRAG]
+        course[:, 0] = 0.0, first.depth, rate, at
         count, status = march(
             profile,
             runs,
@@ -414,7 +426,7 @@ def _relax(
             return failed._replace(status=STRAYED)
         if status == 0:
             trace = _at_times(course[0, :count], course[3, :count], times, after)
-            return Jump(before, course[3, 0], after, trace, np.array([first.depth, last.depth]), count, CONVERGED)
+            return Jump(before, course[3, 0], after, trace, ended, count, 0.0, CONVERGED)
         margin *= 4
     return failed
 

@@ -227,7 +227,7 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
     -------
     LineSolution
         With ``status`` other than zero and a reason if no solution was found; with a reason too if the finest grid
-        allowed (1281 nodes) or the finest one that converged misses the accuracy.
+        allowed (10241 nodes) or the finest one that converged misses the accuracy.
     """
     return solution(case, solve_levels(case, accuracy), accuracy)
 

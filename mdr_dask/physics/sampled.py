@@ -24,7 +24,7 @@ from mdr_dask.physics.sliding import CONVERGED, NOT_CONVERGED, Steady
 FloatArray = NDArray[np.float64]
 
 BLOCK = 32  # cells
-BEFORE, AFTER = 3, 3  # nodes of the turns before and after
+BEFORE, AFTER = 3, 4  # nodes of the turns before and after
 LANES = 64  # cases that go along the line together
 VECTOR = 8
 ITERATIONS = 25

@@ -23,7 +23,6 @@ from mdr_dask.physics.sweep import (
     STRETCH,
     SUMS,
     Cells,
-    barrier,
     sweep,
 )
 
@@ -186,7 +185,7 @@ def _states(
     tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
     """
     n = cells.mean.size - 1
-    barriers, block_barriers = np.empty(n), np.empty(n // BLOCK)
+    barriers, block_barriers = np.empty(n), np.empty(n // BLOCK + 1)
     sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
     reach = -1.0
     first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
@@ -194,7 +193,7 @@ def _states(
         starts = reaches[k] != reach
         if starts:
             reach = reaches[k]
-            barrier(cells, reach, barriers, block_barriers)
+            block_barriers[:] = np.nan
             trail[:] = first
         depth, converged = guesses[k], False
         if guesses[k] > 0:

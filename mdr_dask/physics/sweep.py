@@ -82,10 +82,18 @@ def summit(a: float, b: float, c: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: FloatArray) -> None:
-    """Write the depth that keeps each whole cell pressed, w + reach w' > 0, and its maximum over blocks."""
-    height, enter, leave = cells.height, cells.enter, cells.leave
-    for i in range(barriers.size):
+def _barrier(
+    height: FloatArray,
+    enter: FloatArray,
+    leave: FloatArray,
+    reach: float,
+    block: int,
+    barriers: FloatArray,
+    block_barriers: FloatArray,
+) -> None:
+    """Write the depth that keeps each whole cell of a block pressed, w + reach w' > 0, and their maximum."""
+    every = -np.inf
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, barriers.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
         first = -(h0 + reach * a)
         last = -(height[i + 1] + reach * leave[i])
@@ -97,11 +105,8 @@ def barrier(cells: Cells, reach: float, barriers: FloatArray, block_barriers: Fl
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
         barriers[i] = highest
-    for j in range(block_barriers.size):
-        highest = barriers[j * BLOCK]
-        for i in range(j * BLOCK + 1, (j + 1) * BLOCK):
-            highest = barriers[i] if barriers[i] > highest else highest
-        block_barriers[j] = highest
+        every = highest if highest > every else every
+    block_barriers[block] = every
 
 
 @njit(nogil=True, cache=True)
@@ -234,8 +239,9 @@ def sweep(
     ----------
     cells : Cells
         The profile.
-    barriers, block_barriers : array
-        From :func:`barrier` for the same reach.
+    barriers, block_barriers : array, shape (n,), (n // BLOCK + 1,)
+        Depths that keep cells and blocks pressed at this reach, as far as sweeps at it have needed them: those of
+        blocks that are NaN, all of them at first, are written here when an element in contact comes there.
     reach : float
         v tau in cells.
     depth : float
@@ -268,7 +274,11 @@ def sweep(
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
         if contact and x == 0:
-            while i < n and barriers[i] < depth:
+            while i < n:
+                if math.isnan(block_barriers[i // BLOCK]):
+                    _barrier(height, enter, leave, reach, i // BLOCK, barriers, block_barriers)
+                if not barriers[i] < depth:
+                    break
                 if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
                     area += block_mean[i // BLOCK] + BLOCK * depth
                     stretch += block_stretch[i // BLOCK]

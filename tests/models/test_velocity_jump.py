@@ -1,9 +1,13 @@
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute, coordinates, distinct, seconds
+from mdr_dask.physics import kinetics
 
 EVERY = tuple(output.name for output in MODEL.outputs if output.default)
 BASE = {
@@ -45,6 +49,45 @@ def test_same_dimensionless_numbers_are_one_case() -> None:
     assert distinct(same) == len(same.realisations) == result.solves
     for name in EVERY:
         assert np.array_equal(result.values[name][0], result.values[name][1])
+
+
+def test_accuracy_leaves_out_what_is_smaller_and_says_so() -> None:
+    whole = block({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
+    exact, quick = compute(whole).values, compute(replace(whole, accuracy=1e-2)).values
+    for name in ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after"):
+        assert np.array_equal(quick[name], exact[name])
+    after = exact["friction_coefficient_after"]
+    error = np.max(np.abs(quick["friction_coefficient"] - exact["friction_coefficient"]), axis=2) / after
+    assert np.all(error < 1e-2)
+    left_out = np.all(quick["friction_coefficient"] == after[:, :, None], axis=2)
+    assert 0 < left_out.sum() < left_out.size
+    assert np.all(quick["discretisation_error"][left_out] > error[left_out])
+
+
+def test_equal_cases_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twice the modulus under twice the force, ten times the length and height, half the time at twice the velocity."""
+    solved: list[int] = []
+    solve = kinetics.velocity_jumps
+
+    def counted(*arguments: Any) -> list[Any]:
+        found = solve(*arguments)
+        solved.append(len(found))
+        return found
+
+    monkeypatch.setattr(kinetics, "velocity_jumps", counted)
+    same = block(
+        {
+            "shear_modulus": np.array([1e7, 2e7, 1e7, 1e7, 1e7]),
+            "normal_force": np.array([0.1, 0.2, 10.0, 0.1, 0.1]),
+            "length": np.array([0.002, 0.002, 0.02, 0.002, 0.002]),
+            "rms_roughness": np.array([2e-6, 2e-6, 2e-5, 2e-6, 2e-6]),
+            "velocity": np.array([0.05, 0.05, 0.5, 0.1, 0.06]),
+            "relaxation_time": np.array([1e-3, 1e-3, 1e-3, 5e-4, 1e-3]),
+        }
+    )
+    result = compute(same)
+    assert solved == [2, 2] * len(same.realisations)  # and once on the coarser grid of the error
+    assert distinct(same) == result.solves == 2 * len(same.realisations)
 
 
 def test_jump_follows_the_slope_in_region_one() -> None:

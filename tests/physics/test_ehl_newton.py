@@ -12,8 +12,8 @@ from mdr_dask.physics.ehl_newton import (
     FILM_COLLAPSED,
     TOO_MANY_STEPS,
     Liquid,
-    _balance,
     _mobility,
+    balance,
     log_viscosity,
     newton,
     nodal_film,
@@ -78,16 +78,16 @@ def test_derivatives_of_the_balance_are_its_differences(liquid: Liquid) -> None:
     P[[0, -1]] = 0.0
     H = 0.3 + 0.1 * nodes**2
 
-    def balance(P: np.ndarray, H: np.ndarray) -> tuple[np.ndarray, ...]:
+    def balances(P: np.ndarray, H: np.ndarray) -> tuple[np.ndarray, ...]:
         R, by_pressure, by_film = np.empty(n), np.empty((n, 4)), np.empty((n, 4))
-        _balance(nodes, liquid, 0.2, P, H, np.empty((4, n)), R, by_pressure, by_film)
+        balance(nodes, liquid, 0.2, P, H, np.empty((4, n)), R, by_pressure, by_film)
         return R, by_pressure, by_film
 
-    _, by_pressure, by_film = balance(P, H)
+    _, by_pressure, by_film = balances(P, H)
     for j in range(n):
         step = 1e-6 * np.eye(n)[j]
-        numeric_P = (balance(P + step, H)[0] - balance(P - step, H)[0]) / 2e-6
-        numeric_H = (balance(P, H + step)[0] - balance(P, H - step)[0]) / 2e-6
+        numeric_P = (balances(P + step, H)[0] - balances(P - step, H)[0]) / 2e-6
+        numeric_H = (balances(P, H + step)[0] - balances(P, H - step)[0]) / 2e-6
         for i in range(n):
             inside = 0 <= j - i + 2 < 4
             assert numeric_P[i] == pytest.approx(by_pressure[i, j - i + 2] if inside else 0.0, rel=1e-6, abs=1e-7)
@@ -113,7 +113,7 @@ def test_result_is_complementary_and_carries_the_load() -> None:
     nodal_film(nodes, influence_matrix(nodes, nodes), P, central, again)
     assert np.array_equal(again, H)
     assert H.min() > 0
-    _balance(nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))
+    balance(nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))
     carrying = P > 0
     carrying[[0, -1]] = False
     assert np.max(np.abs(R[carrying])) < 1e-9  # the step was below 1e-10 of the pressure

@@ -185,13 +185,32 @@ def test_bad_numbers_are_a_status() -> None:
         assert velocity_jump(height, slope, load, reaches, TIMES, WAVENUMBER).status == INVALID
 
 
-def test_resolution_stops_the_march_at_equilibrium() -> None:
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-2])
+def test_march_ends_where_friction_stays_within_the_accuracy(accuracy: float) -> None:
     height, slope = line()
     reaches = REACH, 1.2 * REACH
     long = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 24)
-    short = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 24, 1e-3 * long.after)
-    assert short.moments < long.moments
-    assert np.max(np.abs(short.trace - long.trace)) < 1e-3 * long.after
+    short = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 24, accuracy)
+    assert 0 < short.moments < long.moments
+    assert np.max(np.abs(short.trace - long.trace)) < accuracy * long.after
+
+
+def test_transient_within_the_accuracy_is_not_computed() -> None:
+    height, slope = line()
+    accuracy, skipped = 1e-2, 0
+    for reach in np.geomspace(1e-5, 1, 16):
+        reaches = reach, 1.2 * reach
+        long = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 8)
+        short = velocity_jump(height, slope, LOAD, reaches, TIMES, WAVENUMBER, 8, accuracy)
+        assert (short.before, short.at, short.after) == (long.before, long.at, long.after)
+        error = np.max(np.abs(short.trace - long.trace))
+        assert error < accuracy * long.after
+        assert short.moments <= long.moments
+        if short.left_out > 0:
+            skipped += 1
+            assert short.moments == 0
+            assert error < 1.4 * short.left_out <= 1.4 * accuracy * long.after
+    assert 0 < skipped < 16
 
 
 @pytest.mark.parametrize("hurst", [0.0, 0.7])

@@ -174,7 +174,7 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=1,
+    version=2,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,
