@@ -24,12 +24,14 @@ SAMPLED = 4  # oversampling of a line that cases go along from node to node
 REFINEMENTS = (1, 2, 4, 8, 16, 32)  # of the cells of the first of these grids, where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
 # of the last change of the drag between grids, and of the one before; see docs/friction.md
-QUICK_SAFETY, QUICK_MEMORY = 1.0, 0.1
+QUICK_SAFETY, QUICK_MEMORY = 0.6, 0.06
 FEW = 10  # nodes in contact that are too few to go from node to node
-MANY, SAFETY_OF_MANY = 1000, 0.6  # nodes in contact whose errors are an average
-# then on the first three grids: of the last changes of drag and contact, and of the changes before
-OF_DRAG, OF_CONTACT, OF_DRAG_BEFORE, OF_CONTACT_BEFORE = 0.12, 0.1, 0.01, 0.03
+MANY, SAFETY_OF_MANY = 1000, 0.4  # nodes in contact whose errors are an average
+# on the first three grids: of the change of the drag with so many nodes, of that of the contact, and of those before
+OF_DRAG, OF_CONTACT, OF_DRAG_BEFORE, OF_CONTACT_BEFORE = 0.12, 0.15, 0.02, 0.03
 OF_FIRST_CONTACT = 0.5  # of the change of the contact on the first two
+# of the accuracy, that the search for the depth may leave on the second grid and on finer ones
+ROUGHLY, TRUSTED = 0.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -140,19 +142,21 @@ class Task:
         left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
         height, slope = self.nodes(SAMPLED, "hermite")
         line = sampled.nodes(height, slope, 1, True)
-        coarse, fine = sampled.begin(height, slope, self.reaches[left], self.loads[left])
+        coarse, fine = sampled.begin(height, slope, self.reaches[left], self.loads[left], ROUGHLY * accuracy)
         before = sampled.Change(np.zeros(left.size), np.zeros(left.size))
         for grids, refinement in enumerate(REFINEMENTS, 2):
             found, change = sampled.extrapolated(coarse, fine)
             touching = fine.contact_fraction * self.line.points * 2 * refinement
-            estimate = _estimate(grids, touching, change, before) + fine.doubt
+            estimate = _estimate(grids, touching, change, before) + fine.doubt + sampled.EXTRAPOLATED * coarse.doubt
             error[left] = np.where(np.isfinite(estimate), estimate, np.inf)
             steady = steady.replaced(left, found)
             still = ~(error[left] <= accuracy)
-            left, coarse, before = left[still], fine.only(still), change.only(still)
+            left, before = left[still], change.only(still)
+            coarse, fine = coarse.only(still), fine.only(still)
             if not left.size or refinement == REFINEMENTS[-1]:
                 break
-            fine = sampled.settle(line, refinement, self.reaches[left], self.loads[left], coarse)
+            cases = self.reaches[left], self.loads[left]
+            coarse, fine = fine, sampled.settle(line, refinement, *cases, (coarse, fine), TRUSTED * accuracy)
         return steady, error
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, FloatArray]:
@@ -194,12 +198,12 @@ def _estimate(grids: int, touching: FloatArray, change: Change, before: Change) 
     """
     many = touching > MANY
     if grids == 2:
-        estimate = np.maximum(QUICK_SAFETY * change.drag, OF_FIRST_CONTACT * change.contact)
+        estimate = np.maximum(change.drag, OF_FIRST_CONTACT * change.contact)
         return np.where(many, estimate, np.inf)
     safety = np.where(many, SAFETY_OF_MANY, QUICK_SAFETY)
     estimate = np.maximum(safety * change.drag, QUICK_MEMORY * before.drag)
     if grids == 3:
-        now = np.maximum(OF_DRAG * change.drag, OF_CONTACT * change.contact)
         memory = np.maximum(OF_DRAG_BEFORE * before.drag, OF_CONTACT_BEFORE * before.contact)
-        estimate = np.where(many, np.maximum(now, memory), QUICK_SAFETY * change.drag)
+        seen = np.where(many, OF_DRAG, QUICK_SAFETY) * change.drag
+        estimate = np.maximum(np.maximum(seen, OF_CONTACT * change.contact), memory)
     return np.where(touching > FEW, estimate, np.inf)

@@ -30,8 +30,8 @@ VECTOR = 8
 ITERATIONS = 25
 COARSENING = 4
 COARSEST = 64  # nodes of the grid that the search for the depth starts on
-# relative step of the depth that a secant is trusted with, and what that may cost: on a grid, and to start the next
-ANSWER, START = (0.02, 1e-3), (0.1, 0.03)
+# relative step of the depth that a secant is trusted with, and what that may cost to start the next grid
+ANSWER_STEP, START = 0.03, (0.1, 0.03)
 EXTRAPOLATED = 1 / 7  # of the change between grids: the error falls by 8 where the cells are halved
 DOUBTED = 0.1  # of the last step of the drag, which is taken along the secant
 EXACT_STEP, ROUNDING = 1e-12, 3e-12
@@ -56,7 +56,7 @@ class Sampled:
     depth : array
         Penetration of the mean line, in the unit of height.
     rate : array
-        Change of the drag with the depth.
+        Relative change of the drag with the depth.
     drag, contact_fraction, contact_slope : array
         As in :class:`mdr_dask.physics.sliding.Steady`.
     doubt : array
@@ -391,7 +391,8 @@ def _solve(
     near_step, trusted : float
         Bounds of the last relative step of the depth and of what it costs.
     depths, rates : array, shape (cases,)
-        Penetration of the highest node, and change of the drag with it, NaN where it is not known; read and written.
+        Penetration of the highest node, and relative change of the drag with it, NaN where it is not known; read and
+        written.
     results : array, shape (cases, 4)
         Written: F_x / (4 G), length in contact over length of the line, rms slope over it, and a bound of the relative
         error of the search; NaN where no depth is found.
@@ -419,15 +420,15 @@ def _solve(
                 depth, drag = room[DEPTH * LANES + k], room[LOSS * LANES + k]
                 step = (loads[case] * n - room[LOAD * LANES + k]) / room[RATE * LANES + k]
                 size = abs(step) / depth
-                rate = (drag - last_drag[k]) / last_step[k]
+                rate = (1 - last_drag[k] / drag) / last_step[k]
                 rate = rate if math.isfinite(rate) else rates[case]
-                doubt = DOUBTED * abs(rate * step / drag)
+                doubt = DOUBTED * abs(rate * step)
                 if size < EXACT_STEP:
                     rate, doubt = (rate if math.isfinite(rate) else 0.0), 0.0
                 if size <= near_step and doubt <= trusted:
                     depths[case], rates[case] = depth + step, rate
                     length, stretch = room[LENGTH * LANES + k], room[STRETCH * LANES + k]
-                    results[case, 0] = drag + rate * step
+                    results[case, 0] = drag * (1 + rate * step)
                     results[case, 1] = length / n
                     results[case, 2] = n * math.sqrt(stretch / length) if length > 0 else 0.0
                     results[case, 3] = doubt + ROUNDING
@@ -439,7 +440,9 @@ def _solve(
             count = kept
 
 
-def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: FloatArray) -> tuple[Sampled, Sampled]:
+def begin(
+    height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: FloatArray, trusted: float
+) -> tuple[Sampled, Sampled]:
     """Return the steady states on every fourth node of a periodic line, found roughly, and on every other node.
 
     Parameters
@@ -449,6 +452,8 @@ def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: Flo
         for every Nyquist point.
     reaches, loads : array, shape (cases,)
         v tau / L and F_N / (4 G L), positive and finite.
+    trusted : float
+        Relative error of the drag on every other node that the search may leave.
     """
     strides = [2, 4]
     while height.size > COARSENING * COARSEST * strides[-1]:
@@ -458,15 +463,21 @@ def begin(height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: Flo
     found = []
     for stride in reversed(strides):
         line = nodes(height, slope, stride, stride <= strides[1])
-        if stride == 2:
-            rates[:] = np.nan
-        _solve(line, _weights(1), reaches, loads, *(ANSWER if stride == 2 else START), depths, rates, results)
+        bounds = (ANSWER_STEP, trusted) if stride == 2 else START
+        _solve(line, _weights(1), reaches, loads, *bounds, depths, rates, results)
         if stride <= strides[1]:
             found.append(_sampled(line, depths, rates, results.copy()))
     return found[0], found[1]
 
 
-def settle(line: Nodes, refinement: int, reaches: FloatArray, loads: FloatArray, near: Sampled) -> Sampled:
+def settle(
+    line: Nodes,
+    refinement: int,
+    reaches: FloatArray,
+    loads: FloatArray,
+    grids: tuple[Sampled, Sampled],
+    trusted: float,
+) -> Sampled:
     """Return the steady states on a line, or on a finer grid where it is touched.
 
     Parameters
@@ -477,11 +488,17 @@ def settle(line: Nodes, refinement: int, reaches: FloatArray, loads: FloatArray,
         Cells of the finer grid for each of the line.
     reaches, loads : array, shape (cases,)
         As in :func:`begin`.
-    near : Sampled
-        The states on a coarser grid.
+    grids : tuple of Sampled
+        The states on two coarser grids, the finer one last.
+    trusted : float
+        Relative error of the drag that the search may leave.
     """
-    depths, rates, results = near.depth + line.top, near.rate.copy(), np.empty((loads.size, 4))
-    _solve(line, _weights(refinement), reaches, loads, *ANSWER, depths, rates, results)
+    coarse, fine = grids
+    ahead = EXTRAPOLATED * (fine.depth - coarse.depth)
+    depths = fine.depth + line.top
+    depths += np.where(np.abs(ahead) < ANSWER_STEP * depths, ahead, 0.0)
+    rates, results = fine.rate.copy(), np.empty((loads.size, 4))
+    _solve(line, _weights(refinement), reaches, loads, ANSWER_STEP, trusted, depths, rates, results)
     return _sampled(line, depths, rates, results)
 
 

@@ -22,11 +22,11 @@ def cases():
 def settled(refinement, hurst=0.7):
     height, slope, _ = line(hurst)
     reaches, loads = cases()
-    states = sampled.begin(height, slope, reaches, loads)
+    states = sampled.begin(height, slope, reaches, loads, 5e-3)
     whole = sampled.nodes(height, slope, 1, True)
     grid = 1
     while grid <= refinement:
-        states = states[-1], sampled.settle(whole, grid, reaches, loads, states[-1])
+        states = states[-1], sampled.settle(whole, grid, reaches, loads, states, 1e-3)
         grid *= 2
     return states[-1]
 
@@ -50,7 +50,7 @@ def test_grids_converge_to_the_exact_sweep():
 def test_full_contact_is_exact_on_any_grid():
     height, slope, rms = line()
     reaches, loads = np.array([1e-4, 1e-3]), np.array([50.0, 300.0])
-    _, state = sampled.begin(height, slope, reaches, loads)
+    _, state = sampled.begin(height, slope, reaches, loads, 5e-3)
     assert state.drag == pytest.approx(reaches * rms**2, rel=1e-11)
     assert state.contact_fraction == pytest.approx(1.0)
     assert state.contact_slope == pytest.approx(rms, rel=1e-11)
@@ -78,8 +78,8 @@ def test_a_case_is_the_same_among_any_others(count):
     whole = sampled.nodes(height, slope, 1, True)
 
     def solve(some):
-        states = sampled.begin(height, slope, reaches[some], loads[some])
-        return sampled.settle(whole, 2, reaches[some], loads[some], states[-1])
+        states = sampled.begin(height, slope, reaches[some], loads[some], 5e-3)
+        return sampled.settle(whole, 2, reaches[some], loads[some], states, 1e-3)
 
     everything = solve(np.arange(loads.size))
     some = np.random.default_rng(count).permutation(loads.size)[:count]
@@ -94,8 +94,8 @@ def test_a_line_that_does_not_divide_by_the_blocks():
     height, slope = (roughness.line(amplitude, phase, 208, order) for order in (0, 1))
     fine = [roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)]
     reaches, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
-    states = sampled.begin(height, slope, reaches, loads)
+    states = sampled.begin(height, slope, reaches, loads, 5e-3)
     whole = sampled.nodes(height, slope, 1, True)
     for refinement in (1, 2, 4):
-        states = states[-1], sampled.settle(whole, refinement, reaches, loads, states[-1])
+        states = states[-1], sampled.settle(whole, refinement, reaches, loads, states, 1e-3)
     assert states[-1].drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
