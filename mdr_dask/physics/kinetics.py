@@ -449,7 +449,7 @@ def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float
 
 
 def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:
-    """Interpolate over log time by a modified Akima curve, which does not overshoot at a kink; linear in the first step."""
+    """Interpolate over log time by a modified Akima curve, which no kink makes overshoot; linear in the first step."""
     scale = moments[1]
     curve = Akima1DInterpolator(np.log1p(moments / scale), drag, method="makima")
     trace: FloatArray = curve(np.log1p(times / scale))
