@@ -141,6 +141,7 @@ def run(
     """
     with store.lock(url):
         layout, asked = _plan(campaign, url)
+        store.sweep(url)
         with _executor(resources) as execute:
             return _run_rounds(url, layout, asked, execute, report, retry_failed)
 

@@ -188,12 +188,17 @@ def test_files_and_folders_that_are_no_store_are_left_alone(toy, tmp_path):
     assert [path.name for path in (tmp_path / "folder").iterdir()] == ["notes.txt"]
 
 
-def test_leftovers_of_a_killed_write_are_not_read(toy, url):
+def test_leftovers_of_a_killed_write_are_not_read_and_removed_by_the_next_run(toy, url):
     campaign = toy.campaign(toy.axis("position", [1.0]))
     run(campaign, url)
-    Path(url, "status/records/0.0-1.0123abcd.partial").write_text("{")
+    before = digests(url)
+    leftovers = [Path(url, name) for name in ("status/records/0.0-1.0123abcd.partial", "height/c/0/0.4567cdef.partial")]
+    for leftover in leftovers:
+        leftover.write_text("{")
     assert len(list(store.records(url, ""))) == 1
     assert run(campaign, url, retry_failed=True).kept == 6
+    assert digests(url) == before
+    assert not any(leftover.exists() for leftover in leftovers)
 
 
 def test_a_damaged_chunk_is_named(toy, url):

@@ -131,7 +131,10 @@ def test_every_figure_says_what_its_bars_are(groups):
 
 def test_figures_of_a_store_with_one_case(groups):
     for name in ("jump_trace", "jump_velocities", "jump_fit", "jump_height"):
-        plots("velocity_jump")[name].draw({"": groups["example"]}).savefig(io.BytesIO())
+        figure = plots("velocity_jump")[name].draw({"": groups["example"]})
+        figure.savefig(io.BytesIO())
+        drawn = [line for axes in figure.axes for line in axes.lines if np.any(np.isfinite(line.get_ydata(orig=False)))]
+        assert drawn, name
 
 
 def test_the_command_line_fits_each_series_and_joins_intervals(store, capsys):

@@ -22,6 +22,7 @@ from mdr_dask.physics.kinetics_profile import (
     Course,
     Patches,
     Profile,
+    cubic_profile,
     height_at,
     released,
 )
@@ -80,77 +81,13 @@ class Jump(NamedTuple):
     status: int
 
 
-def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float]:
-    """Return a periodic profile of cubic cells that begins at its highest point.
-
-    Parameters
-    ----------
-    height : array, shape (n,)
-        Heights at equidistant nodes of a line of unit length, positive into the elastomer, which moves along it in the
-        order of the nodes.
-    slope : array, shape (n,)
-        Derivative at the nodes.
-
-    Returns
-    -------
-    profile : Profile
-        With heights from the highest point, so that a light contact loses no digits.
-    top : float
-        Height of that point.
-    """
-    best, place, top = _summit(height, slope)
-    n = height.size
-    heights, slopes, area, square = np.empty((4, n + 2))
-    _turned(height, slope, best, top, heights, slopes, area, square)
-    return Profile(heights, slopes, area, square, float(n), 1 / n, place / n, True), top
-
-
 @njit(nogil=True, cache=True)
-def _turned(
-    height: FloatArray,
-    slope: FloatArray,
-    best: int,
-    top: float,
-    heights: FloatArray,
-    slopes: FloatArray,
-    area: FloatArray,
-    square: FloatArray,
-) -> None:
-    """Write the columns of a profile that begins at cell `best`."""
-    n = height.size
-    for i in range(n + 2):
-        node = best + i if best + i < n else best + i - n
-        node = node if node < n else node - n
-        heights[i], slopes[i] = height[node] - top, slope[node]
-    area[0] = square[0] = 0.0
-    for i in range(n + 1):
-        enter, leave = slopes[i] / n, slopes[i + 1] / n
-        before, after = slopes[i - 1 if i > 0 else n - 1] / n, slopes[i + 2 if i < n else 2] / n
-        area[i + 1] = area[i] + (0.5 * (heights[i + 1] + heights[i]) + (enter - leave) / 12) / n
-        # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
-        bend = (leave**2 - before**2 - after**2 + enter**2) / 24
-        square[i + 1] = square[i] + (0.5 * (enter**2 + leave**2) + bend) * n
-
-
-@njit(nogil=True, cache=True)
-def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
-    """Return the cell of the highest point, where in the cell it is, 0..1, and its height."""
-    n = height.size
-    best, best_place, highest = 0, 0.0, -np.inf
-    for i in range(n):
-        following = i + 1 if i + 1 < n else 0
-        after, enter, leave = height[following], slope[i] / n, slope[following] / n
-        place = 0.0
-        if enter > 0 > leave:
-            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
-            b, c = b * place * place, c * place**3
-        else:
-            b, c = 0.0, 0.0
-        peak = height[i] + place * enter + b + c
-        if peak > highest:
-            best, best_place, highest = i, place, peak
-    return best, best_place, highest
+def _patches(profile: Profile, start: FloatArray, end: FloatArray, found: int, depth: float, reach: float) -> Patches:
+    """Return the patches found at a depth, with the displacements that they leave with."""
+    pressed = np.empty(found)
+    for k in range(found):
+        pressed[k] = depth + height_at(profile, end[k])[0]
+    return Patches(start[:found].copy(), end[:found].copy(), pressed, found, depth, reach, np.zeros(1, np.int64))
 
 
 @njit(nogil=True, cache=True)
@@ -158,9 +95,8 @@ def _settle(
     profile: Profile, runs: IntArray, floor: FloatArray, reach: float, load: float, depth: float, sums: FloatArray
 ) -> tuple[Patches, bool]:
     """Find the steady state at a load, from a depth near it."""
-    nothing = np.empty(0)
-    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0, np.zeros(1, np.int64))
     start, end = np.empty(floor.size), np.empty(floor.size)
+    none = _patches(profile, start, end, 0, 0.0, 1.0)
     places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
@@ -193,18 +129,7 @@ def _settle(
             break
         at[0] += step
     converged = converged or (found > 0 and abs(sums[LOAD] - load) <= 1e-8 * load)
-    pressed = np.empty(max(found, 0))
-    for k in range(pressed.size):
-        pressed[k] = at[0] + height_at(profile, end[k])[0]
-    return Patches(
-        start[: pressed.size].copy(),
-        end[: pressed.size].copy(),
-        pressed,
-        pressed.size,
-        at[0],
-        reach,
-        np.zeros(1, np.int64),
-    ), converged
+    return _patches(profile, start, end, max(found, 0), at[0], reach), converged
 
 
 @njit(nogil=True, cache=True)
@@ -295,7 +220,7 @@ def velocity_jump(
     Parameters
     ----------
     height, slope : array, shape (n,)
-        See :func:`cubic_profile`.
+        See :func:`mdr_dask.physics.kinetics_profile.cubic_profile`.
     load : float
         F_N / (4 G L), in the unit of height.
     reaches : tuple of float
@@ -434,18 +359,14 @@ def _relax(
 @njit(nogil=True, cache=True)
 def _settle_at(profile: Profile, runs: IntArray, floor: FloatArray, reach: float, depth: float) -> Patches:
     """Return the steady state at a depth."""
-    nothing = np.empty(0)
-    none = Patches(nothing, nothing, nothing, 0, 0.0, 1.0, np.zeros(1, np.int64))
     start, end, sums = np.empty(floor.size), np.empty(floor.size), np.empty(SUMS)
+    none = _patches(profile, start, end, 0, 0.0, 1.0)
     places, spreads = np.empty(CANDIDATES), np.empty(WINDOWS)
     least = np.empty(floor.size // BLOCK)
     block_least(profile, reach, least)
     course = Course(np.array([np.inf]), np.array([depth]), np.zeros(1), 1, 0.0)
     found = max(touch(profile, runs, floor, least, none, course, np.inf, reach, start, end, sums, places, spreads), 0)
-    pressed = np.empty(found)
-    for k in range(found):
-        pressed[k] = depth + height_at(profile, end[k])[0]
-    return Patches(start[:found].copy(), end[:found].copy(), pressed, found, depth, reach, np.zeros(1, np.int64))
+    return _patches(profile, start, end, found, depth, reach)
 
 
 def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:

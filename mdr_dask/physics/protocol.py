@@ -274,7 +274,7 @@ def follow(
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Profile of unit length, as in :func:`mdr_dask.physics.kinetics.cubic_profile`.
+        Profile of unit length, as in :func:`mdr_dask.physics.kinetics_profile.cubic_profile`.
     moments, travels, reaches, loads
         As in :func:`follow_line`.
     displacement : array, shape (n,)

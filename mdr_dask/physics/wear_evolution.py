@@ -8,6 +8,7 @@ differentiation formula along fixed radii, solved by Newton's method for the ima
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -87,7 +88,7 @@ class Problem(Protocol):
         """Return the quantity in d0 whose step error is controlled."""
 
 
-class FixedBorder:
+class FixedBorder(ABC):
     """What problems with a fixed inner border share: the memory of a radius is a value of a function on the panels."""
 
     panels: Panels
@@ -97,9 +98,9 @@ class FixedBorder:
         """Return the radius of the inner border."""
         return self.inner_radius
 
+    @abstractmethod
     def gathered(self, unknowns: FloatArray) -> FloatArray:
         """Return what the radii have gathered."""
-        raise NotImplementedError
 
     def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
         """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""

@@ -16,7 +16,7 @@ from mdr_dask.store.blocks import (
     write_status,
     write_values,
 )
-from mdr_dask.store.files import attributes, exists, lock
+from mdr_dask.store.files import attributes, exists, lock, sweep
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
 from mdr_dask.store.reading import datasets, save
@@ -35,6 +35,7 @@ __all__ = [
     "reconcile",
     "records",
     "save",
+    "sweep",
     "values",
     "write_record",
     "write_status",

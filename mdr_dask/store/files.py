@@ -85,6 +85,15 @@ def clear(url: str) -> None:
         sync(remove())
 
 
+def sweep(url: str) -> None:
+    """Remove the files that killed writers had not yet given their names; only for the holder of the lock."""
+    path = local(url)
+    if path is not None and path.is_dir():
+        with guarded(url, "removing what a killed run left"):
+            for leftover in path.rglob("*.partial"):
+                leftover.unlink(missing_ok=True)
+
+
 def names(url: str, prefix: str) -> list[str]:
     """Return the names of all JSON documents below a prefix, in order."""
 
