@@ -82,7 +82,7 @@ def test_a_store_that_cannot_be_written_ends_a_distributed_run_with_one_error(to
 @pytest.mark.slow
 def test_a_worker_of_another_version_is_refused(toy, url, workers, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
-    monkeypatch.setattr(execute, "versions", lambda _: ("9.9", 1))
+    monkeypatch.setattr(execute.cells, "versions", lambda _: ("9.9", 1))
     with pytest.raises(ClusterError, match=r"worker .* has mdr_dask .* with toy 1, this program is mdr_dask 9\.9"):
         run_on(workers, campaign, url)
 
@@ -97,7 +97,7 @@ def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, ur
 
 def test_a_scheduler_that_does_not_answer_is_named(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0]))
-    monkeypatch.setattr(execute, "SCHEDULER_PATIENCE", 0.2)
+    monkeypatch.setattr(execute.executors, "SCHEDULER_PATIENCE", 0.2)
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
         run_on(Resources(scheduler="tcp://127.0.0.1:9"), campaign, url)
     with pytest.raises(ClusterError, match="no Dask scheduler answers at 'head:node'"):

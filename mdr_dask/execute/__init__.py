@@ -1,0 +1,7 @@
+"""Plan and store through Dask: resume, retries, failures, progress. The only room that knows Dask."""
+
+from mdr_dask.execute.executors import Resources
+from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.rounds import outlook, run
+
+__all__ = ["Progress", "Resources", "outlook", "run"]

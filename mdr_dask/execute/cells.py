@@ -1,0 +1,88 @@
+"""What a round has to compute of a group of the store, cell by cell, and the tasks that do so."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask import store
+from mdr_dask.models.base import Status
+from mdr_dask.plan import BlockIndex, Template
+from mdr_dask.store import Place
+from mdr_dask.task import Work, versions
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Which results of a group a round has to compute, and which only need a word in the ledger.
+
+    Parameters
+    ----------
+    template : Template
+        The group.
+    wanted, spared : bool array, shape of the group
+        Results to compute, and those to write down as not needed.
+    kept : int
+        Number of results of the round that are in the store already.
+    """
+
+    template: Template
+    wanted: NDArray[np.bool_]
+    spared: NDArray[np.bool_]
+    kept: int
+
+    @property
+    def new(self) -> int:
+        """Number of results that are not in the store yet, those included that turn out not to be needed."""
+        return int(np.count_nonzero(self.wanted) + np.count_nonzero(self.spared))
+
+    def seconds(self, index: BlockIndex) -> float:
+        """Return the seconds that a block should take, in proportion to what is wanted of it."""
+        part = float(np.mean(self.wanted[self.template.region(index)]))
+        return part * self.template.seconds(index) if part else 0.0
+
+
+def find_cells(
+    url: str,
+    template: Template,
+    asked: NDArray[np.bool_],
+    needed: NDArray[np.bool_],
+    realisations: tuple[int, int],
+    retry_failed: bool,
+) -> Cells:
+    """Compare a round with the ledger: its cases `asked` for, those of them still `needed`, and its realisations."""
+    status = store.ledger(url, template.series.name, template.shape)
+    open_states = [Status.MISSING, Status.NOT_NEEDED]
+    if retry_failed:
+        open_states += [Status.FAILED, Status.NOT_CONVERGED]
+    in_round = np.zeros(status.shape, dtype=bool)
+    in_round[..., slice(*realisations)] = asked[..., None]
+    wanted = in_round & needed[..., None] & np.isin(status, open_states)
+    spared = in_round & ~wanted & (status == Status.MISSING)
+    return Cells(template, wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
+
+
+def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
+    """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
+    laid_out = uuid.uuid4().hex
+    for cells in groups:
+        template = cells.template
+        attempts = store.attempts(url, template.series.name)
+        for index in template.block_indices():
+            region = template.region(index)
+            wanted, spared = cells.wanted[region], cells.spared[region]
+            if wanted.any() or spared.any():
+                yield Work(
+                    place=Place(url, template.series.name, index, region, laid_out),
+                    model=template.campaign.model,
+                    versions=versions(template.campaign.model),
+                    block=template.block(index),
+                    wanted=wanted,
+                    spared=spared,
+                    attempt=attempts.get(index, 0) + 1,
+                    estimate=cells.seconds(index),
+                )

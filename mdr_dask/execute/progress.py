@@ -1,0 +1,66 @@
+"""How far a run has come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from mdr_dask.models.base import Status
+from mdr_dask.task import Outcome
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The state of a run, in results (one case in one realisation).
+
+    Parameters
+    ----------
+    total, kept, done, failed, not_needed : int
+        All results of the campaign so far, those found in the store, and those of this run.
+    blocks, solves : int
+        Blocks run and solutions really computed in this run.
+    estimated, finished : float
+        Seconds of work by the model's estimate: that of all rounds so far, and that of the blocks run.
+    compute_seconds, write_seconds, wall_seconds : float
+        Time in models and in writing, summed over threads, and time since the start.
+    """
+
+    total: int = 0
+    kept: int = 0
+    done: int = 0
+    failed: int = 0
+    not_needed: int = 0
+    blocks: int = 0
+    solves: int = 0
+    estimated: float = 0.0
+    finished: float = 0.0
+    compute_seconds: float = 0.0
+    write_seconds: float = 0.0
+    wall_seconds: float = 0.0
+
+    @property
+    def to_do(self) -> int:
+        """Results still to come in this round."""
+        return self.total - self.kept - self.done - self.failed - self.not_needed
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Time until the end of this round at the pace so far, each block weighted by its estimate; None before any."""
+        if not self.finished > 0:
+            return None
+        return self.wall_seconds * max(self.estimated / self.finished - 1, 0.0)
+
+    def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
+        """Return the state after one more block, so many seconds after the start."""
+        counts = outcome.counts
+        return replace(
+            self,
+            done=self.done + counts[Status.DONE],
+            failed=self.failed + counts[Status.FAILED] + counts[Status.NOT_CONVERGED],
+            not_needed=self.not_needed + counts[Status.NOT_NEEDED],
+            blocks=self.blocks + 1,
+            solves=self.solves + outcome.solves,
+            finished=self.finished + outcome.estimate,
+            compute_seconds=self.compute_seconds + outcome.compute_seconds,
+            write_seconds=self.write_seconds + outcome.write_seconds,
+            wall_seconds=wall_seconds,
+        )
