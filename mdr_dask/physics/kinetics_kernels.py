@@ -16,6 +16,7 @@ from mdr_dask.physics.kinetics_profile import (
     add_patch,
     compiled,
     height_at,
+    inlined,
     unloading,
 )
 from mdr_dask.physics.kinetics_wakes import (
@@ -47,6 +48,83 @@ def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
         for i in range(m * BLOCK + 1, (m + 1) * BLOCK + 1):
             value = min(value, profile.height[i] + reach * profile.slope[i])
         least[m] = value
+
+
+@inlined
+def _write_patch(
+    profile: Profile,
+    begin: float,
+    until: float,
+    lift: float,
+    reach: float,
+    found: int,
+    start: FloatArray,
+    end: FloatArray,
+    sums: FloatArray,
+) -> int:
+    """Write a patch, add up its forces and return how many there are now."""
+    add_patch(profile, begin, until, lift, reach, sums)
+    start[found], end[found] = begin, until
+    return found + 1
+
+
+@inlined
+def _remember(place: float, places: FloatArray, known: int) -> int:
+    """Write down where contact was left, over the last place where there is no more room; count the places."""
+    known = min(known, CANDIDATES - 1)
+    places[known] = place
+    return known + 1
+
+
+@inlined
+def _leaving(
+    profile: Profile,
+    first: Patches,
+    t: float,
+    reach: float,
+    depth: float,
+    lift: float,
+    part: tuple[float, float],
+    pulls: bool,
+    next_free: float,
+) -> tuple[float, bool, float]:
+    """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones."""
+    low, high = part
+    until = unloading(profile, lift, reach, low, high) if pulls else high
+    if until < next_free:
+        return until, False, next_free
+    w = depth + height_at(profile, until)[0]
+    next_free = next_free_place(profile, first, t, reach, until)
+    if next_free == until and w < left_before(profile, first, t, reach, until)[0] * (1 - 1e-14):
+        return losing(profile, first, t, reach, depth, low, until), True, next_free
+    return until, False, next_free
+
+
+@inlined
+def _arriving(
+    profile: Profile,
+    first: Patches,
+    course: Course,
+    t: float,
+    reach: float,
+    lift: float,
+    part: tuple[float, float],
+    gap: float,
+    rise: float,
+    places: FloatArray,
+    known: int,
+    oldest: float,
+) -> tuple[float, float, float]:
+    """Return where contact begins in a part of a cell, and how load and drag change by the depth as that place moves.
+
+    At the end of the part the profile is above the wake by `gap`, and rises from it by `rise`.
+    """
+    low, high = part
+    guess = high - gap / rise if rise > 0 else low
+    begin, rise, gain = meeting(profile, first, course, t, reach, low, high, guess, places, known, oldest)
+    h, slope, _ = height_at(profile, begin)
+    edge = max(lift + h + reach * slope, 0.0) * gain / rise if rise > 0 else 0.0
+    return begin, edge, edge * slope
 
 
 @compiled
@@ -124,28 +202,20 @@ def touch(
                 h1, slope1, _ = height_at(profile, x1)
             pulls = lift + h1 + reach * slope1 <= 0
             if contact:
-                until = unloading(profile, lift, reach, max(x0, begin), x1) if pulls else x1
-                lost = False
-                if until >= next_free:
-                    w = depth + height_at(profile, until)[0]
-                    next_free = next_free_place(profile, first, t, reach, until)
-                    if next_free == until and w < left_before(profile, first, t, reach, until)[0] * (1 - 1e-14):
-                        until, lost = losing(profile, first, t, reach, depth, max(x0, begin), until), True
+                until, lost, next_free = _leaving(
+                    profile, first, t, reach, depth, lift, (max(x0, begin), x1), pulls, next_free
+                )
                 if not (pulls or lost):
                     continue
                 if found + 1 >= start.size:
                     return -1
-                add_patch(profile, begin, until, lift, reach, sums)
-                start[found], end[found] = begin, until
-                found += 1
+                found = _write_patch(profile, begin, until, lift, reach, found, start, end, sums)
                 w = depth + height_at(profile, until)[0]
                 known = worth_keeping(profile, course, t, reach, until, w, spreads, window, places, known)
                 least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                 oldest, last_start = last_start, begin
                 if not lost:
-                    known = min(known, CANDIDATES - 1)
-                    places[known] = until
-                    known += 1
+                    known = _remember(until, places, known)
                 contact, free_from = False, until
                 continue
             least_free *= fade_of_cell
@@ -165,27 +235,20 @@ def touch(
             spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
             least_free, known_at = (u - spread) * fade_of_cell, probe
             if gap > 0:
-                guess = probe - gap / rise if rise > 0 else low
-                begin, rise, gain = meeting(profile, first, course, t, reach, low, probe, guess, places, known, oldest)
-                h, h_slope, _ = height_at(profile, begin)
-                if rise > 0:
-                    edge = max(lift + h + reach * h_slope, 0.0) * gain / rise
-                    edges += edge
-                    edges_drag += edge * h_slope
+                begin, edge, edge_drag = _arriving(
+                    profile, first, course, t, reach, lift, (low, probe), gap, rise, places, known, oldest
+                )
+                edges, edges_drag = edges + edge, edges_drag + edge_drag
                 contact = True
                 next_free = next_free_place(profile, first, t, reach, begin) if guard else np.inf
             if pulls and gap > -2 * spread:
                 if contact:
                     if found + 1 >= start.size:
                         return -1
-                    add_patch(profile, begin, probe, lift, reach, sums)
-                    start[found], end[found] = begin, probe
-                    found += 1
+                    found = _write_patch(profile, begin, probe, lift, reach, found, start, end, sums)
                     oldest, last_start = last_start, begin
                 known = worth_keeping(profile, course, t, reach, probe, depth + h1, spreads, window, places, known)
-                known = min(known, CANDIDATES - 1)
-                places[known] = probe
-                known += 1
+                known = _remember(probe, places, known)
                 contact, free_from = False, probe
         if contact and run + 1 < runs.shape[0]:
             return -1
@@ -193,9 +256,7 @@ def touch(
         return -1
     if profile.periodic:
         begin = begin if contact else finish
-        add_patch(profile, begin, finish, lift, reach, sums)
-        start[found], end[found] = begin, finish
-        found += 1
+        found = _write_patch(profile, begin, finish, lift, reach, found, start, end, sums)
     sums[STIFFNESS] = sums[LENGTH] * (1 + course.stiff) + edges
     sums[DRAG_STIFFNESS] = sums[TILT] * (1 + course.stiff) + edges_drag
     return found

@@ -189,6 +189,18 @@ def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
 
 
 @inlined
+def last_until(values: FloatArray, x: float, low: int, high: int) -> int:
+    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        if values[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inlined
 def patch_before(patches: Patches, s: float) -> int:
     """Return the last patch that begins at s or before, or the first one; those near the last one found come first."""
     low, high = int(patches.cursor[0]), patches.count
@@ -202,12 +214,7 @@ def patch_before(patches: Patches, s: float) -> int:
         high, low = low, max(low - NEARBY, 0)
         if patches.start[low] > s:
             high, low = low, 0
-    while high - low > 1:
-        middle = (low + high) // 2
-        if patches.start[middle] <= s:
-            low = middle
-        else:
-            high = middle
+    low = last_until(patches.start, s, low, high)
     patches.cursor[0] = low
     return low
 

@@ -14,7 +14,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.physics.kinetics_profile import ROOT_STEPS, Course, Patches, Profile, height_at, inlined, patch_before
+from mdr_dask.physics.kinetics_profile import (
+    ROOT_STEPS,
+    Course,
+    Patches,
+    Profile,
+    height_at,
+    inlined,
+    last_until,
+    patch_before,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -31,12 +40,8 @@ def _moment(course: Course, t: float) -> tuple[float, float, float]:
     low, high, back = last - 1, last, 1
     while course.time[low] > t and low > 0:
         high, low, back = low, max(low - back, 0), 2 * back
-    while high - low > 1:
-        middle = (low + high) // 2
-        if course.time[middle] <= t:
-            low = middle
-        else:
-            high = middle
+    low = last_until(course.time, t, low, high)
+    high = low + 1
     step = course.time[high] - course.time[low]
     y = (t - course.time[low]) / step
     rise = course.depth[high] - course.depth[low]
