@@ -229,6 +229,24 @@ def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, 
     return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / reach + slope)
 
 
+@njit(nogil=True, cache=True, inline="always")
+def _flown_over(
+    peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
+) -> tuple[int, float]:
+    """Pass cells that an element in free flight cannot touch; return the first other one, and the displacement there."""
+    n, blocks = peak.size - 1, block_peak.size
+    while i < n and peak[i] + depth <= free * decay:
+        if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
+            free *= block_decay
+            i += BLOCK
+        else:
+            free *= decay
+            i += 1
+        # numbers below the normal ones cost a hundred times as much
+        free = free if free > TINY else 0.0
+    return i, free
+
+
 @njit(nogil=True, cache=True)
 def sweep(
     cells: Cells, barriers: FloatArray, block_barriers: FloatArray, reach: float, depth: float, sums: FloatArray
@@ -265,11 +283,8 @@ def sweep(
     decay, block_decay = np.exp(-1 / reach), np.exp(-BLOCK / reach)
     area = rate = drag = drag_rate = length = stretch = 0.0
     i, x, contact = 0, start, cells.periodic
-    u, free, left = (
-        0.0,
-        0.0,
-        0.0,
-    )  # displacement where the contact was left, at the start of this cell; place of leaving
+    # displacement where the contact was left and at the start of this cell; place of leaving
+    u = free = left = 0.0
     # the turn ends in a part of a cell that repeats the first, at the highest point again
     last = n if cells.periodic and start > 0 else n - 1
     while i <= last:
@@ -290,19 +305,7 @@ def sweep(
                     length += 1
                     i += 1
         elif not contact:
-            while i < n and peak[i] + depth <= free * decay:
-                if (
-                    i & (BLOCK - 1) == 0
-                    and i // BLOCK < blocks
-                    and block_peak[i // BLOCK] + depth <= free * block_decay
-                ):
-                    free *= block_decay
-                    i += BLOCK
-                else:
-                    free *= decay
-                    i += 1
-                # numbers below the normal ones cost a hundred times as much
-                free = free if free > TINY else 0.0
+            i, free = _flown_over(peak, block_peak, depth, decay, block_decay, i, free)
         if i > last:
             break
         stop = 1.0 if i < n else start
