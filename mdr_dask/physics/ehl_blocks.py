@@ -12,14 +12,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.physics.ehl_newton import (
-    CONVERGED,
-    FILM_COLLAPSED,
     SINGULAR,
     TOO_MANY_STEPS,
+    UNDER_WAY,
     Liquid,
     balance,
-    is_settled,
-    step_length,
+    outcome,
+    take_step,
 )
 from mdr_dask.physics.line_kernel import BESIDE, CROSSING, LineKernel, deform
 
@@ -254,16 +253,9 @@ def newton_by_blocks(
         at_origin = deform(kernel, step, film_step)
         for i in range(n):
             film_step[i] += change - at_origin
-        share = step_length(film_step, P, H, step, clip)
-        if not share > 1e-9:
-            return FILM_COLLAPSED, steps, central, H
-        done = share == 1.0 and is_settled(P, step, central, change, tolerance)
-        for i in range(n):
-            P[i] = max(0.0, P[i] + share * step[i])
-        central += share * change
+        status, central = take_step(P, central, H, step, change, film_step, clip, tolerance)
         film_of(kernel, P, central, H)
-        if done:
-            return CONVERGED, steps, central, H
-        if not (central > 0.0 and np.min(H) > 0.0):
-            return FILM_COLLAPSED, steps, central, H
+        status = outcome(status, central, H)
+        if status != UNDER_WAY:
+            return status, steps, central, H
     return TOO_MANY_STEPS, most, central, H

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: What became of an iteration: values of the status that `newton` returns.
-CONVERGED, TOO_MANY_STEPS, SINGULAR, FILM_COLLAPSED = range(4)
+#: What became of an iteration: values of the status that `newton` returns, and that it has not ended.
+CONVERGED, TOO_MANY_STEPS, SINGULAR, FILM_COLLAPSED, UNDER_WAY = range(5)
 
 #: Share of the quadratic (QUICK) face value in the second-order upwind Couette flux; the rest is linear from upstream.
 _QUADRATIC = 1.0 / 3.0
@@ -250,7 +250,7 @@ def _fill_film_step(matrix: FloatArray, step: FloatArray, central: float, film_s
 
 
 @njit(nogil=True, cache=True)
-def step_length(film_step: FloatArray, P: FloatArray, H: FloatArray, step: FloatArray, clip: float) -> float:
+def _step_length(film_step: FloatArray, P: FloatArray, H: FloatArray, step: FloatArray, clip: float) -> float:
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
@@ -261,9 +261,39 @@ def step_length(film_step: FloatArray, P: FloatArray, H: FloatArray, step: Float
 
 
 @njit(nogil=True, cache=True)
-def is_settled(P: FloatArray, step: FloatArray, central: float, change: float, tolerance: float) -> bool:
+def _is_settled(P: FloatArray, step: FloatArray, central: float, change: float, tolerance: float) -> bool:
     """Return whether a step changes pressure and central film by less than the tolerance."""
     return bool(np.max(np.abs(step)) < tolerance * np.max(P) and abs(change) < tolerance * central)
+
+
+@njit(nogil=True, cache=True)
+def take_step(
+    P: FloatArray,
+    central: float,
+    H: FloatArray,
+    step: FloatArray,
+    change: float,
+    film_step: FloatArray,
+    clip: float,
+    tolerance: float,
+) -> tuple[int, float]:
+    """Change P and `central` by as much of a Newton step as the film allows; return the status and the new `central`.
+
+    CONVERGED, or UNDER_WAY, or FILM_COLLAPSED where hardly anything of the step is allowed, and P is left alone.
+    """
+    share = _step_length(film_step, P, H, step, clip)
+    if not share > 1e-9:
+        return FILM_COLLAPSED, central
+    done = share == 1.0 and _is_settled(P, step, central, change, tolerance)
+    for i in range(P.size):
+        P[i] = max(0.0, P[i] + share * step[i])
+    return (CONVERGED if done else UNDER_WAY), central + share * change
+
+
+@njit(nogil=True, cache=True)
+def outcome(status: int, central: float, H: FloatArray) -> int:
+    """Return the status of :func:`take_step`, or FILM_COLLAPSED where the step has left no film."""
+    return FILM_COLLAPSED if status == UNDER_WAY and not (central > 0.0 and np.min(H) > 0.0) else status
 
 
 @njit(nogil=True, cache=True)
@@ -364,16 +394,9 @@ def newton(
             step[active[k]] = b[k]
         change = b[count]
         _fill_film_step(matrix, step, change, row)
-        share = step_length(row, P, H, step, clip)
-        if not share > 1e-9:
-            return FILM_COLLAPSED, steps, central, H
-        done = share == 1.0 and is_settled(P, step, central, change, tolerance)
-        for i in range(n):
-            P[i] = max(0.0, P[i] + share * step[i])
-        central += share * change
+        status, central = take_step(P, central, H, step, change, row, clip, tolerance)
         nodal_film(nodes, matrix, P, central, H)
-        if done:
-            return CONVERGED, steps, central, H
-        if not (central > 0.0 and np.min(H) > 0.0):
-            return FILM_COLLAPSED, steps, central, H
+        status = outcome(status, central, H)
+        if status != UNDER_WAY:
+            return status, steps, central, H
     return TOO_MANY_STEPS, most, central, H

@@ -233,7 +233,7 @@ def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, 
 def _flown_over(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
-    """Pass cells that an element in free flight cannot touch; return the first other one, and the displacement there."""
+    """Pass cells that a free element cannot touch; return the first other one, and the displacement there."""
     n, blocks = peak.size - 1, block_peak.size
     while i < n and peak[i] + depth <= free * decay:
         if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
