@@ -73,8 +73,16 @@ def _power(x: float, n: float) -> float:
 
 
 @njit(nogil=True, cache=True)
+def _narrowed(low, low_value, high, high_value, side, x, value):  # type: ignore[no-untyped-def]
+    """Return a bracket of a falling function, its values and its newer end, -1 or 1: false position by Illinois."""
+    if value > 0.0:
+        return x, value, high, 0.5 * high_value if side == -1 else high_value, -1
+    return low, 0.5 * low_value if side == 1 else low_value, x, value, 1
+
+
+@njit(nogil=True, cache=True)
 def _limits(n, c, abscissa, weight, result):  # type: ignore[no-untyped-def]
-    """Find a(c) by false position with halved ends (Illinois); then volume and force."""
+    """Find a(c) by false position; then volume and force."""
     for case in range(n.size):
         low, high = 1.0, 1.5
         low_value = _plateau(n[case], c[case], low, abscissa, weight, 0)
@@ -90,14 +98,7 @@ def _limits(n, c, abscissa, weight, result):  # type: ignore[no-untyped-def]
             if abs(a - last) < 4e-16 * a or not low < a < high:
                 break
             value = _plateau(n[case], c[case], a, abscissa, weight, 0)
-            if value > 0.0:
-                low, low_value = a, value
-                high_value *= 0.5 if side == 1 else 1.0
-                side = 1
-            else:
-                high, high_value = a, value
-                low_value *= 0.5 if side == -1 else 1.0
-                side = -1
+            low, low_value, high, high_value, side = _narrowed(low, low_value, high, high_value, side, a, value)
         result[0, case] = a
         result[1, case] = 4.0 * _plateau(n[case], c[case], a, abscissa, weight, 1)
         result[2, case] = 2.0 * (c[case] - c[case] * _power(c[case], n[case]) / (n[case] + 1.0))
@@ -176,14 +177,9 @@ def _fasts(n, c, cycles, xi, limit, abscissa, weight, result):  # type: ignore[n
                 value = _scar_integral(radius, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
                 if abs(value) < SCAR_ERROR * eta or high - low <= 1e-13 * high:
                     break
-                if value > 0.0:
-                    low, low_value = radius, value
-                    high_value *= 0.5 if side == 1 else 1.0
-                    side = 1
-                else:
-                    high, high_value = radius, value
-                    low_value *= 0.5 if side == -1 else 1.0
-                    side = -1
+                low, low_value, high, high_value, side = _narrowed(
+                    low, low_value, high, high_value, side, radius, value
+                )
         volume = _scar_integral(radius, 1, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
         result[0, case], result[1, case] = radius, 4.0 * volume
         worn = 0.0
