@@ -12,11 +12,11 @@ import sys
 
 import numpy as np
 
-from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import VelocityJump, compute
+from benchmarks.measures import alone
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
 
 TIMES = tuple(float(t) for t in np.linspace(0.0, 3.0, 16))
-OUTPUTS = ("friction_coefficient", "discretisation_error")
+FRICTION, ESTIMATE = OUTPUTS = ("friction_coefficient", "discretisation_error")
 FLOOR = 1e-4  # errors below count as met
 
 
@@ -61,12 +61,8 @@ def random_case(generator: np.random.Generator) -> dict[str, object]:
     }
 
 
-def solved(case: dict[str, object], realisation: int) -> tuple[np.ndarray, float] | None:
-    block = Block(VelocityJump.model_validate(case), {}, 1, (realisation, realisation + 1), 7, OUTPUTS)
-    found = compute(block)
-    if found.status[0, 0] != Status.DONE:
-        return None
-    return found.values["friction_coefficient"][0, 0], float(found.values["discretisation_error"][0, 0])
+def solve(case: dict[str, object], realisation: int) -> dict[str, np.ndarray] | None:
+    return alone(MODEL, VelocityJump.model_validate(case), realisation, OUTPUTS, 7)
 
 
 def main() -> None:
@@ -74,13 +70,13 @@ def main() -> None:
     generator, rows, failed = np.random.default_rng(2014), [], 0
     for number in range(cases):
         case = random_case(generator)
-        coarse = solved(case, number)
-        fine = solved(case | {"oversampling": 24, "steps_per_decade": 24}, number)
+        coarse = solve(case, number)
+        fine = solve(case | {"oversampling": 24, "steps_per_decade": 24}, number)
         if coarse is None or fine is None:
             failed += 1
             continue
-        true = float(np.max(np.abs(coarse[0] - fine[0])) / np.max(np.abs(fine[0])))
-        rows.append((true, coarse[1], str(case["protocol"]), str(case["indenter"]), "material" in case))
+        true = float(np.max(np.abs(coarse[FRICTION] - fine[FRICTION])) / np.max(np.abs(fine[FRICTION])))
+        rows.append((true, float(coarse[ESTIMATE]), str(case["protocol"]), str(case["indenter"]), "material" in case))
     true, estimate = np.array([row[:2] for row in rows]).T
     met = true <= np.maximum(estimate, FLOOR)
     print(f"{len(rows)} cases, {failed} failed; estimate covers {100 * met.mean():.1f} %")

@@ -7,10 +7,9 @@ half a minute, most of it in the dense steps.
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
+from benchmarks.measures import print_table, timed
 from mdr_dask.physics import ehl_grid, ehl_levels
 from mdr_dask.physics.deformation import influence_matrix
 from mdr_dask.physics.ehl_blocks import newton_by_blocks
@@ -29,20 +28,14 @@ CASES = {
 DENSE = 5121
 
 
-def seconds(function, *arguments):
-    begin = time.process_time()
-    result = function(*arguments)
-    return time.process_time() - begin, result
-
-
 def shares():
     """Print error, nodes, time and share of the kernel over cases and accuracies."""
     spent = [0.0]
 
     def clocked(fill):
         def clock(*arguments):
-            duration, kernel = seconds(fill, *arguments)
-            spent[0] += duration
+            kernel, seconds = timed(fill, *arguments)
+            spent[0] += seconds
             return kernel
 
         return clock
@@ -50,15 +43,14 @@ def shares():
     ehl_levels.influence_matrix = clocked(influence_matrix)
     ehl_levels.line_kernel = clocked(line_kernel)
     solve(line_contact(*CASES["rigid"], E_STAR), 1e-5)
-    print(
-        "| case | accuracy asked | estimated error | nodes | order | time [s] | kernel |\n|---|---|---|---|---|---|---|"
-    )
+    rows = []
     for name, numbers in CASES.items():
         for accuracy in (1e-3, 1e-4, 1e-5, 1e-6):
             spent[0] = 0.0
-            total, found = seconds(solve, line_contact(*numbers, E_STAR), accuracy)
-            end = f"{found.order:.2f} | {total:.3f} | {100 * spent[0] / total:.0f} %"
-            print(f"| {name} | {accuracy:.0e} | {found.error:.1e} | {found.nodes.size} | {end} |")
+            found, total = timed(solve, line_contact(*numbers, E_STAR), accuracy)
+            end = f"{found.order:.2f}", f"{total:.3f}", f"{spent[0] / total:.0%}"
+            rows.append((name, f"{accuracy:.0e}", f"{found.error:.1e}", found.nodes.size, *end))
+    print_table(("case", "accuracy asked", "estimated error", "nodes", "order", "time [s]", "kernel"), rows)
 
 
 def parts():
@@ -73,19 +65,19 @@ def parts():
         guess = np.interp(nodes, state.nodes, state.pressure)
         guess[[0, -1]] = 0.0
         rest = (case.liquid, case.film_number)
-        block_fill, kernel = seconds(line_kernel, nodes)
-        block_product, _ = seconds(deform, kernel, guess, film)
+        kernel, block_fill = timed(line_kernel, nodes)
+        _, block_product = timed(deform, kernel, guess, film)
         P = guess.copy()
-        block_step, _ = seconds(newton_by_blocks, kernel, *rest, P, state.central, 0.12, 1e-8, 1)
+        _, block_step = timed(newton_by_blocks, kernel, *rest, P, state.central, 0.12, 1e-8, 1)
         if count > DENSE:
             print(
                 f"| {count} | | {1e3 * block_fill:.0f} | | {1e3 * block_product:.2f} | | {1e3 * block_step:.1f} | | |"
             )
             continue
-        fill, matrix = seconds(influence_matrix, nodes, nodes)
-        product, _ = seconds(nodal_film, nodes, matrix, guess, state.central, film)
+        matrix, fill = timed(influence_matrix, nodes, nodes)
+        _, product = timed(nodal_film, nodes, matrix, guess, state.central, film)
         Q = guess.copy()
-        step, _ = seconds(newton, nodes, matrix, kernel.weights, *rest, Q, state.central, 0.12, 1e-8, 1)
+        _, step = timed(newton, nodes, matrix, kernel.weights, *rest, Q, state.central, 0.12, 1e-8, 1)
         times = (fill, block_fill, product, block_product, step, block_step)
         line = " | ".join(f"{1e3 * value:.3g}" for value in times)
         print(f"| {count} | {line} | {step / block_step:.1f} | {np.max(np.abs(P - Q)):.0e} |")

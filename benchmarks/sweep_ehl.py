@@ -6,10 +6,9 @@ against solutions on finer grids. Takes about two minutes.
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
+from benchmarks.measures import timed
 from mdr_dask.physics import ehl_lattice
 from mdr_dask.physics.ehl_lattice import solve_beside_lattice
 from mdr_dask.physics.line_contact import line_contact, solve
@@ -30,10 +29,8 @@ def sweeps():
     yield "load and speed, 20 x 20", [line_contact(W, U, 5000.0, E_STAR) for W in loads for U in speeds]
 
 
-def timed(solver, cases):
-    begin = time.process_time()
-    found = [solver(case) for case in cases]
-    return found, time.process_time() - begin
+def solved(solver, cases):
+    return [solver(case) for case in cases]
 
 
 def true_errors(cases, found):
@@ -55,8 +52,8 @@ def main():
     for name, cases in sweeps():
         points = len({ehl_lattice.lattice_point(case) for case in cases})
         ehl_lattice._levels.cache_clear()
-        _, alone = timed(solve, cases)
-        found, beside = timed(solve_beside_lattice, cases)
+        _, alone = timed(solved, solve, cases)
+        found, beside = timed(solved, solve_beside_lattice, cases)
         worst, within = true_errors(cases, found)
         print(
             f"| {name} | {len(cases)} | {points} | {alone:.2f} | {beside:.2f} | {alone / beside:.2f} "

@@ -7,11 +7,11 @@ that of the mean friction, discretisation and statistics together: rms over case
 
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measures import print_table, timed
 from mdr_dask import execute, store
 from mdr_dask.campaign import load
 
@@ -63,9 +63,7 @@ def run(folder, scene, scheme, grid, realisations, seed, accuracy=0.05, output="
     path = Path(folder, "campaign.yaml")
     path.write_text(CAMPAIGN.format(name="benchmark", scheme=scheme, grid=grid, **numbers))
     url = tempfile.mkdtemp(dir=folder) + "/store.zarr"
-    start = time.process_time()
-    progress = execute.run(load(path), url, execute.Resources(threads=1), lambda _: None)
-    seconds = time.process_time() - start
+    progress, seconds = timed(lambda: execute.run(load(path), url, execute.Resources(threads=1), lambda _: None))
     assert progress.failed == 0
     friction = store.datasets(url)[""][output].load()
     return friction.mean("realisation").values, friction.count("realisation").values, seconds
@@ -138,15 +136,17 @@ def main(path=None):
             truth = run(folder, scene, "hermite", "auto", TRUTH, SEED_OF_TRUTH, 0.005)[0]
             tables[scene] = fixed(folder, scene, truth), chosen(folder, scene, truth)
     for scene, (grids, accuracies) in tables.items():
-        print(
-            f"\n{scene}\n| campaign | error estimates | lines | error of mean μ | core-seconds |\n|---|---|---|---|---|"
-        )
-        for legend, rows in grids.items():
-            for error, lines, seconds in rows:
-                print(f"| {legend} | | {lines:.0f} | {error:.2%} | {seconds:.2f} |")
+        print(f"\n{scene}")
+        rows = [
+            (legend, "", f"{lines:.0f}", f"{error:.2%}", f"{seconds:.2f}")
+            for legend, measurements in grids.items()
+            for error, lines, seconds in measurements
+        ]
         for accuracy, solved_to, error, lines, seconds in accuracies:
             estimates = ", ".join(f"{estimate:.1e}" for estimate in solved_to)
-            print(f"| accuracy and until {accuracy:.0%} | {estimates} | {lines:.0f} | {error:.2%} | {seconds:.2f} |")
+            end = f"{lines:.0f}", f"{error:.2%}", f"{seconds:.2f}"
+            rows.append((f"accuracy and until {accuracy:.0%}", estimates, *end))
+        print_table(("campaign", "error estimates", "lines", "error of mean μ", "core-seconds"), rows)
     if path:
         draw(tables, path)
 

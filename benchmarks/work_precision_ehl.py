@@ -7,10 +7,10 @@ a solution on the finest grids. Then some hundred random points of the whole box
 from __future__ import annotations
 
 import sys
-import time
 
 import numpy as np
 
+from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics import ehl_grid, line_contact
 from mdr_dask.physics.deformation import influence_matrix
 from mdr_dask.physics.ehl_levels import expected_film
@@ -24,12 +24,6 @@ CASES = {
 }
 BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))
 STRESS = 100
-
-
-def timed(function, *arguments):
-    begin = time.process_time()
-    value = function(*arguments)
-    return value, time.process_time() - begin
 
 
 def extrapolated(case, accuracy):
@@ -104,33 +98,26 @@ def stress():
 
 def main():
     rows = measure()
-    print(f"{'case':15} {'method':21} {'nodes':>5} {'error h_c':>10} {'error h_min':>11} {'time [ms]':>10}")
-    for name, method, nodes, central, minimum, seconds in rows:
-        print(f"{name:15} {method:21} {nodes:5d} {central:10.1e} {minimum:11.1e} {1e3 * seconds:10.1f}")
-    print(
-        f"\n{'random points':22} {'cases':>5} {'failed':>6} {'over 0.1 %':>10} {'median':>8} {'95 %':>8} {'longest':>8}"
+    print_table(
+        ("case", "method", "nodes", "error h_c", "error h_min", "time [ms]"),
+        [(*row[:3], f"{row[3]:.1e}", f"{row[4]:.1e}", f"{1e3 * row[5]:.1f}") for row in rows],
     )
-    for what, cases, failed, missed, *times in stress():
-        print(f"{what:22} {cases:5d} {failed:6d} {missed:10d} " + " ".join(f"{1e3 * t:8.1f}" for t in times))
+    print()
+    print_table(
+        ("random points", "cases", "failed", "over 0.1 %", "median [ms]", "95 %", "longest"),
+        [(*row[:4], *(f"{1e3 * t:.1f}" for t in row[4:])) for row in stress()],
+    )
     if len(sys.argv) > 1:
         draw(rows, sys.argv[1])
 
 
 def draw(rows, path):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    panel = figure.subplots()
-    for index, case in enumerate(CASES):
-        for (method, *_), style in zip(METHODS, ("o-", "s--", "^:"), strict=True):
+    panels = {case: {} for case in CASES}
+    for case, panel in panels.items():
+        for method, *_ in METHODS:
             chosen = [row for row in rows if row[0] == case and row[1] == method]
-            errors = [max(row[3], row[4]) for row in chosen]
-            panel.loglog([row[5] for row in chosen], errors, style, color=f"C{index}", label=f"{case}: {method}")
-    panel.axhline(1e-3, color="0.6", linewidth=1)
-    panel.set_xlabel("time of one case [s]")
-    panel.set_ylabel("relative error of the worse film")
-    panel.legend(fontsize="x-small", frameon=False)
-    figure.savefig(path, dpi=120)
+            panel[method] = [row[5] for row in chosen], [max(row[3], row[4]) for row in chosen]
+    draw_errors(panels, "relative error of the worse film", path, goal=1e-3)
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ at oversampling 128. Time is that of the solution alone, per case, in processor 
 """
 
 import sys
-import time
 
 import numpy as np
 
+from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics import roughness, sliding
 
 SCHEMES = {"backward_euler": "thesis: backward Euler", "piecewise_linear": "straight cells", "hermite": "cubic cells"}
@@ -31,12 +31,8 @@ def measure(hurst, force, velocity):
     def solve(realisation, grid, scheme):
         phase = roughness.phases(0, realisation, POINTS // 2)
         height, slope = (roughness.line(amplitude, phase, POINTS * grid, order) for order in (0, 1))
-        times = []
-        for _ in range(REPEATS):
-            start = time.process_time()
-            drag = sliding.steady_sliding(height, slope, reach, load, scheme).drag[0]
-            times.append(time.process_time() - start)
-        return drag, min(times)
+        found, seconds = timed(sliding.steady_sliding, height, slope, reach, load, scheme, calls=REPEATS)
+        return found.drag[0], seconds
 
     exact = np.array([solve(line, 128, "hermite")[0] for line in range(LINES)])
     table = {}
@@ -50,30 +46,25 @@ def measure(hurst, force, velocity):
     return table
 
 
-def draw(tables, path):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(11, 4), layout="constrained")
-    for axes, (case, table) in zip(figure.subplots(1, len(tables), sharey=True), tables.items(), strict=True):
-        for scheme, rows in table.items():
-            _, errors, seconds = zip(*rows, strict=True)
-            axes.loglog(np.array(seconds) * 1e6, errors, "o-", ms=4, label=SCHEMES[scheme])
-        axes.set(title=case, xlabel="time per case (µs)")
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("rms relative error of μ")
-    figure.axes[0].legend(fontsize="small")
-    figure.savefig(path, dpi=120)
-
-
 def main(path=None):
     tables = {case: measure(*numbers) for case, numbers in CASES.items()}
     for case, table in tables.items():
-        print(f"{case}\n| scheme | oversampling | rms error of μ | µs a case |\n|---|---|---|---|")
-        for scheme, rows in table.items():
-            for grid, error, seconds in rows:
-                print(f"| {SCHEMES[scheme]} | {grid} | {error:.1e} | {seconds * 1e6:.0f} |")
+        print(case)
+        print_table(
+            ("scheme", "oversampling", "rms error of μ", "µs a case"),
+            [
+                (SCHEMES[scheme], grid, f"{error:.1e}", f"{seconds * 1e6:.0f}")
+                for scheme, rows in table.items()
+                for grid, error, seconds in rows
+            ],
+        )
     if path:
-        draw(tables, path)
+        panels = {case: {} for case in tables}
+        for case, table in tables.items():
+            for scheme, rows in table.items():
+                _, errors, seconds = zip(*rows, strict=True)
+                panels[case][SCHEMES[scheme]] = seconds, errors
+        draw_errors(panels, "rms relative error of μ", path)
 
 
 if __name__ == "__main__":

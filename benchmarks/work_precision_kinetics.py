@@ -10,11 +10,11 @@ fine grids, and the two results are extrapolated at second order.
 from __future__ import annotations
 
 import sys
-import time
 
 import numpy as np
 from numba import njit
 
+from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics import roughness
 from mdr_dask.physics.kinetics import velocity_jump
 from mdr_dask.physics.protocol import follow
@@ -111,16 +111,6 @@ def papers(oversampling: int) -> np.ndarray:
     return at_times((np.arange(ratios.size) - before + 1) / (reach * n), drag)
 
 
-def timed(function, *arguments, times=1):
-    """Return the value and the least processor time of some calls."""
-    seconds = []
-    for _ in range(times):
-        started = time.process_time()
-        value = function(*arguments)
-        seconds.append(time.process_time() - started)
-    return value, min(seconds)
-
-
 def main() -> None:
     march(2, 12), followed(1), papers(1)
     rows = []
@@ -130,7 +120,7 @@ def main() -> None:
     finest, half = ladder[FINEST][0], ladder[FINEST // 2][0]
     truth = (4 * finest - half) / 3
     for arguments in ((2, 8), (4, 8), (4, 12), (8, 24), (16, 48)):
-        trace, seconds = timed(march, *arguments, times=5)
+        trace, seconds = timed(march, *arguments, calls=5)
         rows.append(("march", *arguments, np.max(np.abs(trace - truth)), seconds))
     for oversampling in (2, 4, 8, 16):
         trace, seconds = ladder[oversampling]
@@ -139,24 +129,16 @@ def main() -> None:
         trace, seconds = timed(papers, oversampling)
         rows.append(("backward Euler", oversampling, 0, np.max(np.abs(trace - truth)), seconds))
     print(f"truth: the two finest grids differ by {np.max(np.abs(finest - half)):.1e}")
-    print(f"{'method':24}{'oversampling':>14}{'steps':>8}{'error':>12}{'seconds':>12}")
-    for method, oversampling, per_decade, error, seconds in rows:
-        print(f"{method:24}{oversampling:14d}{per_decade or 'cells':>8}{error:12.2e}{seconds:12.4f}")
+    print_table(
+        ("method", "oversampling", "steps", "error", "seconds"),
+        [(*row[:2], row[2] or "cells", f"{row[3]:.2e}", f"{row[4]:.4f}") for row in rows],
+    )
     if len(sys.argv) > 1:
-        draw(rows, sys.argv[1])
-
-
-def draw(rows: list[tuple[str, int, float, float, float]], path: str) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5, 4), layout="constrained")
-    axes = figure.subplots()
-    for method in dict.fromkeys(row[0] for row in rows):
-        mine = np.array([row[3:] for row in rows if row[0] == method])
-        axes.loglog(mine[:, 1], mine[:, 0], "o-", label=method)
-    axes.set(xlabel="seconds", ylabel=r"largest error of the trace over $\mu_2$")
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=120)
+        curves = {}
+        for method in dict.fromkeys(row[0] for row in rows):
+            errors, seconds = zip(*(row[3:] for row in rows if row[0] == method), strict=True)
+            curves[method] = seconds, errors
+        draw_errors({"": curves}, r"largest error of the trace over $\mu_2$", sys.argv[1])
 
 
 if __name__ == "__main__":

@@ -7,10 +7,10 @@ the error is that against the finest grid. A realisation's own scatter, far larg
 from __future__ import annotations
 
 import sys
-import time
 
 import numpy as np
 
+from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics import breakthrough as bt
 from mdr_dask.physics import roughness
 
@@ -39,12 +39,6 @@ def every_window(pair, window, level):
     return float(np.mean(found.contact_points > 0))
 
 
-def timed(function, *arguments):
-    begin = time.process_time()
-    value = function(*arguments)
-    return value, time.process_time() - begin
-
-
 def measure():
     """Return rows of case, points, method, probability, error, seconds."""
     finest = lines(8 * MILLION)
@@ -63,9 +57,10 @@ def measure():
 
 def main():
     rows = measure()
-    print(f"{'case':12} {'points':>9} {'method':>13} {'P [%]':>8} {'error [points]':>15} {'time [ms]':>10}")
-    for case, points, method, probability, error, seconds in rows:
-        print(f"{case:12} {points:9d} {method:>13} {100 * probability:8.3f} {100 * error:15.3f} {1e3 * seconds:10.2f}")
+    print_table(
+        ("case", "points", "method", "P [%]", "error [points]", "time [ms]"),
+        [(*row[:3], f"{100 * row[3]:.3f}", f"{100 * row[4]:.3f}", f"{1e3 * row[5]:.2f}") for row in rows],
+    )
     for case in CASES:
         times = {row[2]: row[5] for row in rows if row[0] == case and row[1] == MILLION}
         print(
@@ -78,18 +73,12 @@ def main():
 
 
 def draw(rows, path):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6, 4), layout="constrained")
-    panel = figure.subplots()
-    for case in CASES:
-        for method, marker in (("sliding", "o"), ("every_window", "s")):
+    panels = {case: {} for case in CASES}
+    for case, panel in panels.items():
+        for method in ("sliding", "every_window"):
             chosen = [row for row in rows if row[0] == case and row[2] == method]
-            panel.loglog([r[5] for r in chosen], [100 * r[4] for r in chosen], marker=marker, label=f"{case}, {method}")
-    panel.set_xlabel("time of one turn [s]")
-    panel.set_ylabel("error of the probability [points]")
-    panel.legend(fontsize="small")
-    figure.savefig(path, dpi=120)
+            panel[method] = [row[5] for row in chosen], [100 * row[4] for row in chosen]
+    draw_errors(panels, "error of the probability [points]", path)
 
 
 if __name__ == "__main__":

@@ -10,11 +10,11 @@ backward Euler passes one cell in a step, as the thesis does, and takes the exac
 from __future__ import annotations
 
 import sys
-import time
 
 import numpy as np
 from numba import njit
 
+from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics import roughness
 from mdr_dask.physics.protocol import KELVIN, closed_line, follow_line, foundation, steady_start
 from mdr_dask.physics.protocol_forces import depth_for
@@ -106,52 +106,33 @@ def backward_euler(under, solid) -> np.ndarray:
     return np.concatenate([np.interp(TIMES[t], moments[:count][rows], drags[:count][rows]) for rows, t in parts])
 
 
-def timed(function, *arguments):
-    """Return the value and the least processor time of three calls."""
-    seconds = []
-    for _ in range(3):
-        started = time.process_time()
-        value = function(*arguments)
-        seconds.append(time.process_time() - started)
-    return value, min(seconds)
-
-
 def measured(solid) -> list[tuple[str, str, float, float]]:
     """Return method, grid, error and seconds of every run."""
     followed(line(2), solid, 1.0), backward_euler(line(2), solid)
     truth = followed(line(40), solid, 0.25)
     rows = []
     for oversampling, cells in ((2, 1.0), (4, 1.0), (4, 0.5), (8, 0.5), (16, 0.5)):
-        drag, seconds = timed(followed, line(oversampling), solid, cells)
+        drag, seconds = timed(followed, line(oversampling), solid, cells, calls=3)
         rows.append(("followed", f"{oversampling}, {cells:g}", np.max(np.abs(drag - truth)) / truth.max(), seconds))
     for oversampling in (4, 16, 64):
-        drag, seconds = timed(backward_euler, line(oversampling), solid)
+        drag, seconds = timed(backward_euler, line(oversampling), solid, calls=3)
         rows.append(("backward Euler", f"{oversampling}, 1", np.max(np.abs(drag - truth)) / truth.max(), seconds))
     return rows
 
 
 def main() -> None:
     found = {name: measured(solid) for name, solid in SOLIDS.items()}
-    print("| solid | method | oversampling, cells in a step | error | seconds |\n|---|---|---|---|---|")
-    for name, rows in found.items():
-        for method, grid, error, seconds in rows:
-            print(f"| {name} | {method} | {grid} | {error:.1e} | {seconds:.3f} |")
+    print_table(
+        ("solid", "method", "oversampling, cells in a step", "error", "seconds"),
+        [(name, *row[:2], f"{row[2]:.1e}", f"{row[3]:.3f}") for name, rows in found.items() for row in rows],
+    )
     if len(sys.argv) > 1:
-        draw(found, sys.argv[1])
-
-
-def draw(found: dict[str, list[tuple[str, str, float, float]]], path: str) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(3.6 * len(found), 3.6), layout="constrained")
-    for axes, (name, rows) in zip(figure.subplots(1, len(found), sharey=True), found.items(), strict=True):
-        for method in dict.fromkeys(row[0] for row in rows):
-            mine = np.array([row[2:] for row in rows if row[0] == method])
-            axes.loglog(mine[:, 1], mine[:, 0], "o-", label=method)
-        axes.set(xlabel="seconds", title=name)
-    figure.axes[0].set_ylabel("largest error of the drag over the largest drag")
-    figure.axes[0].legend(frameon=False)
-    figure.savefig(path, dpi=120)
+        panels = {name: {} for name in found}
+        for name, rows in found.items():
+            for method in dict.fromkeys(row[0] for row in rows):
+                errors, seconds = zip(*(row[2:] for row in rows if row[0] == method), strict=True)
+                panels[name][method] = seconds, errors
+        draw_errors(panels, "largest error of the drag over the largest drag", sys.argv[1])
 
 
 if __name__ == "__main__":

@@ -8,12 +8,12 @@ cycle and as few cycles as are stable. Times are processor times. ``--figure FIL
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.measures import Curve, draw_errors, print_table, timed
 from mdr_dask.physics import wear_cases
 from mdr_dask.physics.revolution import PowerProfile
 from mdr_dask.physics.wear import Worn, fast
@@ -33,26 +33,15 @@ class Row(NamedTuple):
     error: float
 
 
-def best_of(repeats: int, run: Callable[[], Worn]) -> tuple[float, Worn]:
-    """Return the shortest processor time of several runs, and a result."""
-    run()
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        result = run()
-        times.append(time.process_time() - start)
-    return min(times), result
-
-
 def fast_seconds(cases: int = 20000) -> float:
     """Return the processor time of one case of the fast rule among many: a(c) solved, scar, volume and force."""
     c, n = np.linspace(0.05, 0.95, cases), np.full(cases, 2.0)
-    radius = wear_cases.limit_cases(n[:2], c[:2])[0]
-    wear_cases.fast_cases(n[:2], c[:2], 2.0, 0.8, radius)
-    start = time.process_time()
-    radius = wear_cases.limit_cases(n, c)[0]
-    wear_cases.fast_cases(n, c, 2.0, 0.8, radius)
-    return (time.process_time() - start) / cases
+
+    def run(some: slice) -> None:
+        wear_cases.fast_cases(n[some], c[some], 2.0, 0.8, wear_cases.limit_cases(n[some], c[some])[0])
+
+    run(slice(2))
+    return timed(run, slice(None))[1] / cases
 
 
 def rows(moments: tuple[float, ...]) -> list[Row]:
@@ -62,7 +51,8 @@ def rows(moments: tuple[float, ...]) -> list[Row]:
         truth = exact(PARABOLA, STICK, [cycles], 1e-5)[0].height(RADII)
 
         def measure(method: str, setting: str, repeats: int, run: Callable[[], Worn]) -> None:
-            seconds, worn = best_of(repeats, run)
+            run()
+            worn, seconds = timed(run, calls=repeats)
             error = float(np.max(np.abs(worn.height(RADII) - truth)))  # noqa: B023
             table.append(Row(method, setting, cycles, seconds, error))  # noqa: B023
 
@@ -87,19 +77,13 @@ def rows(moments: tuple[float, ...]) -> list[Row]:
 
 def draw(table: list[Row], path: str) -> None:
     """Draw error over time."""
-    moments = sorted({row.cycles for row in table})
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    for axes, cycles in zip(figure.subplots(1, len(moments), squeeze=False)[0], moments, strict=True):
-        for method in ("fast", "exact", "literal"):
+    panels: dict[str, dict[str, Curve]] = {}
+    for cycles in sorted({row.cycles for row in table}):
+        panel = panels[f"parabola, c = {STICK:g}, N = {cycles:g}"] = {}
+        for method in dict.fromkeys(row.method for row in table):
             points = [row for row in table if row.method == method and row.cycles == cycles]
-            axes.loglog([row.seconds for row in points], [row.error for row in points], "o-", label=method)
-        axes.set_xlabel("processor time, s")
-        axes.set_ylabel("largest |Δf| / $d_0$")
-        axes.set_title(f"parabola, c = 0.455, N = {cycles:g}", fontsize=10)
-        axes.legend()
-    figure.savefig(path, dpi=120)
+            panel[method] = [row.seconds for row in points], [row.error for row in points]
+    draw_errors(panels, "largest |Δf| / $d_0$", path)
 
 
 def main() -> None:
@@ -110,9 +94,10 @@ def main() -> None:
     options = parser.parse_args()
     moments = tuple(options.cycles)
     table = rows(moments)
-    print(f"{'method':8} {'setting':34} {'N':>4} {'seconds':>10} {'error':>9}")
-    for row in table:
-        print(f"{row.method:8} {row.setting:34} {row.cycles:4g} {row.seconds:10.2e} {row.error:9.1e}")
+    print_table(
+        ("method", "setting", "N", "seconds", "error"),
+        [(*row[:2], f"{row.cycles:g}", f"{row.seconds:.2e}", f"{row.error:.1e}") for row in table],
+    )
     single = fast_seconds()
     print(f"fast, one of 20000 compiled cases: {single:.2e} s")
     for cycles in moments:
