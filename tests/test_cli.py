@@ -314,23 +314,6 @@ def test_dry_run_on_a_store_says_what_remains(campaign, filled, capsys):
     assert xr.open_zarr(filled).sizes["realisation"] == 8
 
 
-def test_what_is_no_store_is_named_in_one_line(campaign, tmp_path, capsys):
-    Path("empty.zarr").mkdir()
-    for arguments, message in (
-        (["status", str(campaign)], f"{campaign}: a file, expected the folder of a store"),
-        (["show", "empty.zarr"], "empty.zarr: no store here"),
-        (["show", str(tmp_path)], f"{tmp_path}: no store here"),
-        (["run", str(campaign), "--store", str(tmp_path)], f"{tmp_path}: a folder that holds something else"),
-        (["run", str(campaign), "--store", str(campaign)], f"{campaign}: a file, expected the folder of a store"),
-        (["run", str(campaign), "--store", "nobody://x"], "nobody://x: Protocol not known: nobody"),
-        (["schema", "-o", "nowhere/schema.json"], "nowhere/schema.json: No such file or directory"),
-    ):
-        assert main(arguments) == 2
-        errors = capsys.readouterr().err
-        assert message in errors
-        assert len(errors.splitlines()) == 1
-
-
 def test_a_reader_that_has_seen_enough_is_no_error(filled):
     line = subprocess.run(
         f"{sys.executable} -m mdr_dask show {filled} --realisations --limit 0 --json | head -1",

@@ -192,7 +192,7 @@ def test_a_store_of_another_campaign_is_refused_and_untouched(toy, url):
 
 def test_a_foreign_group_is_refused(toy, url):
     xr.Dataset({"a": ("x", [1.0])}).to_zarr(url, consolidated=False)
-    with pytest.raises(StoreError, match="not one that mdr_dask made"):
+    with pytest.raises(StoreError, match="not a study that mdr_dask made"):
         run(toy.campaign(toy.axis("position", [1.0])), url)
 
 

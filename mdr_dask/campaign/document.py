@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -13,6 +14,7 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
+from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50
@@ -54,6 +56,22 @@ class Document:
 
     def _at(self, node: Node) -> Place:
         return Place(self.source, node.start_mark.line + 1, node.start_mark.column + 1)
+
+
+def read_text(path: str | FilePath) -> str:
+    """Return the text of a YAML file.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be read, or is not UTF-8.
+    """
+    try:
+        return FilePath(path).read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise CampaignError(f"{path}:1:1: expected UTF-8 text, got byte {error.object[error.start]:#x}") from None
+    except OSError as error:
+        raise CampaignError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def parse(text: str, source: str, problems: Problems) -> Document:

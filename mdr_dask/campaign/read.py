@@ -9,13 +9,12 @@ from pydantic import ValidationError
 
 from mdr_dask import models
 from mdr_dask.campaign.definition import Campaign, Replication, Series, Tolerance
-from mdr_dask.campaign.document import Document, parse
+from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
 from mdr_dask.campaign.units import to_si
-from mdr_dask.errors import CampaignError
 from mdr_dask.models.base import Model
 
 
@@ -33,13 +32,7 @@ def load(path: str | FilePath) -> Campaign:
         With every problem of the file, by line: ``force.yaml:12:12: parameters.hurst: expected a number of at most 1,
         got 1.2``.
     """
-    try:
-        text = FilePath(path).read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise CampaignError(f"{path}:1:1: expected UTF-8 text, got byte {error.object[error.start]:#x}") from None
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot read the campaign: {error.strerror}") from None
-    return loads(text, str(path), str(FilePath(path).parent))
+    return loads(read_text(path), str(path), str(FilePath(path).parent))
 
 
 def loads(text: str, source: str, directory: str) -> Campaign:

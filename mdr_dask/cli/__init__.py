@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
@@ -52,6 +53,7 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo("interrupted; nothing is lost: the same command goes on where this one stopped", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # tasks of Zarr that are given up with it
         click.echo(str(error), err=True)
         return 2
     except BrokenPipeError:

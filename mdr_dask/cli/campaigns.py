@@ -9,6 +9,7 @@ import click
 
 from mdr_dask.cli.printing import print_json, print_rows
 from mdr_dask.cli.progress import reporter, seconds
+from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign
@@ -181,27 +182,14 @@ def _range(first: int, more: float) -> str:
 
 
 def _resources(options: dict[str, Any]) -> Resources:
+    from mdr_dask.campaign.cluster import load_cluster
     from mdr_dask.execute import Resources
 
     chosen = [name for name in ("threads", "workers", "scheduler", "cluster") if options[name] is not None]
     if len(chosen) > 1:
         raise click.UsageError(f"expected one of --{', --'.join(chosen)}, got {len(chosen)} of them")
-    cluster = options["cluster"] and _read_cluster(options["cluster"])
+    cluster = options["cluster"] and load_cluster(options["cluster"])
     return Resources(options["threads"], options["workers"], options["scheduler"], cluster)
-
-
-def _read_cluster(path: Path) -> dict[str, Any]:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        document = YAML(typ="safe", pure=True).load(path.read_text())
-    except YAMLError as error:
-        raise click.UsageError(f"{path}: not YAML: {error}") from None
-    known = {"class", "arguments", "scale"}
-    if not isinstance(document, dict) or "class" not in document or not document.keys() <= known:
-        raise click.UsageError(f"{path}: expected the keys class, arguments and scale, got {document!r}")
-    return document
 
 
 def _print_outcome(url: str, progress: Progress, resources: Resources, form: str | None) -> None:
@@ -246,6 +234,7 @@ def schema(output: Path | None) -> None:
 
     text = json.dumps(json_schema(), indent=1) + "\n"
     if output:
-        output.write_text(text)
+        with writing(output):
+            output.write_text(text)
     else:
         click.echo(text, nl=False)

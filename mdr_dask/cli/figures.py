@@ -8,12 +8,13 @@ import click
 
 from mdr_dask.cli.campaigns import CAMPAIGN, run
 from mdr_dask.cli.results import plot
+from mdr_dask.cli.writing import format_option
 
 
 @click.command()
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
 @click.option("--output", "-o", default="figures", show_default=True, help="Folder of the figures.")
-@click.option("--format", "suffix", default="png", show_default=True, help="png, pdf or svg.")
+@format_option
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.pass_context
 def figures(context: click.Context, /, campaigns: tuple[Path, ...], output: str, suffix: str, quiet: bool) -> int:

@@ -10,14 +10,15 @@ import click
 
 from mdr_dask.cli import selection
 from mdr_dask.cli.printing import print_json, print_rows, table
-from mdr_dask.cli.results import csv_option, json_option, select_option, series_option
+from mdr_dask.cli.results import Reading, csv_option, json_option, select_option, series_option
+from mdr_dask.cli.writing import figure_file, writing
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 
-@click.command("master-curve")
+@click.command("master-curve", cls=Reading)
 @click.argument("source")
 @series_option
 @select_option
@@ -26,7 +27,13 @@ if TYPE_CHECKING:
 @click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
 @click.option("--vertical", is_flag=True, help="Let curves shift along the ordinate too.")
 @click.option("--reference", type=float, help="Group whose factors are zero, in the units of the source.")
-@click.option("--bootstrap", default=0, show_default=True, help="Bootstrap samples of the factors to keep.")
+@click.option(
+    "--bootstrap",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Bootstrap samples of the factors to keep.",
+)
 @click.option("--keep", type=click.Path(path_type=Path), help="Keep the whole result in FILE.json, as a later SOURCE.")
 @click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw curves, merged curve and factors.")
 @json_option
@@ -58,6 +65,8 @@ def master_curve(
     from mdr_dask.fit.master_curve import master_curve as superpose
     from mdr_dask.fit.master_curve import rereferenced
 
+    if figure is not None:
+        figure_file(figure)
     path = Path(source)
     if path.suffix == ".json" and path.is_file():
         curve = _read(path)
@@ -65,12 +74,13 @@ def master_curve(
     else:
         curve = superpose(_open(source, series, selections), over, ordinate, by, vertical, reference, bootstrap)
     if keep is not None:
-        keep.write_text(json.dumps(curve.to_dict()))
+        with writing(keep):
+            keep.write_text(json.dumps(curve.to_dict()))
     if figure is not None:
         from mdr_dask.plots.master_curve import draw_master_curve
 
-        figure.parent.mkdir(parents=True, exist_ok=True)
-        draw_master_curve(curve).savefig(figure, dpi=150)
+        with writing(figure):
+            draw_master_curve(curve).savefig(figure, dpi=150)
     _print(curve, form)
 
 

@@ -10,9 +10,24 @@ import click
 
 from mdr_dask.cli import selection
 from mdr_dask.cli.printing import print_json, print_rows, table, with_errors, with_intervals
+from mdr_dask.cli.writing import FORMATS, figure_file, format_option, writing
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class Reading(click.Command):
+    """A command that reads a store, its first argument."""
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run it; what Zarr has to say of chunks that cannot be read is one error."""
+        from mdr_dask.store import readable
+
+        with readable(
+            next(context.params[str(option.name)] for option in self.params if isinstance(option, click.Argument))
+        ):
+            return super().invoke(context)
+
 
 STATISTICS = ("mean", "standard_deviation", "standard_error", "quantile", "interval", "count")
 
@@ -23,10 +38,12 @@ select_option = click.option(
 )
 json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
 csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
-limit_option = click.option("--limit", default=40, show_default=True, help="Most rows of a table; 0 for all.")
+limit_option = click.option(
+    "--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most rows of a table; 0 for all."
+)
 
 
-@click.command()
+@click.command(cls=Reading)
 @store_argument
 @click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
 @click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
@@ -96,7 +113,7 @@ def _brief(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-@click.command()
+@click.command(cls=Reading)
 @store_argument
 @click.argument("outputs", nargs=-1)
 @series_option
@@ -134,7 +151,7 @@ def show(
     print_rows(rows, units, form or "table", limit)
 
 
-@click.command()
+@click.command(cls=Reading)
 @store_argument
 @series_option
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these; repeat.")
@@ -153,13 +170,25 @@ def aggregate(
     from mdr_dask import store as room
     from mdr_dask.aggregate import aggregate as reduce
 
+    if output is not None:
+        _check_target(output)
     reduced = reduce(selection.group(room.datasets(store), series), statistic or STATISTICS)
     if output is None:
         rows, units = table(reduced)
         print_rows(rows, units, form or "table", limit)
         return
-    _write(reduced, output)
+    with writing(output):
+        _write(reduced, output)
     click.echo(f"{output}: {len(reduced.data_vars)} variables over {dict(reduced.sizes)}")
+
+
+def _check_target(path: Path) -> None:
+    from mdr_dask.store import is_study
+
+    if path.suffix not in (".zarr", ".nc", ".csv"):
+        raise click.UsageError(f"expected a file that ends in .zarr, .nc or .csv, got {str(path)!r}")
+    if path.suffix == ".zarr" and is_study(str(path)):
+        raise click.UsageError(f"expected a place for the statistics, got the store of a study: {str(path)!r}")
 
 
 def _write(dataset: xr.Dataset, path: Path) -> None:
@@ -169,13 +198,11 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
         rows, units = table(dataset)
         with path.open("w") as stream, contextlib.redirect_stdout(stream):
             print_rows(rows, units, "csv")
-    elif path.suffix in (".zarr", ".nc"):
-        save(dataset, path)
     else:
-        raise click.UsageError(f"expected a file that ends in .zarr, .nc or .csv, got {str(path)!r}")
+        save(dataset, path)
 
 
-@click.command()
+@click.command(cls=Reading)
 @store_argument
 @click.argument("names", nargs=-1)
 @series_option
@@ -228,12 +255,12 @@ def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
             raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")
 
 
-@click.command()
+@click.command(cls=Reading)
 @store_argument
 @click.argument("names", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="Draw every figure that the store has the data for.")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
-@click.option("--format", "suffix", default="png", show_default=True, help="png, pdf or svg.")
+@format_option
 def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | None, suffix: str) -> None:
     """Draw figures from a store; without a name, say which figures there are.
 
@@ -251,6 +278,7 @@ def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | No
         _list(model, {name: figure.summary for name, figure in known.items()})
         return
     _require_known(names, list(known), f"figure of {model}")
+    folder, file = _places(output, alone=len(names) == 1 and not everything)
     groups = stores.datasets(store)
     for name in names or tuple(known):
         try:
@@ -260,15 +288,19 @@ def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | No
                 raise
             click.echo(f"{name}: left out: {error}", err=True)
             continue
-        path = _figure_path(output, f"{Path(store).stem}-{name}.{suffix}", single=len(names) == 1)
-        figure.savefig(path, dpi=150)
+        path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
+        with writing(path):
+            figure.savefig(path, dpi=150)
         click.echo(str(path))
 
 
-def _figure_path(output: Path | None, name: str, single: bool) -> Path:
-    if single and output is not None and output.suffix:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        return output
+def _places(output: Path | None, alone: bool) -> tuple[Path, Path | None]:
+    """Return the folder of figures, and the file of a figure that is drawn alone where one is named."""
     folder = output or Path("figures")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder / name
+    if not folder.suffix or folder.is_dir():
+        return folder, None
+    if alone:
+        return folder, figure_file(folder)
+    if folder.suffix[1:].lower() in FORMATS:
+        raise click.UsageError(f"expected a folder for the figures, got {str(folder)!r}")
+    return folder, None

@@ -64,7 +64,12 @@ def _pick(dataset: xr.Dataset, name: str, wanted: str) -> xr.Dataset:
         return dataset.isel({dim: [int(np.argmin(abs(axis.to_numpy() - _number(low, unit, name))))]})
     least = _number(low, unit, name) if low else -np.inf
     most = _number(high, unit, name) if high else np.inf
-    return dataset.isel({dim: np.flatnonzero((axis.to_numpy() >= least) & (axis.to_numpy() <= most))})
+    inside = np.flatnonzero((axis.to_numpy() >= least) & (axis.to_numpy() <= most))
+    if not inside.size:
+        raise click.UsageError(
+            f"no {name} from {least:g} to {most:g}; it goes from {axis.to_numpy().min():g} to {axis.to_numpy().max():g}"
+        )
+    return dataset.isel({dim: inside})
 
 
 def _number(text: str, unit: str, name: str) -> float:

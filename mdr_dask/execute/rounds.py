@@ -55,6 +55,7 @@ def run(
     CampaignError
         If the campaign is too large to be run.
     """
+    _plan(campaign, url)  # what is refused leaves no lock behind
     with store.lock(url):
         layout, asked = _plan(campaign, url)
         store.sweep(url)

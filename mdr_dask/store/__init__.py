@@ -16,10 +16,10 @@ from mdr_dask.store.blocks import (
     write_status,
     write_values,
 )
-from mdr_dask.store.files import attributes, exists, lock, sweep
+from mdr_dask.store.files import attributes, exists, is_study, lock, sweep
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
-from mdr_dask.store.reading import datasets, save
+from mdr_dask.store.reading import datasets, readable, save
 
 __all__ = [
     "Place",
@@ -28,10 +28,12 @@ __all__ = [
     "attributes",
     "datasets",
     "exists",
+    "is_study",
     "lay_out",
     "ledger",
     "lock",
     "read_block",
+    "readable",
     "reconcile",
     "records",
     "save",

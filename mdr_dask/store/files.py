@@ -39,7 +39,7 @@ def bytes_of(url: str) -> Any:
     try:
         return zarr.storage.FsspecStore.from_url(url)
     except (ImportError, ValueError) as error:
-        raise StoreError(f"{url}: {error}") from None
+        raise StoreError(f"{url}: expected a path, or a URL that fsspec can open: {error}") from None
 
 
 @contextmanager
@@ -115,12 +115,26 @@ def exists(url: str) -> bool:
     path = local(url)
     if path is not None and path.is_file():
         raise StoreError(f"{url}: a file, expected the folder of a store or nothing")
-    metadata = read_json(url, "zarr.json")
-    if metadata is None and path is not None and path.is_dir():
+    found = _root_attributes(url)
+    if found is None and path is not None and path.is_dir():
         others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial")
         if others:
             raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
-    return metadata is not None and not only_claimed(metadata["attributes"])
+    return found is not None and not only_claimed(found)
+
+
+def is_study(url: str) -> bool:
+    """Say whether there is a study of mdr_dask at a path or URL."""
+    return "mdr_dask_layout" in (_root_attributes(url) or {})
+
+
+def _root_attributes(url: str) -> dict[str, Any] | None:
+    """Return the attributes of whatever Zarr there is, or None if there is none."""
+    metadata = read_json(url, "zarr.json")
+    if metadata is None:
+        return None
+    found = metadata.get("attributes", {}) if isinstance(metadata, dict) else {}
+    return found if isinstance(found, dict) else {}
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
@@ -139,12 +153,11 @@ def attributes(url: str) -> dict[str, Any]:
     path = local(url)
     if path is not None and path.is_file():
         raise StoreError(f"{url}: a file, expected the folder of a store; 'mdr-dask run {url}' runs a campaign")
-    metadata = read_json(url, "zarr.json")
-    if metadata is None:
+    found = _root_attributes(url)
+    if found is None:
         raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")
-    found: dict[str, Any] = metadata["attributes"]
     if "mdr_dask_layout" not in found:
-        raise StoreError(f"{url}: a Zarr group, but not one that mdr_dask made")
+        raise StoreError(f"{url}: Zarr, but not a study that mdr_dask made")
     if found["mdr_dask_layout"] > LAYOUT:
         raise StoreError(f"{url}: made by a newer mdr_dask (layout {found['mdr_dask_layout']}, known: {LAYOUT})")
     if only_claimed(found):
@@ -190,16 +203,20 @@ def lock(url: str) -> Iterator[None]:
 
     path = path.resolve()
     holder = path.with_name(f".{path.name}.runner")
-    guard = FileLock(path.with_name(f".{path.name}.lock"), timeout=0)
+    file = path.with_name(f".{path.name}.lock")
+    guard = FileLock(file, timeout=0)
     with guarded(url, "making it"):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.parent.exists():
+            path.parent.mkdir(parents=True, exist_ok=True)
+        file.touch()  # where this fails, the lock would say that somebody else holds it
         try:
             guard.acquire()
         except Timeout:
             who = holder.read_text() if holder.exists() else "another process"
             raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it") from None
-        holder.write_text(f"process {os.getpid()} on {platform.node()}")
     try:
+        with guarded(url, "making it"):
+            holder.write_text(f"process {os.getpid()} on {platform.node()}")
         yield
     finally:
         holder.unlink(missing_ok=True)

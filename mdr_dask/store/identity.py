@@ -60,6 +60,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     StoreError
         If the store was made from another campaign; every difference is named, and nothing was touched.
     """
+    attributes(url)  # what is no study at all is refused in its own words
     campaign = _with_root(url, campaign)
     groups = {series.name: _group_attributes(url, series.name) for series in campaign.series}
     held = {name: found for name, found in groups.items() if found is not None}

@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 import json
+import traceback
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
 import xarray as xr
 
+from mdr_dask.errors import StoreError
 from mdr_dask.store.files import bytes_of, group_name, series_names
 
 #: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
 LAZY_BYTES = 2**30
+
+
+@contextmanager
+def readable(url: str) -> Iterator[None]:
+    """Say in one sentence what Zarr has to say of chunks that cannot be read, whenever arrays are loaded."""
+    try:
+        yield
+    except Exception as error:
+        *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
+        room = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
+        if isinstance(error, OSError) or room not in ("zarr", "numcodecs"):
+            raise
+        raise StoreError(f"{url}: damaged, a chunk cannot be read: {error}") from None
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:
@@ -60,7 +77,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
     plain.attrs = {
         name: value if isinstance(value, str | int | float) else json.dumps(value)
         for name, value in dataset.attrs.items()
-        if value is not None
+        if value is not None and name != "mdr_dask_layout"  # no study that could be run on
     }
     if path.suffix == ".nc":
         plain.to_netcdf(path, engine="scipy")

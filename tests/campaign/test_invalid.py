@@ -34,7 +34,7 @@ def test_problems_are_sorted_and_survive_pickling(monkeypatch):
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path):
-    with pytest.raises(CampaignError, match=r"nowhere\.yaml: cannot read the campaign: No such file"):
+    with pytest.raises(CampaignError, match=r"nowhere\.yaml: cannot be read: No such file"):
         load(tmp_path / "nowhere.yaml")
 
 

@@ -1,0 +1,33 @@
+"""The cluster file: which Dask cluster to start, and how."""
+
+from __future__ import annotations
+
+from pathlib import Path as FilePath
+from typing import Any
+
+from mdr_dask.campaign.document import parse, read_text
+from mdr_dask.campaign.problems import Problems, did_you_mean, shown
+
+_EXPECTED = {"class": "a class such as dask_jobqueue.SLURMCluster", "arguments": "a mapping", "scale": "a mapping"}
+
+
+def load_cluster(path: FilePath) -> dict[str, Any]:
+    """Read a cluster file: the keys ``class``, and ``arguments`` and ``scale`` if there are any.
+
+    Raises
+    ------
+    CampaignError
+        With every problem of the file, by line.
+    """
+    problems = Problems()
+    document = parse(read_text(path), str(path), problems)
+    data = document.data if isinstance(document.data, dict) else {}
+    for key, value in data.items():
+        if key not in _EXPECTED:
+            problems.add(document.key_place((key,)), key, f"unknown key{did_you_mean(key, list(_EXPECTED))}")
+        elif not (isinstance(value, dict) if key != "class" else isinstance(value, str) and "." in value):
+            problems.add(document.place((key,)), key, f"expected {_EXPECTED[key]}, got {shown(value)}")
+    if "class" not in data and not problems:
+        problems.add(document.place(()), "", f"expected a mapping with the key class, got {shown(document.data)}")
+    problems.raise_if_any()
+    return data

@@ -1,0 +1,142 @@
+"""Wrong options, wrong files, full disks, damaged stores: one error with the exit code 2, and nothing written."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+from test_cli import CAMPAIGN
+
+from mdr_dask.cli import main
+
+#: Command line, and what the error has to say; STORE is a filled store, FOREIGN a Zarr group of somebody else.
+WRONG = [
+    ("check nowhere.yaml", "File 'nowhere.yaml' does not exist"),
+    ("models nobody", "no model 'nobody'; known: sliding_friction"),
+    ("run small.yaml --threads 0", "0 is not in the range x>=1"),
+    ("run small.yaml --threads 2 --workers 2", "expected one of --threads, --workers, got 2 of them"),
+    ("run small.yaml --store .", ".: a folder that holds something else (.STORE.lock), expected a store or nothing"),
+    ("run small.yaml --store small.yaml", "small.yaml: a file, expected the folder of a store or nothing"),
+    ("run small.yaml --store FOREIGN", "FOREIGN: Zarr, but not a study that mdr_dask made"),
+    ("run small.yaml --store nobody://x", "nobody://x: expected a path, or a URL that fsspec can open: Protocol not"),
+    ("run small.yaml --store small.yaml/x.zarr", "small.yaml/x.zarr: making it failed: Not a directory"),
+    ("run other.yaml --store STORE", "STORE: made from another campaign; name another store, or remove this one:"),
+    ("run other.yaml --store STORE --dry-run", "hurst: 0.7 in the store, 0.6 in the campaign"),
+    ("run large.yaml", "large.yaml: one case needs about"),
+    ("run small.yaml --scheduler nowhere --store STORE", "no Dask scheduler answers at 'nowhere'"),
+    ("run small.yaml --cluster small.yaml", "small.yaml:1:1: name: unknown key (known: class, arguments, scale)"),
+    ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class: expected a class such as dask_jobqueue.SLURM"),
+    ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments: expected a mapping, got 3"),
+    ("run small.yaml --cluster list.yaml", "list.yaml:1:1: expected a mapping with the key class, got ['class']"),
+    ("run small.yaml --cluster latin.yaml", "latin.yaml:1:1: expected UTF-8 text, got byte 0xb5"),
+    ("status small.yaml", "small.yaml: a file, expected the folder of a store"),
+    ("status nowhere.zarr", "nowhere.zarr: no store here; 'mdr-dask run CAMPAIGN' makes one"),
+    ("status FOREIGN", "FOREIGN: Zarr, but not a study that mdr_dask made"),
+    ("show .", ".: no store here"),
+    ("show STORE friction", "no output 'friction' in this store (did you mean 'friction_coefficient'?)"),
+    ("show STORE --series x", "no series 'x'; known: none, leave --series out"),
+    ("show STORE --statistic median", "'median' is not one of 'mean'"),
+    ("show STORE --select speed=1", "expected --select NAME=VALUE or NAME=A:B with one of normal_force, velocity"),
+    ("show STORE --select velocity=1kg", "velocity: expected a velocity (such as '1 mm/s'), got '1kg'"),
+    ("show STORE --select velocity=2:1", "no velocity from 2 to 1; it goes from 0.001 to 1"),
+    ("show STORE --limit -1", "-1 is not in the range x>=0"),
+    ("aggregate STORE -o means.xls", "expected a file that ends in .zarr, .nc or .csv, got 'means.xls'"),
+    ("aggregate STORE -o STORE", "expected a place for the statistics, got the store of a study: 'STORE'"),
+    ("aggregate STORE -o small.yaml/x.csv", "small.yaml/x.csv: Not a directory"),
+    ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
+    ("plot STORE nothing", "no figure of sliding_friction is called 'nothing'; known: regions, velocity"),
+    ("plot STORE velocity --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
+    ("plot STORE velocity -o velocity.bmp", "expected a file that ends in .png, .pdf, .svg, got 'velocity.bmp'"),
+    ("plot STORE velocity force -o both.png", "expected a folder for the figures, got 'both.png'"),
+    ("plot STORE velocity -o small.yaml/x.png", "small.yaml/x.png: Not a directory"),
+    ("figures small.yaml --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
+    ("schema -o small.yaml/x.json", "small.yaml/x.json: Not a directory"),
+    ("master-curve nowhere.csv", "nowhere.csv: no store here"),
+    ("master-curve STORE --bootstrap -1", "-1 is not in the range x>=0"),
+    ("master-curve STORE --over velocity --plot x.bmp", "expected a file that ends in .png, .pdf, .svg, got 'x.bmp'"),
+]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Return a folder with campaigns, right and wrong, a filled store and a Zarr group that is none."""
+    folder = tmp_path_factory.mktemp("wrong")
+    for name, text in {
+        "small.yaml": CAMPAIGN,
+        "other.yaml": CAMPAIGN.replace("hurst: 0.7", "hurst: 0.6"),
+        "large.yaml": CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"),
+        "class.yaml": "class: LocalCluster\n",
+        "number.yaml": "class: distributed.LocalCluster\narguments: 3\n",
+        "list.yaml": "[class]\n",
+    }.items():
+        (folder / name).write_text(text)
+    (folder / "latin.yaml").write_bytes("µ: 1\n".encode("latin-1"))
+    (folder / "FOREIGN").mkdir()
+    (folder / "FOREIGN/zarr.json").write_text(json.dumps({"zarr_format": 3, "node_type": "array"}))
+    with pytest.MonkeyPatch.context() as here:
+        here.chdir(folder)
+        assert main(["run", "small.yaml", "--store", "STORE.zarr", "--quiet"]) == 0
+    return folder
+
+
+def contents(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(("line", "told"), WRONG, ids=[line for line, _ in WRONG])
+def test_one_error_and_nothing_written(folder, monkeypatch, capsys, line, told):
+    monkeypatch.chdir(folder)
+    before = contents(folder)
+    assert main(line.replace("STORE", "STORE.zarr").split()) == 2
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert told.replace("STORE", "STORE.zarr") in streams.err
+    assert contents(folder) == before
+
+
+READING = [(f"{command} damaged.zarr", "friction_coefficient") for command in ("show", "aggregate")]
+READING += [
+    ("fit damaged.zarr zone_one", "friction_coefficient"),
+    ("plot damaged.zarr velocity", "friction_coefficient"),
+]
+READING += [("status damaged.zarr", "status"), ("run small.yaml --store damaged.zarr", "status")]
+
+
+@pytest.mark.parametrize(("line", "array"), READING)
+def test_a_damaged_chunk_is_named_by_its_store(folder, tmp_path, monkeypatch, capsys, line, array):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(folder / "small.yaml", tmp_path)
+    shutil.copytree(folder / "STORE.zarr", "damaged.zarr")
+    for chunk in Path("damaged.zarr", array, "c").rglob("*"):
+        if chunk.is_file():
+            chunk.write_bytes(b"not what was written here")
+    assert main(line.split()) == 2
+    errors = capsys.readouterr().err
+    assert errors.startswith("damaged.zarr: ")
+    assert len(errors.splitlines()) == 1
+
+
+def test_a_full_disk_is_named(folder, tmp_path, monkeypatch, capsys):
+    """The file is begun, and has to go."""
+    from matplotlib.figure import Figure
+
+    def half(_: Figure, path: Path, **_options: object) -> None:
+        path.write_bytes(b"half of it")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(Figure, "savefig", half)
+    target = tmp_path / "figures/velocity.png"
+    assert main(["plot", "STORE.zarr", "velocity", "-o", str(target)]) == 2
+    assert capsys.readouterr().err == f"{target}: No space left on device\n"
+    assert not target.exists()
+
+
+def test_statistics_replace_older_ones_and_are_no_study(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    target = str(tmp_path / "new/means.zarr")
+    for _ in range(2):
+        assert main(["aggregate", "STORE.zarr", "-o", target]) == 0
+    capsys.readouterr()
+    assert main(["run", "small.yaml", "--store", target]) == 2
+    assert "not a study" in capsys.readouterr().err
