@@ -23,9 +23,7 @@ class Reading(click.Command):
         """Run it; what Zarr has to say of chunks that cannot be read is one error."""
         from mdr_dask.store import readable
 
-        with readable(
-            next(context.params[str(option.name)] for option in self.params if isinstance(option, click.Argument))
-        ):
+        with readable(context.params[str(self.params[0].name)]):
             return super().invoke(context)
 
 
