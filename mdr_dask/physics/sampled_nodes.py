@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 BLOCK = 32  # cells
-BEFORE, AFTER = 4, 4  # nodes of the turns before and after
+BEFORE, AFTER = 4, 5  # nodes of the turns before and after, as many as `refine` reads
 TINY = 1e-300
 SUMMIT = 64  # nodes in a cell that its highest point is taken from
 WING = 4  # nodes to either side that the middle of a cell follows from
