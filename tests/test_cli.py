@@ -296,7 +296,9 @@ def test_a_second_process_is_refused_until_the_first_is_gone_however_it_went(cam
     first.kill()
     first.communicate(timeout=60)
     second = started("run", str(campaign), "--quiet")
-    time.sleep(2)
+    deadline = time.monotonic() + 60
+    while str(second.pid) not in Path(".live.zarr.runner").read_text() and time.monotonic() < deadline:
+        time.sleep(0.1)
     assert main(["run", str(campaign), "--quiet"]) == 2
     assert f"process {second.pid} on " in capsys.readouterr().err
     second.terminate()
