@@ -1,6 +1,3 @@
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import t as student
@@ -8,8 +5,6 @@ from scipy.stats import t as student
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.physics.shift_laws import fit_arrhenius, fit_power, fit_wlf
 from mdr_dask.physics.superposition import rereference, superpose
-
-DATA = Path(__file__).parents[1] / "data" / "dma"
 
 
 def sigmoid(x):
@@ -194,27 +189,3 @@ def test_laws_refuse_groups_they_do_not_know():
         fit_arrhenius(np.array([-1.0, 1.0]), np.zeros(2), np.zeros((2, 2)), 1.0)
     with pytest.raises(FitError, match="needs more than 1 shift factors beside the reference, got 0"):
         fit_power(np.array([1.0, 2.0]), np.zeros(2), np.zeros((2, 2)), 1.0)
-
-
-def test_relaxation_data_agree_with_their_authors():
-    """The authors shift neighbours pair by pair and take 3 C as reference; here all curves are fitted at once.
-
-    Above -15 C both agree within 0.35 of 21 decades. Below, neighbours share hardly any range of modulus beyond its
-    scatter, and every pair's difference adds to the next: 0.85 decades at -50 C.
-    """
-    table = np.array(read("time_user_raw.csv"))
-    authors = np.array(read("time_user_raw__shift_factors.csv"))[::-1]
-    sets = [table[table[:, 3] == number] for number in range(21)]
-    temperatures = np.array([part[:, 2].mean() for part in sets])
-    curves = [(np.log10(part[:, 0]), np.log10(part[:, 1])) for part in sets]
-    result = superpose(temperatures, curves, reference=temperatures[7])
-    difference = np.abs(-result.horizontal - authors[:, 1])
-    assert np.all(np.diff(result.horizontal) > 0)
-    assert np.all(difference[temperatures > -15] < 0.35)
-    assert np.all(difference < 0.9)
-    assert result.noise < 0.005
-
-
-def read(name):
-    with (DATA / name).open(encoding="utf-8-sig") as file:
-        return [[float(value) for value in row] for row in list(csv.reader(file))[2:]]
