@@ -219,9 +219,8 @@ def _walked(
     problem: Problem, shifts: FloatArray, settled: Settled, spread: FloatArray, freedom: float, seed: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean and covariance of the posterior, the latter as the square of a scale for Student's t."""
-    visited = sample(problem, shifts, settled, spread, seed)
-    narrower = (freedom - 2) / freedom if freedom > 4 else 0.5
-    return visited.mean(axis=0), np.atleast_2d(np.cov(visited.T)) * narrower
+    mean, covariance = sample(problem, shifts, settled, spread, seed)
+    return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5)
 
 
 def _bootstrap(problem: Problem, shifts: FloatArray, settled: Settled, draws: int, seed: int) -> FloatArray:
