@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.physics import shift_marginal, shift_sampling
+from mdr_dask.physics import shift_marginal, shift_sampling, shift_start
 from mdr_dask.physics.shift_problem import Problem
 from mdr_dask.physics.shift_system import SMOOTHING, Settled, System
 
@@ -13,8 +13,8 @@ FloatArray = NDArray[np.float64]
 Data = tuple[FloatArray, FloatArray, NDArray[np.intp], float, float, int, float]
 """Points and their curves; low end, step and number of the splines; size of the curvature."""
 
-ENOUGH = 200.0
-"""Points of even weight that those drawn are worth: means are known to 0.07 and widths to 0.05 standard deviations."""
+ENOUGH = 500.0
+"""Points of even weight that those drawn are worth: means are known to 0.05 standard deviations, these to 3 %."""
 
 STAGE, MOST_STAGES = 30, 60
 """Points of a stage for every unknown, and stages at most."""
@@ -22,8 +22,8 @@ STAGE, MOST_STAGES = 30, 60
 WORTH = 6.0
 """Points of even weight, for every unknown, that the shape of the next stage is taken from."""
 
-FIRST_VARIANCES = 0.5, 3.0
-"""Of the logarithms of the ratio of variances and of the smoothing, in the first stage."""
+WIDER = 5.0
+"""Variance added to a stage, shared by all unknowns: tails that a stage misses make bars short, and wide ones waste."""
 
 TEMPER, COLDEST = 0.8, 0.02
 """Factor and least value of the power to which the posterior is raised where too few points decide."""
@@ -32,13 +32,12 @@ LEAST_WEIGHT = 1e-3
 """Weight, relative to the largest, below which a point is left out."""
 
 
-def sample(
-    problem: Problem, shifts: FloatArray, settled: Settled, covariance: FloatArray, seed: int
-) -> tuple[FloatArray, FloatArray]:
+def sample(problem: Problem, shifts: FloatArray, settled: Settled, seed: int) -> tuple[FloatArray, FloatArray]:
     """Return mean and covariance of the posterior of the shifts; curve, smoothness and scatter are unknown too.
 
-    Vertical shifts and the curve are integrated out in closed form. The rest is drawn from Student's t, in stages: each
-    has the middle and the shape that all points before tell of, and all points count, by the mixture of all stages.
+    Vertical shifts and the curve are integrated out in closed form. The rest is drawn from Student's t, in stages: the
+    first is that of the linearised problem, each other has the middle and the shape that all points before tell of, and
+    all points count, by the mixture of all stages.
 
     Parameters
     ----------
@@ -47,17 +46,14 @@ def sample(
         The most likely ones.
     settled : Settled
         Smoothing and scatter there.
-    covariance : array, shape (unknowns, unknowns)
-        That of the linearised problem, from which the first points are drawn.
     seed : int
         Seed of the points.
     """
     generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-    data, expected = _arguments(problem, shifts, settled)
+    system = System.at(problem, shifts, settled)
+    data, expected = _arguments(problem, system)
     curves, bounds = problem.curves - 1, np.log(SMOOTHING[[0, -1]])
-    mean = np.append(shifts[:curves], [_log_ratio(problem, shifts, settled, expected[2]), np.log(settled.weight)])
-    spread = np.diag(np.append(np.ones(curves), FIRST_VARIANCES))
-    spread[:curves, :curves] = covariance[:curves, :curves]
+    mean, spread = shift_start.moments(problem, system, shifts, settled.variance, expected[2])
     cloud = _Cloud(mean.size)
     while True:
         drawn = cloud.draw(generator, mean, spread)
@@ -117,21 +113,16 @@ class _Cloud:
         while self.worth(power) < wanted and power > COLDEST:
             power *= TEMPER
         mean, found = shift_sampling.moments(self.points, self.weights(power))
-        return mean, found + 1e-9 * np.diag(np.diag(spread))
+        return mean, (1 + WIDER / spread.shape[0]) * found + 1e-9 * np.diag(np.diag(spread))
 
 
-def _arguments(problem: Problem, shifts: FloatArray, settled: Settled) -> tuple[Data, tuple[float, float, float]]:
+def _arguments(problem: Problem, system: System) -> tuple[Data, tuple[float, float, float]]:
     """Return what the compiled posterior takes: a spline with room for the points to move, and what is expected."""
-    system = System.at(problem, shifts, settled)
     splines = int(np.ceil(system.splines + 2 * problem.width / system.step))
-    height = float(np.median([np.ptp(problem.y[problem.member == curve]) for curve in range(problem.curves)]))
+    heights = [float(np.ptp(problem.y[problem.member == curve])) for curve in range(problem.curves)]
     spline = system.low - problem.width, system.step, splines, float(system.penalty[0, 0])
-    return (problem.x, problem.y, problem.member, *spline), (problem.usual, problem.width, height)
-
-
-def _log_ratio(problem: Problem, shifts: FloatArray, settled: Settled, height: float) -> float:
-    """Return the logarithm of the variance of the steps, in widths and heights of a curve, over that of the scatter."""
-    parts = zip(problem.split(shifts), (problem.width, height), strict=True)
-    steps = [np.diff(shift) / scale for shift, scale in parts]
-    squares = sum(float(np.sum((step - step.mean()) ** 2)) for step in steps)
-    return float(np.log((squares + shift_marginal.ALIKE**2) / shifts.size / settled.variance))
+    return (problem.x, problem.y, problem.member, *spline), (
+        problem.usual,
+        problem.width,
+        float(np.median(heights)) or 1.0,
+    )

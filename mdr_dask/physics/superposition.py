@@ -152,6 +152,8 @@ def _sorted(
             raise DataError(f"the curve at {values[place]:g} needs two or more distinct points with finite logarithms")
         order = np.argsort(x, kind="stable")
         arrays.append((x[order], y[order]))
+    if all(np.ptp(y) == 0 for _, y in arrays):
+        raise DataError("every curve is constant: nothing tells how far to shift them")
     return np.sort(values), arrays
 
 
@@ -182,7 +184,7 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     solution, covariance, noise, freedom = system.posterior(settled.weight)
     spread = covariance[system.splines :, system.splines :]
     if problem.vertical:
-        shifts, spread = _walked(problem, shifts, settled, spread, freedom, seed)
+        shifts, spread = _sampled(problem, shifts, settled, freedom, seed)
         system = System.at(problem, shifts, settled)
         solution = np.append(system.solve(settled.weight)[: system.splines], shifts)
     horizontal, vertical = problem.split(shifts)
@@ -215,11 +217,11 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     )
 
 
-def _walked(
-    problem: Problem, shifts: FloatArray, settled: Settled, spread: FloatArray, freedom: float, seed: int
+def _sampled(
+    problem: Problem, shifts: FloatArray, settled: Settled, freedom: float, seed: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return mean and covariance of the posterior, the latter as the square of a scale for Student's t."""
-    mean, covariance = sample(problem, shifts, settled, spread, seed)
+    mean, covariance = sample(problem, shifts, settled, seed)
     return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5)
 
 

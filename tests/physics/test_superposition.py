@@ -189,3 +189,25 @@ def test_laws_refuse_groups_they_do_not_know():
         fit_arrhenius(np.array([-1.0, 1.0]), np.zeros(2), np.zeros((2, 2)), 1.0)
     with pytest.raises(FitError, match="needs more than 1 shift factors beside the reference, got 0"):
         fit_power(np.array([1.0, 2.0]), np.zeros(2), np.zeros((2, 2)), 1.0)
+
+
+def test_constant_curves_are_refused():
+    with pytest.raises(DataError, match="every curve is constant"):
+        superpose([1.0, 2.0], [([0, 1, 2], [3, 3, 3]), ([0, 1, 2], [4, 4, 4])])
+
+
+def test_vertical_factors_of_many_kinds_of_tables_have_finite_bars():
+    """Warnings are errors: from two curves of two points to curves without scatter and axes far from zero."""
+    random = np.random.default_rng(0)
+    for curves, points, noise, away in (
+        (2, 2, 0.01, 0),
+        (2, 30, 0.01, 0),
+        (4, 3, 0.1, 0),
+        (5, 20, 0.0, 0),
+        (6, 9, 1e-3, 50),
+    ):
+        x = np.linspace(-1, 1, points)
+        table = [(x + away, sigmoid(x + 0.4 * k) + noise * random.standard_normal(points)) for k in range(curves)]
+        result = superpose(np.arange(curves), [(x, y - away) for x, y in table], vertical=True)
+        assert np.all(np.isfinite(result.covariance))
+        assert np.count_nonzero(result.vertical_error) == curves - 1
