@@ -18,7 +18,7 @@ def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
     first = json.loads(capsys.readouterr().out)
     factors = np.array(first["data_vars"]["shift_factor"]["data"])
     groups = np.array(first["coords"]["T"]["data"])
-    assert factors[np.argmin(abs(groups - 20))] == 0.0
+    assert np.interp(20.0, groups, factors) == pytest.approx(0.0, abs=1e-10)
     assert (np.diff(factors) > 0).all()
     assert figure.stat().st_size > 10_000
     assert main(["master-curve", str(kept), "--reference", "60", "--json"]) == 0
@@ -31,7 +31,8 @@ def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("normal_force,velocity\n1,2\n", "expected columns for"),
+        ("normal_force,velocity\n1,2\n", "name them by --over, --of and --by"),
+        ("force,mu,velocity\n1,0.5,1\n2,0.4,1\n", "two or more values of 'velocity', got one value"),
         ("normal_force,velocity,mu\n1,2,high\n", ":2: expected 3 numbers"),
     ],
 )
@@ -40,6 +41,38 @@ def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, con
     path.write_text(content)
     assert main(["master-curve", str(path)]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["nowhere.csv"], "nowhere.csv: no such table or store"),
+        ([str(TABLE), "--plot", "figure.xyz"], "ends in .png, .pdf or .svg, got 'figure.xyz'"),
+        ([str(TABLE), "-o", "factors.txt"], "ends in .json or .csv, got 'factors.txt'"),
+        ([str(TABLE), "--reference", "500"], "must lie between -49.9392 and 99.9931, got 500"),
+        ([str(TABLE), "--vertical"], "measure in between or do without vertical factors"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["master-curve", *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_what_they_hold(tmp_path, capsys):
+    factors, curve, kept = tmp_path / "new" / "factors.csv", tmp_path / "curve.csv", tmp_path / "kept.json"
+    assert main(["master-curve", str(TABLE), "-o", str(factors)]) == 0
+    assert main(["master-curve", str(TABLE), "-o", str(kept), "--bootstrap", "10"]) == 0
+    assert "shift_factor_bootstrap" in capsys.readouterr().out
+    other = kept.rename(tmp_path / "kept.dat")
+    assert main(["master-curve", str(other), "--reference", "60", "--show", "curve", "-o", str(curve)]) == 0
+    assert factors.read_text().splitlines()[0].startswith("T [°C],shift_factor,shift_factor_error")
+    assert curve.read_text().splitlines()[0] == "curve,curve_abscissa [s],curve_ordinate [MPa],curve_error"
+    printed = capsys.readouterr()
+    assert "the law wlf misses the factors by" in printed.err
+    assert main(["master-curve", str(other), "--vertical"]) == 2
+    assert "is a kept result, of which only --reference may change" in capsys.readouterr().err
 
 
 def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):

@@ -77,7 +77,8 @@ def master_curve(
     vertical : bool
         Whether curves may shift along the ordinate too.
     reference : float, optional
-        Group whose factors are zero; the nearest one to it if it was not measured exactly; the middle one by default.
+        Where the factors are zero, between two groups by linear interpolation; the middle group by default. Of two
+        groups, the nearest value of the first one.
     draws : int
         Bootstrap samples of the factors.
 
@@ -106,8 +107,9 @@ def master_curve(
             raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors")
         return _of_two_groups(frame, over, values, (by, second), reference, draws)
     groups, curves = _curves(frame, over, values, by)
-    nearest = None if reference is None else _nearest(groups, reference)
-    result = superposition.superpose(groups, curves, vertical, nearest, draws)
+    zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
+    free = superposition.superpose(groups, curves, vertical, None, draws)
+    result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
     return dataset.assign(_laws(result, over, by, units.get(by, "")))
@@ -146,19 +148,21 @@ def _columns(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
         names = [
             _find(frame, name) if wish is None else _find(frame, wish) for wish, name in zip(given, family, strict=True)
         ]
-        if None not in names and (all(given) or _varies(frame, names)):
-            found.append(names)
-    if not found:
-        wanted = (
-            ", ".join(repr(name) for name in given if name is not None)
-            or "a coefficient over force or a modulus over time"
+        if None not in names:
+            found.append([str(name) for name in names])
+    varied = [names for names in found if all(frame[name].nunique() > 1 for name in (names[0], names[2]))]
+    if found and not varied:
+        constant = next(name for name in (found[0][2], found[0][0]) if frame[name].nunique() < 2)
+        raise DataError(
+            f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
         )
-        raise DataError(f"expected columns for {wanted}, got {[str(name) for name in frame.columns]!r}")
-    return str(found[0][0]), str(found[0][1]), str(found[0][2])
-
-
-def _varies(frame: pd.DataFrame, names: list[str | None]) -> bool:
-    return all(frame[name].nunique() > 1 for name in (names[0], names[2]))
+    if not found:
+        wanted = ", ".join(repr(name) for name in given if name is not None) or (
+            "a coefficient over force by velocity or temperature, or a modulus over frequency or time by temperature"
+        )
+        got = [str(name) for name in frame.columns]
+        raise DataError(f"expected columns for {wanted}, got {got!r}: name them by --over, --of and --by")
+    return varied[0][0], varied[0][1], varied[0][2]
 
 
 def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
@@ -201,7 +205,7 @@ def _of_two_groups(
     )
     dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
     extra = _dataset(found.second, over, values, by[1], units)
-    for part in ("", "_error", "_low", "_high"):
+    for part in ("", "_error", "_low", "_high", *(("_bootstrap",) if draws else ())):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
     if draws:
         dataset["second_draws"] = extra["draws"]
@@ -239,10 +243,25 @@ def _clusters(values: FloatArray) -> NDArray[np.intp]:
     return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
 
 
+def _inside(groups: FloatArray, reference: float) -> float:
+    """Return the reference, or the first or last group if it lies just outside: set points are met by so much."""
+    margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
+    if not groups.min() - margin <= reference <= groups.max() + margin:
+        raise DataError(f"the reference must lie between {groups.min():g} and {groups.max():g}, got {reference:g}")
+    return float(np.clip(reference, groups.min(), groups.max()))
+
+
+def _is_temperature(by: str) -> bool:
+    return by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
+
+
+def _is_logarithmic(by: str, groups: FloatArray) -> bool:
+    """Say whether factors are nearly linear in the logarithm of the group, as a power law of velocities is."""
+    return bool(np.all(groups > 0)) and not _is_temperature(by)
+
+
 def _nearest(groups: FloatArray, reference: float) -> float:
-    if len(groups) > 1 and not groups.min() - 0.5 * np.ptp(groups) <= reference <= groups.max() + 0.5 * np.ptp(groups):
-        raise DataError(f"the reference {reference:g} is far from the groups {groups.min():g} to {groups.max():g}")
-    return float(groups[np.argmin(np.abs(groups - reference))])
+    return float(groups[np.argmin(np.abs(groups - _inside(groups, reference)))])
 
 
 def _dataset(
@@ -279,7 +298,12 @@ def _dataset(
     dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
     dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
     if result.draws.size:
+        for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
+            low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
+            about = {"units": "1", "long_name": "half width of 68 % of the bootstrap samples"}
+            dataset[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
         dataset["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+        dataset["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
     return dataset
 
 
@@ -287,10 +311,9 @@ def _laws(result: superposition.Superposition, over: str, by: str, unit: str) ->
     """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
     size = result.groups.size
     covariance = result.covariance[:size, :size]
-    is_temperature = by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
     fits = []
     try:
-        if is_temperature:
+        if _is_temperature(by):
             sign = -1 if over == "t" or over.lower() == "time" else 1
             kelvin = 0.0 if unit.upper() in ("K", "KELVIN", "") and np.all(result.groups > 0) else -ABSOLUTE_ZERO
             temperatures = result.groups + kelvin, sign * result.horizontal, covariance, result.reference + kelvin
@@ -342,20 +365,29 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_y=np.log10(curve["curve_ordinate"].to_numpy()),
         curve_error=curve["curve_error"].to_numpy(),
         measured=(0.0, 0.0),
-        draws=np.empty((0, 2 * size)),
+        draws=_drawn(curve),
     )
     units = {
         by: curve[by].attrs.get("units", ""),
         over: curve["curve_abscissa"].attrs.get("units", ""),
         values: curve["curve_ordinate"].attrs.get("units", ""),
     }
-    new = superposition.rereference(old, reference)
+    new = superposition.rereference(old, _inside(groups, reference), _is_logarithmic(by, groups))
     dataset = _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
-    for name in set(curve.data_vars) - set(dataset.data_vars):
+    for name in [name for name in curve.data_vars if name not in dataset]:
         dataset[name] = curve[name]
     if "point_shift" in curve:
         dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])
     return dataset.assign_attrs({name: value for name, value in curve.attrs.items() if name not in dataset.attrs})
+
+
+def _drawn(curve: xr.Dataset) -> FloatArray:
+    """Return the bootstrap samples of a kept result, horizontal and vertical side by side."""
+    if "draws" not in curve:
+        return np.empty((0, 2 * curve["shift_factor"].size))
+    across = curve["draws"].to_numpy()
+    along = curve["vertical_draws"].to_numpy() if "vertical_draws" in curve else np.zeros_like(across)
+    return np.hstack([across, along])
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:

@@ -250,11 +250,21 @@ def _require_overlap(result: Superposition) -> None:
     gaps = np.flatnonzero(low[order][1:] > reach[:-1])
     if gaps.size:
         after = result.groups[order[gaps[0] + 1]]
-        raise DataError(f"the curve at {after:g} does not overlap the others after shifting: measure in between")
+        choice = " or do without vertical factors" if result.vertical.any() else ""
+        raise DataError(
+            f"the curve at {after:g} does not overlap the others after shifting: measure in between{choice}"
+        )
 
 
-def rereference(result: Superposition, reference: float) -> Superposition:
+def rereference(result: Superposition, reference: float, logarithmic: bool = False) -> Superposition:
     """Return the same master curve with the factors zero at another group, or between two by linear interpolation.
+
+    Parameters
+    ----------
+    reference : float
+        In the range of the groups.
+    logarithmic : bool
+        Whether factors are linear in the logarithm of the groups, as those of velocities are.
 
     Raises
     ------
@@ -264,11 +274,12 @@ def rereference(result: Superposition, reference: float) -> Superposition:
     groups = result.groups
     if not groups[0] <= reference <= groups[-1]:
         raise DataError(f"the reference must lie between {groups[0]:g} and {groups[-1]:g}, got {reference:g}")
-    share = np.array([np.interp(reference, groups, unit) for unit in np.eye(groups.size)])
+    place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
+    share = np.array([np.interp(place, places, unit) for unit in np.eye(groups.size)])
     one = np.eye(groups.size) - np.outer(np.ones(groups.size), share)
     change = np.kron(np.eye(2), one)
     across, along = float(share @ result.horizontal), float(share @ result.vertical)
-    nearest = int(np.argmin(np.abs(groups - reference)))
+    nearest = int(np.argmin(np.abs(places - place)))
     own = result.x[result.member == nearest] - across
     return replace(
         result,

@@ -108,8 +108,23 @@ def test_saved_curves_can_be_rereferenced(tmp_path):
     assert again["curve_abscissa"].attrs["measured_low"] == pytest.approx(1.0)
 
 
-def test_bootstrap_is_kept():
-    assert master_curve(store()[["friction_coefficient"]], draws=5)["draws"].shape == (5, 7)
+def test_bootstrap_is_kept_and_referenced_anew():
+    curve = master_curve(store()[["friction_coefficient"]], draws=5)
+    assert curve["draws"].shape == (5, 7)
+    velocity = float(curve["velocity"][1])
+    moved = rereferenced(curve, velocity)
+    assert np.all(moved["draws"].sel(velocity=velocity) == 0)
+    assert moved["shift_factor_bootstrap"].sel(velocity=velocity) == 0
+    assert np.all(moved["shift_factor_bootstrap"].drop_sel(velocity=velocity) > 0)
+
+
+def test_a_reference_between_velocities_follows_their_logarithm():
+    exact = store(noise=0.0)[["friction_coefficient"]]
+    middle = float(np.sqrt(exact["velocity"][2] * exact["velocity"][3]))
+    for curve in (master_curve(exact, reference=middle), rereferenced(master_curve(exact), middle)):
+        law_says = EXPONENT * np.log10(curve["velocity"] / middle)
+        np.testing.assert_allclose(curve["shift_factor"], law_says, atol=0.01)
+        assert curve.attrs["reference"] == middle
 
 
 @pytest.mark.parametrize(
@@ -146,8 +161,10 @@ def test_tables_that_are_ambiguous_or_incomplete_are_refused():
         master_curve(frame, ordinate="hardness")
     with pytest.raises(DataError, match="must be positive"):
         master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
-    with pytest.raises(DataError, match="the reference 50 is far"):
+    with pytest.raises(DataError, match="must lie between 1 and 2, got 50"):
         master_curve(frame, reference=50.0)
+    with pytest.raises(DataError, match="two or more values of 'velocity', got one value"):
+        master_curve(frame.assign(velocity=1.0))
 
 
 def two_groups():
