@@ -82,15 +82,19 @@ def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
     assert "not a master curve kept by --keep" in capsys.readouterr().err
 
 
-def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
+def table_of_two_groups(path):
     rows = [
         f"{force},{velocity},{kelvin},{1 / (1 + (force * velocity**-0.15 * 10 ** (0.02 * (kelvin - 300))) ** -0.7)}"
         for force in np.geomspace(1, 100, 12)
         for velocity in (1e-3, 1e-2, 1e-1)
         for kelvin in (290, 300, 310)
     ]
-    path, kept, figure = tmp_path / "table.csv", tmp_path / "kept.json", tmp_path / "master.png"
     path.write_text("force,velocity,temperature,mu\n" + "\n".join(rows))
+
+
+def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
+    path, kept, figure = tmp_path / "table.csv", tmp_path / "kept.json", tmp_path / "master.png"
+    table_of_two_groups(path)
     assert main(["master-curve", str(path), "--keep", str(kept), "--plot", str(figure)]) == 0
     printed = capsys.readouterr()
     assert "second_factor" in printed.out
@@ -100,3 +104,25 @@ def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
     moved = json.loads(capsys.readouterr().out)["data_vars"]
     np.testing.assert_allclose(moved["shift_factor"]["data"], [0, -0.15, -0.3], atol=2e-3)
     np.testing.assert_allclose(moved["second_factor"]["data"], [-0.2, 0, 0.2], atol=2e-3)
+
+
+def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
+    path, figure = tmp_path / "table.csv", tmp_path / "master.png"
+    table_of_two_groups(path)
+    assert main(["master-curve", str(path), "--vertical", "--plot", str(figure)]) == 0
+    printed = capsys.readouterr().out
+    assert " vertical_factor " in printed
+    assert " second_vertical_factor " in printed
+    assert figure.stat().st_size > 10_000
+
+
+def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
+    path = tmp_path / "table.csv"
+    table_of_two_groups(path)
+    assert main(["master-curve", str(path), "--select", "temperature=299", "--select", "velocity=0:0.05", "--csv"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split(",")[0] for line in printed[1:]] == ["0.001", "0.01"]
+    assert main(["master-curve", str(path), "--select", "humidity=1"]) == 2
+    assert "with one of force, velocity, temperature, mu" in capsys.readouterr().err
+    assert main(["master-curve", str(path), "--series", "one"]) == 2
+    assert "a table has no series, got --series one" in capsys.readouterr().err

@@ -117,13 +117,27 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
 
     path = Path("/dev/stdin" if source == "-" else source)
     if path.is_file() or path.is_fifo() or source == "-":
-        return read_table(path)
+        if series is not None:
+            raise click.UsageError(f"a table has no series, got --series {series}")
+        return _rows(read_table(path), selections)
     if "://" not in source and not path.exists():
         raise DataError(f"{source}: no such table or store")
     groups = store.datasets(source)
     if series is None and len(groups) > 1:
         return selection.select(friction_of_roughness(groups), selections)
     return selection.select(selection.group(groups, series), selections)
+
+
+def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
+    """Return the rows of a table whose columns have the values selected."""
+    import numpy as np
+    import xarray as xr
+
+    units = frame.attrs.get("units", {})
+    columns = {name: (name, np.unique(frame[name]), {"units": units.get(name, "1")}) for name in frame.columns}
+    kept = selection.select(xr.Dataset(coords=columns), selections)
+    within = [frame[name].isin(kept[name].to_numpy()) for name in frame.columns]
+    return frame[np.logical_and.reduce(within)]
 
 
 def _kept(source: str) -> xr.Dataset | None:
@@ -153,7 +167,7 @@ def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
     if part == "factors":
         kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
         columns = ("", "_error", "_low", "_high", "_bootstrap")
-        for names in (kept, ("second_factor",)):
+        for names in (kept, ("second_factor", "second_vertical_factor")):
             found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
             shown.extend([curve[found]] if found else [])
     for dataset in shown:

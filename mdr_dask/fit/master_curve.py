@@ -91,8 +91,8 @@ def master_curve(
         ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
         decades), with the range measured at the reference in its attrs; constants of the laws that apply. With two
-        groups also ``second_factor`` over the second one, the constants of its laws, and in the attrs ``second``,
-        ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
+        groups also ``second_factor`` (and ``second_vertical_factor``) over the second one, the constants of its laws,
+        and in the attrs ``second``, ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
 
     Raises
     ------
@@ -103,9 +103,7 @@ def master_curve(
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
     if second is not None:
-        if vertical:
-            raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors")
-        return _of_two_groups(frame, over, values, (by, second), reference, draws)
+        return _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
     groups, curves = _curves(frame, over, values, by)
     zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
     free = superposition.superpose(groups, curves, vertical, None, draws)
@@ -178,7 +176,13 @@ def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 
 
 def _of_two_groups(
-    frame: pd.DataFrame, over: str, values: str, by: tuple[str, str], reference: float | None, draws: int
+    frame: pd.DataFrame,
+    over: str,
+    values: str,
+    by: tuple[str, str],
+    vertical: bool,
+    reference: float | None,
+    draws: int,
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
@@ -195,18 +199,19 @@ def _of_two_groups(
         curves.append(curve)
     a, b = np.array(keys).T
     zero = _nearest(np.unique(a), np.unique(a)[np.unique(a).size // 2] if reference is None else reference)
-    found = two_shifts.superpose_twice(a, b, curves, (zero, float(np.unique(b)[np.unique(b).size // 2])), draws)
+    zeros = zero, float(np.unique(b)[np.unique(b).size // 2])
+    found = two_shifts.superpose_twice(a, b, curves, zeros, draws, vertical=vertical)
     units = frame.attrs.get("units", {})
     dataset = _dataset(found.first, over, values, by[0], units)
-    dataset["point_shift"] = (
-        "point",
-        (found.first.horizontal[found.first.member] + found.second.horizontal[found.second.member]),
-        {"units": "1"},
-    )
+    for name, along in (("point_shift", "horizontal"), ("point_rise", "vertical")):
+        parts = [getattr(part, along)[part.member] for part in (found.first, found.second)]
+        dataset[name] = ("point", parts[0] + parts[1], {"units": "1"})
     dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
     extra = _dataset(found.second, over, values, by[1], units)
     for part in ("", "_error", "_low", "_high", *(("_bootstrap",) if draws else ())):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
+        if vertical:
+            dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     if draws:
         dataset["second_draws"] = extra["draws"]
     laws = _laws(found.first, over, by[0], units.get(by[0], "")) | _laws(
@@ -378,6 +383,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         dataset[name] = curve[name]
     if "point_shift" in curve:
         dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])
+        dataset["point_rise"] = curve["point_rise"] + float(new.vertical[0] - old.vertical[0])
     return dataset.assign_attrs({name: value for name, value in curve.attrs.items() if name not in dataset.attrs})
 
 
