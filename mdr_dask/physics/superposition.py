@@ -186,7 +186,8 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     if problem.vertical:
         shifts, spread = _sampled(problem, shifts, settled, freedom, seed)
         system = System.at(problem, shifts, settled)
-        solution = np.append(system.solve(settled.weight)[: system.splines], shifts)
+        covariance = system.posterior(settled.weight)[1]
+        solution = system.best_curve(settled.weight)
     horizontal, vertical = problem.split(shifts)
     full = np.zeros((2 * problem.curves, 2 * problem.curves))
     places = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][: problem.free]
