@@ -302,6 +302,7 @@ def _dataset(
     dataset["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
     dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
     dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
+    dataset["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
     if result.draws.size:
         for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
             low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
@@ -369,6 +370,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_x=np.log10(curve["curve_abscissa"].to_numpy()),
         curve_y=np.log10(curve["curve_ordinate"].to_numpy()),
         curve_error=curve["curve_error"].to_numpy(),
+        curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
         draws=_drawn(curve),
     )

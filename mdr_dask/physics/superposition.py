@@ -55,7 +55,9 @@ class Superposition:
     member : array of int, shape (points,)
         The group of each.
     curve_x, curve_y, curve_error : array, shape (curve points,)
-        The merged curve with its standard error.
+        The merged curve with its standard error, where the reference is held in place.
+    curve_cross : array, shape (curve points, 2 groups)
+        Covariance of the curve and the factors.
     measured : tuple of float
         Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by
         superposition.
@@ -76,6 +78,7 @@ class Superposition:
     curve_x: FloatArray
     curve_y: FloatArray
     curve_error: FloatArray
+    curve_cross: FloatArray
     measured: tuple[float, float]
     draws: FloatArray
 
@@ -186,8 +189,8 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     if problem.vertical:
         shifts, spread = _sampled(problem, shifts, settled, freedom, seed)
         system = System.at(problem, shifts, settled)
-        covariance = system.posterior(settled.weight)[1]
         solution = system.best_curve(settled.weight)
+        covariance = _widened(system.posterior(settled.weight)[1], system.splines, spread)
     horizontal, vertical = problem.split(shifts)
     full = np.zeros((2 * problem.curves, 2 * problem.curves))
     places = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][: problem.free]
@@ -196,8 +199,10 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     order = np.argsort(x, kind="stable")
     grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
     rows = system.curve(grid)
-    inner = covariance[: system.splines, : system.splines]
-    error = np.sqrt(np.maximum(np.sum((rows @ inner) * rows, axis=1), 0))
+    along = rows @ covariance[: system.splines]
+    error = np.sqrt(np.maximum(np.sum(along[:, : system.splines] * rows, axis=1), 0))
+    cross = np.zeros((grid.size, 2 * problem.curves))
+    cross[:, places] = along[:, system.splines :]
     own = x[problem.member == 0]
     return Superposition(
         values,
@@ -213,9 +218,19 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
         grid,
         rows @ solution[: system.splines],
         error,
+        cross,
         (float(own.min()), float(own.max())),
         np.empty((0, 2 * problem.curves)),
     )
+
+
+def _widened(covariance: FloatArray, splines: int, spread: FloatArray) -> FloatArray:
+    """Return the covariance of curve and shifts with another one of the shifts; the curve depends on them as before."""
+    inner, outer = slice(splines), slice(splines, None)
+    gain = covariance[inner, outer] @ np.linalg.pinv(covariance[outer, outer], hermitian=True)
+    change = spread - covariance[outer, outer]
+    both = np.vstack([gain, np.eye(spread.shape[0])])
+    return np.asarray(covariance + both @ change @ both.T, dtype=np.float64)
 
 
 def _sampled(
@@ -257,6 +272,24 @@ def _require_overlap(result: Superposition) -> None:
         )
 
 
+def moved_with(
+    error: FloatArray, cross: FloatArray, gradient: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return error of a curve that moves with factors, and its covariance with them.
+
+    Parameters
+    ----------
+    error, cross : arrays, shapes (curve points,) and (curve points, factors)
+        As they were.
+    gradient : array, shape (curve points, factors)
+        How far each factor moves the curve up.
+    covariance : array, shape (factors, factors)
+    """
+    along = gradient @ covariance
+    variance = error**2 + np.sum(gradient * (2 * cross + along), axis=1)
+    return np.sqrt(np.maximum(variance, 0)), cross + along
+
+
 def rereference(result: Superposition, reference: float, logarithmic: bool = False) -> Superposition:
     """Return the same master curve with the factors zero at another group, or between two by linear interpolation.
 
@@ -282,6 +315,9 @@ def rereference(result: Superposition, reference: float, logarithmic: bool = Fal
     across, along = float(share @ result.horizontal), float(share @ result.vertical)
     nearest = int(np.argmin(np.abs(places - place)))
     own = result.x[result.member == nearest] - across
+    slope = np.gradient(result.curve_y, result.curve_x)
+    gradient = np.hstack([np.outer(slope, share), -np.outer(np.ones(slope.size), share)])
+    error, cross = moved_with(result.curve_error, result.curve_cross, gradient, result.covariance)
     return replace(
         result,
         horizontal=one @ result.horizontal,
@@ -292,6 +328,8 @@ def rereference(result: Superposition, reference: float, logarithmic: bool = Fal
         y=result.y - along,
         curve_x=result.curve_x - across,
         curve_y=result.curve_y - along,
+        curve_error=error,
+        curve_cross=cross @ change.T,
         measured=(float(own.min()), float(own.max())),
         draws=result.draws @ change.T,
     )

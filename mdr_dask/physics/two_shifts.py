@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition import Superposition, superpose
+from mdr_dask.physics.superposition import Superposition, moved_with, superpose
 
 FloatArray = NDArray[np.float64]
 
@@ -110,7 +110,9 @@ def _split(
     both[kept], covariance[np.ix_(kept, kept)] = project @ target, spread * max(reduced, 1.0)
     drawn = np.zeros((free.draws.shape[0], both.size))
     drawn[:, kept] = free.draws[:, moved] @ (project @ whiten).T
-    summed = _summed(free, design, both.reshape(2, -1))
+    cross = np.zeros((free.curve_x.size, both.size))
+    cross[:, kept] = free.curve_cross[:, moved] @ (project @ whiten).T
+    summed = _summed(replace(free, curve_cross=cross), design, both, covariance)
     own = summed.x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
     own = own if own.size else summed.x[places[0][free.member] == zeros[0]]
     summed = replace(summed, measured=(float(own.min()), float(own.max())))
@@ -121,15 +123,20 @@ def _split(
     return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
 
 
-def _summed(free: Superposition, design: FloatArray, factors: FloatArray) -> Superposition:
-    """Return points and curve shifted by the sums of factors, shape (2, groups), instead of freely."""
-    across, along = factors @ design.T
+def _summed(free: Superposition, design: FloatArray, both: FloatArray, covariance: FloatArray) -> Superposition:
+    """Return points and curve shifted by the sums of factors, horizontal ones first, instead of freely."""
+    across, along = both.reshape(2, -1) @ design.T
+    slope = np.gradient(free.curve_y, free.curve_x)
+    gradient = np.hstack([-np.outer(slope, design[0]), np.outer(np.ones(slope.size), design[0])])
+    error, cross = moved_with(free.curve_error, free.curve_cross, gradient, covariance)
     return replace(
         free,
         x=free.x + (across - free.horizontal)[free.member],
         y=free.y + (along - free.vertical)[free.member],
         curve_x=free.curve_x + across[0],
         curve_y=free.curve_y + along[0],
+        curve_error=error,
+        curve_cross=cross,
     )
 
 
@@ -151,6 +158,7 @@ def _one(
         horizontal=factors[own],
         vertical=factors[factors.size // 2 + own],
         covariance=covariance[np.ix_(kept, kept)],
+        curve_cross=summed.curve_cross[:, kept],
         reference=float(groups[zero]),
         member=place[summed.member],
         draws=drawn[:, kept],

@@ -140,6 +140,31 @@ def test_merged_curve_reaches_beyond_what_was_measured():
     assert np.mean(inside < 3 * result.curve_error + 0.005) > 0.95
 
 
+@pytest.mark.parametrize("vertical", [False, True])
+def test_the_band_of_the_merged_curve_covers_it_where_the_reference_was_measured(vertical):
+    """Six families of four shapes; a curve has a few independent points, so that the share is known to 0.05."""
+    shares = []
+    for shape in [shape for shape in SHAPES if shape != "power"]:
+        for seed in range(3000, 3006):
+            groups, curves, _, _ = family(seed, 0.01, shape=SHAPES[shape], rise=0.02 * vertical)
+            result = superpose(groups, curves, vertical, reference=5.0)
+            own = (result.curve_x > -1) & (result.curve_x < 1)
+            miss = np.abs(result.curve_y - SHAPES[shape](result.curve_x))
+            shares.append(np.mean((miss <= result.curve_error)[own]))
+    assert 0.60 <= np.mean(shares) <= 0.85
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+def test_the_band_does_not_depend_on_the_way_to_the_reference(vertical):
+    groups, curves, _, _ = family(7, rise=0.02)
+    first = superpose(groups, curves, vertical, reference=0.0)
+    one, other = rereference(first, 5.0), rereference(rereference(first, 8.0), 5.0)
+    np.testing.assert_allclose(one.curve_error, other.curve_error, rtol=1e-6)
+    np.testing.assert_allclose(one.curve_cross, other.curve_cross, atol=1e-9)
+    own = np.abs(one.curve_x) < 1
+    assert np.median(one.curve_error[own]) < np.median(one.curve_error[~own])
+
+
 @pytest.mark.parametrize(
     ("groups", "curves", "message"),
     [
