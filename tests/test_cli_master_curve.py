@@ -71,6 +71,8 @@ def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_w
     assert curve.read_text().splitlines()[0] == "curve,curve_abscissa [s],curve_ordinate [MPa],curve_error"
     printed = capsys.readouterr()
     assert "the law wlf misses the factors by" in printed.err
+    assert "1 of 210 points lie off the curve by more than 5 times the scatter" in printed.err
+    assert "decades at T = -49.9392, t = 10: " in printed.err
     assert main(["master-curve", str(other), "--vertical"]) == 2
     assert "is a kept result, of which only --reference may change" in capsys.readouterr().err
 
@@ -99,6 +101,7 @@ def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
     printed = capsys.readouterr()
     assert "second_factor" in printed.out
     assert "chi-squared of the sum" in printed.err
+    assert "points lie off the curve" not in printed.err
     assert figure.stat().st_size > 10_000
     assert main(["master-curve", str(kept), "--reference", "0.001", "--json"]) == 0
     moved = json.loads(capsys.readouterr().out)["data_vars"]

@@ -23,6 +23,9 @@ PARTS = ("factors", "curve", "points")
 """What is printed: the factors, the merged curve with its error, or all points after shifting."""
 
 LAWS = ("power", "arrhenius", "wlf")
+FAR, LEAST = 5.0, 0.002
+"""Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is told."""
+
 FIGURES, KEPT = (".png", ".pdf", ".svg"), (".json", ".csv")
 
 
@@ -204,3 +207,25 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
             click.echo(
                 f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
             )
+    _print_outliers(curve)
+
+
+def _print_outliers(curve: xr.Dataset) -> None:
+    """Say which point lies farthest off the curve, if any lies farther than scatter brings it."""
+    import numpy as np
+
+    x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())
+    merged = np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve["curve_ordinate"].to_numpy())
+    off, scatter = y - np.interp(x, *merged), float(curve.attrs["noise"])
+    far = np.abs(off) > max(FAR * scatter, LEAST)
+    if not far.any():
+        return
+    worst, by, over = int(np.argmax(np.abs(off))), str(curve.attrs["group"]), str(curve.attrs["abscissa"])
+    group = float(curve["point_group"][worst])
+    shift = float(curve["point_shift"][worst] if "point_shift" in curve else curve["shift_factor"].sel({by: group}))
+    click.echo(
+        f"{far.sum()} of {far.size} points lie off the curve by more than {FAR:g} times the scatter, the farthest "
+        f"{off[worst]:+.2g} decades at {by} = {group:.6g}, {over} = {10 ** (x[worst] - shift):.4g}: "
+        "bars know of scatter only, look at the figure",
+        err=True,
+    )
