@@ -39,7 +39,11 @@ FIGURES, KEPT = (".png", ".pdf", ".svg"), (".json", ".csv")
 @click.option("--vertical", is_flag=True, help="Let curves shift along the ordinate too.")
 @click.option("--reference", type=float, help="Where the factors are zero, in the units of --by; interpolated.")
 @click.option(
-    "--bootstrap", default=0, show_default=True, help="Bootstrap samples, for a second opinion on the errors."
+    "--bootstrap",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Bootstrap samples, for a second opinion on the errors.",
 )
 @click.option(
     "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
