@@ -282,6 +282,7 @@ def _dataset(
             "reference": result.reference,
             "noise": result.noise,
             "freedom": result.freedom,
+            "sampled": result.sampled,
         },
     )
     narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
@@ -373,6 +374,7 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
         draws=_drawn(curve),
+        sampled=float(curve.attrs["sampled"]),
     )
     units = {
         by: curve[by].attrs.get("units", ""),

@@ -32,9 +32,10 @@ LEAST_WEIGHT = 1e-3
 """Weight, relative to the largest, below which a point is left out."""
 
 
-def sample(problem: Problem, shifts: FloatArray, settled: Settled, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Return mean and covariance of the posterior of the shifts; curve, smoothness and scatter are unknown too.
+def sample(problem: Problem, shifts: FloatArray, settled: Settled, seed: int) -> tuple[FloatArray, FloatArray, float]:
+    """Return mean and covariance of the posterior of the shifts, and how many points of even weight they rest on.
 
+    The curve, its smoothness and the scatter are unknown too.
     Vertical shifts and the curve are integrated out in closed form. The rest is drawn from Student's t, in stages: the
     first is that of the linearised problem, each other has the middle and the shape that all points before tell of, and
     all points count, by the mixture of all stages.
@@ -67,7 +68,7 @@ def sample(problem: Problem, shifts: FloatArray, settled: Settled, seed: int) ->
     heights, spread = shift_marginal.heights_of(points, weights, *data, expected)
     mean, covariance = shift_sampling.moments(np.hstack([points[:, :curves], heights]), weights)
     covariance[curves:, curves:] += spread
-    return mean, covariance
+    return mean, covariance, cloud.worth(1.0)
 
 
 class _Cloud:

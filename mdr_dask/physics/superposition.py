@@ -63,6 +63,9 @@ class Superposition:
         superposition.
     draws : array, shape (draws, 2 groups)
         Bootstrap samples of the factors; none unless asked for.
+    sampled : float
+        Number of points of even weight on which vertical fits rest: below some 200 their bars are rough. 0 where
+        nothing was sampled.
     """
 
     groups: FloatArray
@@ -81,6 +84,7 @@ class Superposition:
     curve_cross: FloatArray
     measured: tuple[float, float]
     draws: FloatArray
+    sampled: float = 0.0
 
     @property
     def horizontal_error(self) -> FloatArray:
@@ -185,9 +189,9 @@ def _fit(
 def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: FloatArray, seed: int) -> Superposition:
     system = System.at(problem, shifts, settled)
     solution, covariance, noise, freedom = system.posterior(settled.weight)
-    spread = covariance[system.splines :, system.splines :]
+    spread, sampled = covariance[system.splines :, system.splines :], 0.0
     if problem.vertical:
-        shifts, spread = _sampled(problem, shifts, settled, freedom, seed)
+        shifts, spread, sampled = _sampled(problem, shifts, settled, freedom, seed)
         system = System.at(problem, shifts, settled)
         solution = system.best_curve(settled.weight)
         covariance = _widened(system.posterior(settled.weight)[1], system.splines, spread)
@@ -221,6 +225,7 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
         cross,
         (float(own.min()), float(own.max())),
         np.empty((0, 2 * problem.curves)),
+        sampled,
     )
 
 
@@ -235,10 +240,10 @@ def _widened(covariance: FloatArray, splines: int, spread: FloatArray) -> FloatA
 
 def _sampled(
     problem: Problem, shifts: FloatArray, settled: Settled, freedom: float, seed: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and covariance of the posterior, the latter as the square of a scale for Student's t."""
-    mean, covariance = sample(problem, shifts, settled, seed)
-    return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5)
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return mean and covariance of the posterior, as the square of a scale for Student's t, and the points drawn."""
+    mean, covariance, points = sample(problem, shifts, settled, seed)
+    return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5), points
 
 
 def _bootstrap(problem: Problem, shifts: FloatArray, settled: Settled, draws: int, seed: int) -> FloatArray:

@@ -96,8 +96,19 @@ def test_many_more_points_change_bars_by_little(monkeypatch):
     few = shift_posterior.sample(data, shifts, Settled(0.01, 1e-4), 0)
     again = shift_posterior.sample(data, shifts, Settled(0.01, 1e-4), 0)
     assert all(np.array_equal(one, other) for one, other in zip(few, again, strict=True))
-    monkeypatch.setattr(shift_posterior, "ENOUGH", 8000.0)
+    monkeypatch.setattr(shift_posterior, "ENOUGH", 5000.0)
     many = shift_posterior.sample(data, shifts, Settled(0.01, 1e-4), 1)
     wide = np.sqrt(np.diag(many[1]))
     np.testing.assert_allclose(np.sqrt(np.diag(few[1])) / wide, 1, atol=0.15)
     assert np.max(np.abs(few[0] - many[0]) / wide) < 0.2
+    assert 500 <= few[2] < 5000 <= many[2]
+
+
+def test_too_few_points_are_told(monkeypatch):
+    monkeypatch.setattr(shift_posterior, "MOST_STAGES", 1)
+    data = replace(problem(6, 20, 0.01), vertical=True)
+    shifts = np.concatenate([0.4 * np.arange(1, 6), 0.1 * np.arange(1, 6)])
+    mean, covariance, points = shift_posterior.sample(data, shifts, Settled(0.01, 1e-4), 0)
+    assert 1 <= points < 500
+    assert np.all(np.isfinite(mean))
+    assert np.all(np.diag(covariance) > 0)
