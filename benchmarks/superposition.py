@@ -20,7 +20,7 @@ SHAPES = {
     "flat plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
 }
 SCATTER = (0.003, 0.01, 0.03)
-FIRST_SEED = {False: 500_000, True: 800_000}
+FIRST_SEED = {False: 500_000, True: 1_200_000}
 RISE = 0.02
 
 
