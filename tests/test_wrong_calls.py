@@ -46,14 +46,14 @@ WRONG = [
     ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
     ("plot STORE nothing", "no figure of sliding_friction is called 'nothing'; known: regions, velocity"),
     ("plot STORE velocity --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
-    ("plot STORE velocity -o velocity.bmp", "expected a file that ends in .png, .pdf, .svg, got 'velocity.bmp'"),
+    ("plot STORE velocity -o velocity.bmp", "expected a file that ends in .png, .pdf or .svg, got 'velocity.bmp'"),
     ("plot STORE velocity force -o both.png", "expected a folder for the figures, got 'both.png'"),
     ("plot STORE velocity -o small.yaml/x.png", "small.yaml/x.png: Not a directory"),
     ("figures small.yaml --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
     ("schema -o small.yaml/x.json", "small.yaml/x.json: Not a directory"),
-    ("master-curve nowhere.csv", "nowhere.csv: no store here"),
+    ("master-curve nowhere.csv", "nowhere.csv: no such table or store"),
     ("master-curve STORE --bootstrap -1", "-1 is not in the range x>=0"),
-    ("master-curve STORE --over velocity --plot x.bmp", "expected a file that ends in .png, .pdf, .svg, got 'x.bmp'"),
+    ("master-curve STORE --over velocity --plot x.bmp", "expected a file that ends in .png, .pdf or .svg, got 'x.bmp'"),
 ]
 
 

@@ -10,7 +10,7 @@ import click
 
 from mdr_dask.cli import selection
 from mdr_dask.cli.printing import print_json, print_rows, table, with_errors, with_intervals
-from mdr_dask.cli.writing import FORMATS, figure_file, format_option, writing
+from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -183,8 +183,7 @@ def aggregate(
 def _check_target(path: Path) -> None:
     from mdr_dask.store import is_study
 
-    if path.suffix not in (".zarr", ".nc", ".csv"):
-        raise click.UsageError(f"expected a file that ends in .zarr, .nc or .csv, got {str(path)!r}")
+    require_suffix(path, (".zarr", ".nc", ".csv"))
     if path.suffix == ".zarr" and is_study(str(path)):
         raise click.UsageError(f"expected a place for the statistics, got the store of a study: {str(path)!r}")
 
@@ -298,7 +297,8 @@ def _places(output: Path | None, alone: bool) -> tuple[Path, Path | None]:
     if not folder.suffix or folder.is_dir():
         return folder, None
     if alone:
-        return folder, figure_file(folder)
-    if folder.suffix[1:].lower() in FORMATS:
+        require_suffix(folder, FIGURES)
+        return folder, folder
+    if folder.suffix in FIGURES:
         raise click.UsageError(f"expected a folder for the figures, got {str(folder)!r}")
     return folder, None

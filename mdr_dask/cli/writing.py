@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 FORMATS = ("png", "pdf", "svg")
+FIGURES = tuple(f".{name}" for name in FORMATS)
 format_option = click.option(
     "--format", "suffix", type=click.Choice(FORMATS), default=FORMATS[0], show_default=True, help="png, pdf or svg."
 )
@@ -31,14 +32,15 @@ def writing(path: Path) -> Iterator[None]:
         raise
 
 
-def figure_file(path: Path) -> Path:
-    """Return the path of a figure.
+def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
+    """Refuse the name of a file that does not end in any of these.
 
     Raises
     ------
     click.UsageError
-        If it does not end as one does.
+        If there is a name, with another end.
     """
-    if path.suffix[1:].lower() not in FORMATS:
-        raise click.UsageError(f"expected a file that ends in .{', .'.join(FORMATS)}, got {str(path)!r}")
-    return path
+    if path is not None and path.suffix not in known:
+        raise click.UsageError(
+            f"expected a file that ends in {', '.join(known[:-1])} or {known[-1]}, got {str(path)!r}"
+        )
