@@ -20,8 +20,8 @@ SAFETY = 3.0  # see docs/friction.md for how honest it makes the estimate
 CLOSE = 0.005  # change of the depth between grids that is taken from the tangent
 SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
 RESTART = 4  # oversampling of the sweeps over what is left
-SAMPLED = 4  # oversampling of a line that cases go along from node to node
-REFINEMENTS = (1, 2, 4, 8, 16, 32)  # of the cells of the first of these grids, where they are touched
+SAMPLED = 2  # oversampling of a line that cases go along from node to node
+REFINEMENTS = (1, 2, 4, 8, 16, 32)  # of the cells of half the width, where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
 # of the last change of the drag between grids, and of the one before; see docs/friction.md
 QUICK_SAFETY, QUICK_MEMORY = 0.6, 0.06
@@ -136,12 +136,11 @@ class Task:
 
     def _sampled(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve cases from node to node; the error is infinite where that gives nothing."""
-        from mdr_dask.physics import sampled, sliding
+        from mdr_dask.physics import sampled, sampled_nodes, sliding
 
         steady, error = sliding.unsolved(self.loads.size), np.full(self.loads.size, np.inf)
         left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
         height, slope = self.nodes(SAMPLED, "hermite")
-        line = sampled.nodes(height, slope, 1, True)
         coarse, fine = sampled.begin(height, slope, self.reaches[left], self.loads[left], ROUGHLY * accuracy)
         before = sampled.Change(np.zeros(left.size), np.zeros(left.size))
         for grids, refinement in enumerate(REFINEMENTS, 2):
@@ -156,6 +155,8 @@ class Task:
             if not left.size or refinement == REFINEMENTS[-1]:
                 break
             cases = self.reaches[left], self.loads[left]
+            if refinement == REFINEMENTS[0]:
+                line = sampled_nodes.nodes(*sampled_nodes.halved(height, slope), 1, True)
             coarse, fine = fine, sampled.settle(line, refinement, *cases, (coarse, fine), TRUSTED * accuracy)
         return steady, error
 

@@ -334,7 +334,7 @@ def memory(block: Block[SlidingFriction]) -> float:
 
 MODEL = Model(
     name="sliding_friction",
-    version=4,
+    version=5,
     summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
     parameters=SlidingFriction,
     outputs=OUTPUTS,

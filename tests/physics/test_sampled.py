@@ -1,14 +1,15 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics import roughness, sampled, sliding
+from mdr_dask.physics import roughness, sampled, sampled_nodes, sliding
+from mdr_dask.physics.sampled_nodes import halved, nodes, refine, weights
 
 POINTS, MODES = 400, 200
 LOADS = np.geomspace(1e-3, 30, 7)
 REACHES = np.geomspace(1e-6, 10, 6)
 
 
-def line(hurst=0.7, oversampling=4, realisation=0):
+def line(hurst=0.7, oversampling=2, realisation=0):
     amplitude, phase = roughness.amplitudes(MODES, hurst), roughness.phases(3, realisation, MODES)
     height, slope = (roughness.line(amplitude, phase, POINTS * oversampling, order) for order in (0, 1))
     return height, slope, roughness.spectral_slope(amplitude)
@@ -23,7 +24,7 @@ def settled(refinement, hurst=0.7):
     height, slope, _ = line(hurst)
     reaches, loads = cases()
     states = sampled.begin(height, slope, reaches, loads, 5e-3)
-    whole = sampled.nodes(height, slope, 1, True)
+    whole = nodes(*halved(height, slope), 1, True)
     grid = 1
     while grid <= refinement:
         states = states[-1], sampled.settle(whole, grid, reaches, loads, states, 1e-3)
@@ -58,12 +59,12 @@ def test_full_contact_is_exact_on_any_grid():
 
 
 def test_a_finer_grid_lies_on_the_line():
-    height, slope, _ = line()
+    height, slope, _ = line(oversampling=4)
     fine, fine_slope, _ = line(oversampling=16)
-    whole = sampled.nodes(height, slope, 1, True)
+    whole = nodes(height, slope, 1, True)
     top = int(np.argmax(height))
     got_height, got_slope = np.empty(4 * 50 + 3), np.empty(4 * 50 + 3)
-    sampled._refine(whole, sampled.BEFORE, 50, sampled._weights(4), got_height, got_slope)
+    refine(whole, sampled_nodes.BEFORE, 50, weights(4), got_height, got_slope)
     expected = np.arange(-1, 4 * 50 + 2) + 4 * top
     # polynomials of degree 7 over two nodes a shortest half wave
     scale = np.std(fine)
@@ -71,11 +72,21 @@ def test_a_finer_grid_lies_on_the_line():
     assert got_slope == pytest.approx(np.take(fine_slope, expected, mode="wrap") / fine.size, abs=1e-5 * scale)
 
 
+@pytest.mark.parametrize("hurst", [0.0, 0.7])
+def test_cells_of_half_the_width_lie_on_the_line(hurst):
+    amplitude = roughness.amplitudes(MODES, hurst)
+    height, slope = halved(*line(hurst)[:2])
+    fine, fine_slope, _ = line(hurst, oversampling=4)
+    shortest = amplitude[-1]
+    assert height == pytest.approx(fine, abs=1e-6 * shortest)
+    assert slope == pytest.approx(fine_slope, abs=1e-7 * 2 * np.pi * MODES * shortest)
+
+
 @pytest.mark.parametrize("count", [1, 5, 42])
 def test_a_case_is_the_same_among_any_others(count):
     height, slope, _ = line(0.3)
     reaches, loads = cases()
-    whole = sampled.nodes(height, slope, 1, True)
+    whole = nodes(*halved(height, slope), 1, True)
 
     def solve(some):
         states = sampled.begin(height, slope, reaches[some], loads[some], 5e-3)
@@ -89,13 +100,13 @@ def test_a_case_is_the_same_among_any_others(count):
 
 
 def test_a_line_that_does_not_divide_by_the_blocks():
-    # 52 modes: 208 nodes, 6 blocks of 32 and 16 more
+    # 26 modes: 104 and 208 nodes, 3 and 6 blocks of 32 and 8 and 16 more
     amplitude, phase = roughness.amplitudes(26, 0.8), roughness.phases(3, 1, 26)
-    height, slope = (roughness.line(amplitude, phase, 208, order) for order in (0, 1))
+    height, slope = (roughness.line(amplitude, phase, 104, order) for order in (0, 1))
     fine = [roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)]
     reaches, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
     states = sampled.begin(height, slope, reaches, loads, 5e-3)
-    whole = sampled.nodes(height, slope, 1, True)
+    whole = nodes(*halved(height, slope), 1, True)
     for refinement in (1, 2, 4):
         states = states[-1], sampled.settle(whole, refinement, reaches, loads, states, 1e-3)
     assert states[-1].drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
