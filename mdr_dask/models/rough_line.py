@@ -21,11 +21,13 @@ CLOSE = 0.005  # change of the depth between grids that is taken from the tangen
 SEARCH = 1e-8  # bound of the error of the search for the depth, and of rounding
 RESTART = 4  # oversampling of the sweeps over what is left
 SAMPLED = 2  # oversampling of a line that cases go along from node to node
-REFINEMENTS = (1, 2, 4, 8, 16, 32)  # of the cells of half the width, where they are touched
+REFINEMENTS = (1, 2, 4, 8, 16, 32, 64, 128, 256)  # of the cells of half the width, where they are touched
 QUICKEST = 2e-3  # accuracy that needs more than that
 # of the last change of the drag between grids, and of the one before; see docs/friction.md
 QUICK_SAFETY, QUICK_MEMORY = 0.6, 0.06
+HOPE = 2  # of them, from which on a grid without a solution ends the way from node to node
 FEW = 10  # nodes in contact that are too few to go from node to node
+PROFILE = 1e-5  # of the profile between nodes, under the lightest contacts
 MANY, SAFETY_OF_MANY = 1000, 0.4  # nodes in contact whose errors are an average
 # on the first three grids: of the change of the drag with so many nodes, of that of the contact, and of those before
 OF_DRAG, OF_CONTACT, OF_DRAG_BEFORE, OF_CONTACT_BEFORE = 0.12, 0.15, 0.02, 0.03
@@ -136,7 +138,7 @@ class Task:
 
     def _sampled(self, accuracy: float) -> tuple[Steady, FloatArray]:
         """Solve cases from node to node; the error is infinite where that gives nothing."""
-        from mdr_dask.physics import sampled, sampled_nodes, sliding
+        from mdr_dask.physics import sampled, sliding
 
         steady, error = sliding.unsolved(self.loads.size), np.full(self.loads.size, np.inf)
         left = np.flatnonzero(sliding.valid(self.reaches, self.loads))
@@ -146,17 +148,18 @@ class Task:
         for grids, refinement in enumerate(REFINEMENTS, 2):
             found, change = sampled.extrapolated(coarse, fine)
             touching = fine.contact_fraction * self.line.points * 2 * refinement
-            estimate = _estimate(grids, touching, change, before) + fine.doubt + sampled.EXTRAPOLATED * coarse.doubt
+            estimate = _estimate(grids, touching, change, before) + PROFILE
+            estimate += fine.doubt + sampled.EXTRAPOLATED * coarse.doubt
             error[left] = np.where(np.isfinite(estimate), estimate, np.inf)
             steady = steady.replaced(left, found)
-            still = ~(error[left] <= accuracy)
+            still = ~(error[left] <= accuracy) & (np.isfinite(fine.drag) | (refinement <= HOPE))
             left, before = left[still], change.only(still)
             coarse, fine = coarse.only(still), fine.only(still)
             if not left.size or refinement == REFINEMENTS[-1]:
                 break
             cases = self.reaches[left], self.loads[left]
             if refinement == REFINEMENTS[0]:
-                line = sampled_nodes.nodes(*sampled_nodes.halved(height, slope), 1, True)
+                line = sampled.finer(height, slope)
             coarse, fine = fine, sampled.settle(line, refinement, *cases, (coarse, fine), TRUSTED * accuracy)
         return steady, error
 

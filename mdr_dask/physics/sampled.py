@@ -13,7 +13,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from mdr_dask.physics.sampled_nodes import AFTER, BEFORE, BLOCK, FloatArray, Nodes, nodes, weights
+from mdr_dask.physics.sampled_nodes import (
+    AFTER,
+    BEFORE,
+    BLOCK,
+    FloatArray,
+    Nodes,
+    after_summit,
+    halved,
+    nodes,
+    summit,
+    weights,
+)
 from mdr_dask.physics.sampled_walk import (
     DEPTH,
     LANES,
@@ -24,6 +35,7 @@ from mdr_dask.physics.sampled_walk import (
     REACH,
     ROOM,
     STRETCH,
+    closed,
     load_case,
     sweep,
 )
@@ -85,6 +97,7 @@ class Change:
 def _solve(
     line: Nodes,
     weights: FloatArray,
+    rise: float,
     reaches: FloatArray,
     loads: FloatArray,
     near_step: float,
@@ -99,14 +112,16 @@ def _solve(
     ----------
     line : Nodes
         The line on a grid.
-    weights : array, shape (2, refinement, 8)
+    weights : array, shape (2, refinement, 12)
         From `weights`.
+    rise : float
+        Height of the summit over the highest node.
     reaches, loads : array, shape (cases,)
         v tau / L, and F_N / (4 G L) in the unit of height.
     near_step, trusted : float
         Bounds of the last relative step of the depth and of what it costs.
     depths, rates : array, shape (cases,)
-        Penetration of the highest node, and relative change of the drag with it, NaN where it is not known; read and
+        Penetration of the summit, and relative change of the drag with it, NaN where it is not known; read and
         written.
     results : array, shape (cases, 4)
         Written: F_x / (4 G), length in contact over length of the line, rms slope over it, and a bound of the relative
@@ -117,13 +132,13 @@ def _solve(
     local = np.empty((2, cells + 3))
     room, near = np.zeros(ROOM * LANES), np.zeros(ROOM * LANES)
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
-    last_step, last_drag, done = np.empty(LANES), np.empty(LANES), np.empty(LANES, np.int64)
+    last_step, last_drag = np.empty(LANES), np.empty(LANES)
     for begin in range(0, loads.size, LANES):
         count = min(LANES, loads.size - begin)
         for k in range(count):
-            lanes[k], done[k] = begin + k, 0
+            lanes[k] = begin + k
             last_step[k] = last_drag[k] = np.nan
-            load_case(room, k, depths[begin + k], reaches[begin + k] * n, cells)
+            load_case(room, k, depths[begin + k] - rise, reaches[begin + k] * n, cells)
             results[begin + k] = np.nan
         for _ in range(ITERATIONS):
             if count == 0:
@@ -132,7 +147,7 @@ def _solve(
             kept = 0
             for k in range(count):
                 case = lanes[k]
-                depth, drag = room[DEPTH * LANES + k], room[LOSS * LANES + k]
+                depth, drag = room[DEPTH * LANES + k] + rise, room[LOSS * LANES + k]
                 step = (loads[case] * n - room[LOAD * LANES + k]) / room[RATE * LANES + k]
                 size = abs(step) / depth
                 rate = (1 - last_drag[k] / drag) / last_step[k]
@@ -140,7 +155,7 @@ def _solve(
                 doubt = DOUBTED * abs(rate * step)
                 if size < EXACT_STEP:
                     rate, doubt = (rate if math.isfinite(rate) else 0.0), 0.0
-                if size <= near_step and doubt <= trusted:
+                if size <= near_step and doubt <= trusted and closed(room, k):
                     depths[case], rates[case] = depth + step, rate
                     length, stretch = room[LENGTH * LANES + k], room[STRETCH * LANES + k]
                     results[case, 0] = drag * (1 + rate * step)
@@ -150,7 +165,7 @@ def _solve(
                     continue
                 ahead = depth + step if step > -0.7 * depth else 0.3 * depth
                 last_step[kept], last_drag[kept], lanes[kept] = ahead - depth, drag, case
-                load_case(room, kept, ahead, room[REACH * LANES + k], cells)
+                load_case(room, kept, ahead - rise, room[REACH * LANES + k], cells)
                 kept += 1
             count = kept
 
@@ -173,16 +188,23 @@ def begin(
     strides = [1, 2]
     while height.size > COARSENING * COARSEST * strides[-1]:
         strides.append(strides[-1] * COARSENING)
-    depths, results = np.maximum(loads, loads ** (2 / 3)), np.empty((loads.size, 4))
+    depths, results = _shallow(loads), np.empty((loads.size, 4))
     rates = np.full(loads.size, np.nan)
+    highest = int(np.argmax(height))
     found = []
     for stride in reversed(strides):
-        line = nodes(height, slope, stride, stride <= strides[1])
+        line = nodes(height, slope, highest, stride, stride <= strides[1])
         bounds = (ANSWER_STEP, trusted) if stride == 1 else START
-        _solve(line, weights(1), reaches, loads, *bounds, depths, rates, results)
+        _solve(line, weights(1), 0.0, reaches, loads, *bounds, depths, rates, results)
         if stride <= strides[1]:
-            found.append(_sampled(line, depths, rates, results.copy()))
+            found.append(_sampled(line.top, depths, rates, results.copy()))
     return found[0], found[1]
+
+
+def finer(height: FloatArray, slope: FloatArray) -> Nodes:
+    """Return the line that :func:`begin` was given on cells of half the width, from its summit on."""
+    height, slope = halved(height, slope)
+    return nodes(height, slope, after_summit(height, slope), 1, True)
 
 
 def settle(
@@ -198,7 +220,7 @@ def settle(
     Parameters
     ----------
     line : Nodes
-        The line that :func:`begin` was given on cells of half the width.
+        The line that :func:`begin` was given, from :func:`finer`.
     refinement : int
         Cells of the finer grid for each of the line.
     reaches, loads : array, shape (cases,)
@@ -210,16 +232,23 @@ def settle(
     """
     coarse, fine = grids
     ahead = (DEEPER_FIRST if refinement == 1 else DEEPER) * (fine.depth - coarse.depth)
-    depths = fine.depth + line.top
+    rise = summit(line)
+    depths = fine.depth + (line.top + rise)
     depths += np.where(np.abs(ahead) < NEAR * depths, ahead, 0.0)
+    depths = np.where(depths > 0, depths, _shallow(loads))
     rates, results = fine.rate.copy(), np.empty((loads.size, 4))
-    _solve(line, weights(refinement), reaches, loads, ANSWER_STEP, trusted, depths, rates, results)
-    return _sampled(line, depths, rates, results)
+    _solve(line, weights(refinement), rise, reaches, loads, ANSWER_STEP, trusted, depths, rates, results)
+    return _sampled(line.top + rise, depths, rates, results)
 
 
-def _sampled(line: Nodes, depths: FloatArray, rates: FloatArray, results: FloatArray) -> Sampled:
+def _shallow(loads: FloatArray) -> FloatArray:
+    """Return a penetration of the summit to begin with, where nothing is known."""
+    return np.maximum(loads, loads ** (2 / 3))
+
+
+def _sampled(top: float, depths: FloatArray, rates: FloatArray, results: FloatArray) -> Sampled:
     drag, fraction, slope, doubt = results.T
-    return Sampled(depths - line.top, rates, drag, fraction, slope, doubt)
+    return Sampled(depths - top, rates, drag, fraction, slope, doubt)
 
 
 def extrapolated(coarse: Sampled, fine: Sampled) -> tuple[Steady, Change]:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 BLOCK = 32  # cells
-BEFORE, AFTER = 3, 4  # nodes of the turns before and after
+BEFORE, AFTER = 4, 5  # nodes of the turns before and after, as many as `refine` reads
+TINY = 1e-300
+SUMMIT = 64  # nodes in a cell that its highest point is taken from
 WING = 4  # nodes to either side that the middle of a cell follows from
 
 # What is known of a block of cells, in this order
@@ -21,16 +23,16 @@ KNOWN = 5
 
 
 class Nodes(NamedTuple):
-    """A periodic line from its highest node on a grid of n cells.
+    """A periodic line on a grid of n cells.
 
     Parameters
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
-        With nodes of the turns before and after; heights from the highest, rise over a cell.
+        With nodes of the turns before and after; heights from the first, rise over a cell.
     blocks : array, shape (n // BLOCK, KNOWN)
         Bounds and sums over the cells of a block.
     top : float
-        The height of the highest node.
+        The height of the first node.
     """
 
     height: FloatArray
@@ -56,21 +58,39 @@ def slope_square(s: FloatArray, i: int) -> float:
 
 
 @njit(nogil=True, cache=True)
-def nodes(height: FloatArray, slope: FloatArray, stride: int, resolved: bool) -> Nodes:
-    """Take every stride-th node of a line, its highest among them; differences for slopes if it is not resolved.
+def after_summit(height: FloatArray, slope: FloatArray) -> int:
+    """Return the node after the cell that holds the highest point of a line."""
+    n = height.size
+    best, highest = 0, -np.inf
+    for i in range(n):
+        following = i + 1 if i + 1 < n else 0
+        enter, leave = slope[i] / n, slope[following] / n
+        if enter >= 0 >= leave and max(height[i], height[following]) + 0.125 * (enter - leave) > highest:
+            x = enter / (enter - leave + TINY)
+            rise = height[following] - height[i]
+            peak = height[i] + x * (enter + x * (3 * rise - 2 * enter - leave + x * (enter + leave - 2 * rise)))
+            if peak > highest:
+                best, highest = following, peak
+    return best
+
+
+@njit(nogil=True, cache=True)
+def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool) -> Nodes:
+    """Take every stride-th node of a line; differences for slopes if it is not resolved.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
         Heights and derivatives by position over the length of the line.
+    first : int
+        The node to begin with; heights are from there.
     """
     n = height.size // stride
-    top = np.argmax(height)
     h, s = np.empty(n + BEFORE + AFTER), np.empty(n + BEFORE + AFTER)
-    highest = height[top]
-    source = top
+    top = height[first]
+    source = first
     for i in range(BEFORE, n + BEFORE):
-        h[i] = height[source] - highest
+        h[i] = height[source] - top
         s[i] = slope[source] / n
         source += stride
         source = source if source < height.size else source - height.size
@@ -81,9 +101,9 @@ def nodes(height: FloatArray, slope: FloatArray, stride: int, resolved: bool) ->
     _close(s)
     blocks = np.empty((n // BLOCK, KNOWN))
     for j in range(blocks.shape[0]):
-        first, last = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
+        last = BEFORE + (j + 1) * BLOCK
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
-        for i in range(first, last):
+        for i in range(last - BLOCK, last):
             bend = s[i] - s[i + 1]
             above = max(h[i], h[i + 1]) + 0.125 * max(bend, 0.0)
             peak, lowest, steepest = max(peak, above), min(lowest, h[i]), min(steepest, s[i])
@@ -91,7 +111,7 @@ def nodes(height: FloatArray, slope: FloatArray, stride: int, resolved: bool) ->
             squares += slope_square(s, i)
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
-    return Nodes(h, s, blocks, highest)
+    return Nodes(h, s, blocks, top)
 
 
 def _hermite(places: FloatArray, x: float) -> FloatArray:
@@ -114,11 +134,11 @@ def _hermite(places: FloatArray, x: float) -> FloatArray:
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return how the nodes of a finer grid follow from two nodes to either side, shape (2, refinement, 8).
+    """Return how the nodes of a finer grid follow from three nodes to either side, shape (2, refinement, 12).
 
     Rows are as in `_hermite`, for every node in a cell.
     """
-    return np.stack([_hermite(np.arange(-1.0, 3.0), step / refinement) for step in range(refinement)], axis=1)
+    return np.stack([_hermite(np.arange(-2.0, 4.0), step / refinement) for step in range(refinement)], axis=1)
 
 
 def halved(height: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -166,9 +186,17 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
         cell = place // refinement
-        step, i = place - cell * refinement, first + cell
+        step, i = place - cell * refinement, first + cell - 2
         value, rate = 0.0, 0.0
-        for k in range(4):
-            value += weights[0, step, k] * h[i - 1 + k] + weights[0, step, 4 + k] * s[i - 1 + k]
-            rate += weights[1, step, k] * h[i - 1 + k] + weights[1, step, 4 + k] * s[i - 1 + k]
+        for k in range(6):
+            value += weights[0, step, k] * h[i + k] + weights[0, step, 6 + k] * s[i + k]
+            rate += weights[1, step, k] * h[i + k] + weights[1, step, 6 + k] * s[i + k]
         height[place + 1], slope[place + 1] = value, rate / refinement
+
+
+def summit(line: Nodes) -> float:
+    """Return how high over the first node the line reaches in the cell before it."""
+    table = weights(SUMMIT)
+    height, slope = np.empty((2, SUMMIT + 3))
+    refine(line, BEFORE - 1, 1, table, height, slope)
+    return max(float(np.max(height[1:-1])), 0.0)

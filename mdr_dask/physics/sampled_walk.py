@@ -34,11 +34,12 @@ from mdr_dask.physics.sampled_nodes import (
 LANES = 64  # cases that go along the line together
 VECTOR = 8
 SMALL, LARGE = 1e-300, 1e12
+CLOSED = 1e-9  # relative difference of the displacement before and after a turn
 
 # What a sweep holds of a case, in this order: its state, sums, and what does not change
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(8)
-DEPTH, REACH, DECAY, INVERSE, THROUGH = range(8, 13)
-ROOM = 13
+DEPTH, REACH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
+ROOM = 14
 STATES = DEPTH
 
 
@@ -170,19 +171,20 @@ def sweep(
     queue: NDArray[np.int64],
     count: int,
 ) -> None:
-    """Follow one element of every case along the line, from its highest node back to it.
+    """Follow one element of every case along the line, from its summit back to it.
 
     Blocks that a case touches or leaves in are gone along on the finer grid that the weights make, in `local`.
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
     full = -(-count // VECTOR) * VECTOR
-    # the highest point may lie in the cell before the highest node
+    # the summit, where every case touches, lies in the cell before the first one
     refine(line, BEFORE - 1, 1, weights, local[0], local[1])
     for k in range(count):
         room[U * LANES + k] = max(room[DEPTH * LANES + k] + line.height[BEFORE - 1], 0.0)
         room[FADE * LANES + k] = room[CONTACT * LANES + k] = 1.0
     _walk(local[0], local[1], 1, 1 + refinement, room, full)
+    room[BEGAN * LANES : ROOM * LANES] = room[U * LANES : FADE * LANES]
     room[LOAD * LANES : STATES * LANES] = 0.0
     for j in range(blocks.shape[0]):
         first, end = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
@@ -207,3 +209,10 @@ def load_case(room: FloatArray, k: int, depth: float, reach: float, cells: int) 
     """Write what does not change of a case on a grid."""
     room[DEPTH * LANES + k], room[REACH * LANES + k], room[INVERSE * LANES + k] = depth, reach, min(1 / reach, LARGE)
     room[DECAY * LANES + k], room[THROUGH * LANES + k] = math.exp(-1 / reach), math.exp(-cells / reach)
+
+
+@njit(nogil=True, cache=True, inline="always")
+def closed(room: FloatArray, k: int) -> bool:
+    """Return whether a case ended its turn as it began it: not so where the first cell is not touched."""
+    same: bool = abs(room[U * LANES + k] - room[BEGAN * LANES + k]) <= CLOSED * room[U * LANES + k]
+    return same

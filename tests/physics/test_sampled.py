@@ -24,7 +24,7 @@ def settled(refinement, hurst=0.7):
     height, slope, _ = line(hurst)
     reaches, loads = cases()
     states = sampled.begin(height, slope, reaches, loads, 5e-3)
-    whole = nodes(*halved(height, slope), 1, True)
+    whole = sampled.finer(height, slope)
     grid = 1
     while grid <= refinement:
         states = states[-1], sampled.settle(whole, grid, reaches, loads, states, 1e-3)
@@ -61,15 +61,15 @@ def test_full_contact_is_exact_on_any_grid():
 def test_a_finer_grid_lies_on_the_line():
     height, slope, _ = line(oversampling=4)
     fine, fine_slope, _ = line(oversampling=16)
-    whole = nodes(height, slope, 1, True)
     top = int(np.argmax(height))
+    whole = nodes(height, slope, top, 1, True)
     got_height, got_slope = np.empty(4 * 50 + 3), np.empty(4 * 50 + 3)
     refine(whole, sampled_nodes.BEFORE, 50, weights(4), got_height, got_slope)
     expected = np.arange(-1, 4 * 50 + 2) + 4 * top
-    # polynomials of degree 7 over two nodes a shortest half wave
+    # polynomials of degree 11 over four nodes a shortest half wave
     scale = np.std(fine)
-    assert got_height + whole.top == pytest.approx(np.take(fine, expected, mode="wrap"), abs=1e-5 * scale)
-    assert got_slope == pytest.approx(np.take(fine_slope, expected, mode="wrap") / fine.size, abs=1e-5 * scale)
+    assert got_height + whole.top == pytest.approx(np.take(fine, expected, mode="wrap"), abs=1e-9 * scale)
+    assert got_slope == pytest.approx(np.take(fine_slope, expected, mode="wrap") / fine.size, abs=1e-9 * scale)
 
 
 @pytest.mark.parametrize("hurst", [0.0, 0.7])
@@ -86,7 +86,7 @@ def test_cells_of_half_the_width_lie_on_the_line(hurst):
 def test_a_case_is_the_same_among_any_others(count):
     height, slope, _ = line(0.3)
     reaches, loads = cases()
-    whole = nodes(*halved(height, slope), 1, True)
+    whole = sampled.finer(height, slope)
 
     def solve(some):
         states = sampled.begin(height, slope, reaches[some], loads[some], 5e-3)
@@ -106,7 +106,7 @@ def test_a_line_that_does_not_divide_by_the_blocks():
     fine = [roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)]
     reaches, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
     states = sampled.begin(height, slope, reaches, loads, 5e-3)
-    whole = nodes(*halved(height, slope), 1, True)
+    whole = sampled.finer(height, slope)
     for refinement in (1, 2, 4):
         states = states[-1], sampled.settle(whole, refinement, reaches, loads, states, 1e-3)
     assert states[-1].drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
