@@ -216,3 +216,17 @@ def test_extremes_are_right_to_their_own_estimates(material):
     estimate = (found.values["discretisation_error"] + exact.values["discretisation_error"])[known]
     assert np.mean(miss <= estimate + 1e-9) >= 0.9
     assert np.max(miss / (estimate + 1e-9)) < 20
+
+
+def test_a_peak_between_nodes_that_holds_an_element_above_the_highest_node():
+    """On this line the highest node is not on the highest peak, which a fast element still feels when it gets there."""
+    parameters = LINE | KELVIN | {"points": 500, "hurst": 0.5, "length": 1.0, "rms_roughness": 1.0}
+    columns = {"velocity": np.array([3e3, 1e4, 3e4]), "normal_force": 4e7 * np.array([0.5, 1.0, 2.0])}
+
+    def friction(oversampling):
+        case = SlidingFriction.model_validate(parameters | LOAD | {"oversampling": oversampling})
+        return MODEL.compute(Block(case, columns, 3, (112,), 3, ALL, 0.01)).values
+
+    found, exact = friction("auto"), friction(64)["friction_coefficient"]
+    miss = np.abs(found["friction_coefficient"] / exact - 1)
+    assert np.all(miss <= found["discretisation_error"])
