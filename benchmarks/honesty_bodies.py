@@ -90,7 +90,7 @@ def judge(found, exact):
     """Return the share of errors below their estimate, and the median of estimate over error, of cases with results."""
     (friction, estimates), exact = np.array(found).T, np.array(exact)
     known = np.isfinite(friction) & np.isfinite(exact) & (exact != 0)
-    errors, estimates = np.abs(friction / exact - 1)[known], estimates[known]
+    errors, estimates = np.abs(friction[known] / exact[known] - 1), estimates[known]
     over = np.median((estimates / np.maximum(errors, 1e-12))[errors > ROUNDING]) if np.any(errors > ROUNDING) else 1.0
     return float(np.mean(errors <= estimates + ROUNDING)), float(over), int(known.sum())
 
