@@ -18,7 +18,7 @@ def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
     first = json.loads(capsys.readouterr().out)
     factors = np.array(first["data_vars"]["shift_factor"]["data"])
     groups = np.array(first["coords"]["T"]["data"])
-    assert factors[np.argmin(abs(groups - 20))] == 0.0
+    assert np.interp(20.0, groups, factors) == pytest.approx(0.0, abs=1e-10)
     assert (np.diff(factors) > 0).all()
     assert figure.stat().st_size > 10_000
     assert main(["master-curve", str(kept), "--reference", "60", "--json"]) == 0
@@ -31,7 +31,8 @@ def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("normal_force,velocity\n1,2\n", "expected columns for"),
+        ("normal_force,velocity\n1,2\n", "name them by --over, --of and --by"),
+        ("force,mu,velocity\n1,0.5,1\n2,0.4,1\n", "two or more values of 'velocity', got one value"),
         ("normal_force,velocity,mu\n1,2,high\n", ":2: expected 3 numbers"),
     ],
 )
@@ -42,6 +43,40 @@ def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, con
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["nowhere.csv"], "nowhere.csv: no such table or store"),
+        ([str(TABLE), "--plot", "figure.xyz"], "ends in .png, .pdf or .svg, got 'figure.xyz'"),
+        ([str(TABLE), "-o", "factors.txt"], "ends in .json or .csv, got 'factors.txt'"),
+        ([str(TABLE), "--reference", "500"], "must lie between -49.9392 and 99.9931, got 500"),
+        ([str(TABLE), "--vertical"], "measure in between or do without vertical factors"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["master-curve", *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_what_they_hold(tmp_path, capsys):
+    factors, curve, kept = tmp_path / "new" / "factors.csv", tmp_path / "curve.csv", tmp_path / "kept.json"
+    assert main(["master-curve", str(TABLE), "-o", str(factors)]) == 0
+    assert main(["master-curve", str(TABLE), "-o", str(kept), "--bootstrap", "10"]) == 0
+    assert "shift_factor_bootstrap" in capsys.readouterr().out
+    other = kept.rename(tmp_path / "kept.dat")
+    assert main(["master-curve", str(other), "--reference", "60", "--show", "curve", "-o", str(curve)]) == 0
+    assert factors.read_text().splitlines()[0].startswith("T [°C],shift_factor,shift_factor_error")
+    assert curve.read_text().splitlines()[0] == "curve,curve_abscissa [s],curve_ordinate [MPa],curve_error"
+    printed = capsys.readouterr()
+    assert "the law wlf misses the factors by" in printed.err
+    assert "1 of 210 points lie off the curve by more than 5 times the scatter" in printed.err
+    assert "decades at T = -49.9392, t = 10: " in printed.err
+    assert main(["master-curve", str(other), "--vertical"]) == 2
+    assert "is a kept result, of which only --reference may change" in capsys.readouterr().err
+
+
 def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
     path = tmp_path / "other.json"
     path.write_text("{}")
@@ -49,21 +84,56 @@ def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):
     assert "not a master curve kept by --keep" in capsys.readouterr().err
 
 
-def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
+def table_of_two_groups(path):
     rows = [
         f"{force},{velocity},{kelvin},{1 / (1 + (force * velocity**-0.15 * 10 ** (0.02 * (kelvin - 300))) ** -0.7)}"
         for force in np.geomspace(1, 100, 12)
         for velocity in (1e-3, 1e-2, 1e-1)
         for kelvin in (290, 300, 310)
     ]
-    path, kept, figure = tmp_path / "table.csv", tmp_path / "kept.json", tmp_path / "master.png"
     path.write_text("force,velocity,temperature,mu\n" + "\n".join(rows))
+
+
+def test_two_groups_are_drawn_printed_and_referenced_anew(tmp_path, capsys):
+    path, kept, figure = tmp_path / "table.csv", tmp_path / "kept.json", tmp_path / "master.png"
+    table_of_two_groups(path)
     assert main(["master-curve", str(path), "--keep", str(kept), "--plot", str(figure)]) == 0
     printed = capsys.readouterr()
     assert "second_factor" in printed.out
     assert "chi-squared of the sum" in printed.err
+    assert "points lie off the curve" not in printed.err
     assert figure.stat().st_size > 10_000
     assert main(["master-curve", str(kept), "--reference", "0.001", "--json"]) == 0
     moved = json.loads(capsys.readouterr().out)["data_vars"]
     np.testing.assert_allclose(moved["shift_factor"]["data"], [0, -0.15, -0.3], atol=2e-3)
     np.testing.assert_allclose(moved["second_factor"]["data"], [-0.2, 0, 0.2], atol=2e-3)
+
+
+def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
+    path, figure = tmp_path / "table.csv", tmp_path / "master.png"
+    table_of_two_groups(path)
+    assert main(["master-curve", str(path), "--vertical", "--plot", str(figure)]) == 0
+    printed = capsys.readouterr().out
+    assert " vertical_factor " in printed
+    assert " second_vertical_factor " in printed
+    assert figure.stat().st_size > 10_000
+
+
+def test_errors_that_rest_on_few_points_are_told(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("mdr_dask.physics.shift_posterior.MOST_STAGES", 1)
+    path = tmp_path / "table.csv"
+    table_of_two_groups(path)
+    assert main(["master-curve", str(path), "--vertical"]) == 0
+    assert "sampled points instead of 500 and are rough" in capsys.readouterr().err
+
+
+def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
+    path = tmp_path / "table.csv"
+    table_of_two_groups(path)
+    assert main(["master-curve", str(path), "--select", "temperature=299", "--select", "velocity=0:0.05", "--csv"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split(",")[0] for line in printed[1:]] == ["0.001", "0.01"]
+    assert main(["master-curve", str(path), "--select", "humidity=1"]) == 2
+    assert "with one of force, velocity, temperature, mu" in capsys.readouterr().err
+    assert main(["master-curve", str(path), "--series", "one"]) == 2
+    assert "a table has no series, got --series one" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,10 +12,24 @@ import click
 from mdr_dask.cli import selection
 from mdr_dask.cli.printing import print_json, print_rows, table
 from mdr_dask.cli.results import csv_option, json_option, select_option, series_option
+from mdr_dask.errors import DataError
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+
+
+PARTS = ("factors", "curve", "points")
+"""What is printed: the factors, the merged curve with its error, or all points after shifting."""
+
+LAWS = ("power", "arrhenius", "wlf")
+FAR, LEAST = 5.0, 0.002
+"""Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is told."""
+
+ENOUGH, FEW = 500, 200
+"""Sampled points that errors of vertical fits should rest on, and below which it is told that they do not."""
+
+FIGURES, KEPT = (".png", ".pdf", ".svg"), (".json", ".csv")
 
 
 @click.command("master-curve")
@@ -25,10 +40,19 @@ if TYPE_CHECKING:
 @click.option("--of", "ordinate", help="Their values: a column such as friction_coefficient or modulus.")
 @click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
 @click.option("--vertical", is_flag=True, help="Let curves shift along the ordinate too.")
-@click.option("--reference", type=float, help="Group whose factors are zero, in the units of the source.")
-@click.option("--bootstrap", default=0, show_default=True, help="Bootstrap samples of the factors to keep.")
-@click.option("--keep", type=click.Path(path_type=Path), help="Keep the whole result in FILE.json, as a later SOURCE.")
-@click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw curves, merged curve and factors.")
+@click.option("--reference", type=float, help="Where the factors are zero, in the units of --by; interpolated.")
+@click.option(
+    "--bootstrap",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Bootstrap samples, for a second opinion on the errors.",
+)
+@click.option(
+    "--keep", "-o", type=click.Path(path_type=Path), help="Keep all in FILE.json, a later SOURCE; FILE.csv: the table."
+)
+@click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw all into FILE.png, .pdf or .svg.")
+@click.option("--show", "part", type=click.Choice(PARTS), default=PARTS[0], show_default=True, help="What to print.")
 @json_option
 @csv_option
 def master_curve(
@@ -43,35 +67,58 @@ def master_curve(
     bootstrap: int,
     keep: Path | None,
     figure: Path | None,
+    part: str,
     form: str | None,
 ) -> None:
     """Shift the curves of a store or a table into one master curve; print factors, errors and the laws they follow.
 
     SOURCE is a store, a table (CSV with a row of names, perhaps one of units; - for standard input) or a result kept by
-    --keep, which is then only re-referenced. A source that varies in velocity and in temperature gives a shift of each.
+    --keep, of which only the reference may change. A source that varies in velocity and in temperature gives a shift of
+    each.
 
     \b
     mdr-dask master-curve results/force_master_curve.zarr --plot master.png
     mdr-dask master-curve relaxation.csv --by T --reference 20 --keep factors.json
-    mdr-dask master-curve factors.json --reference 60
+    mdr-dask master-curve factors.json --reference 60 --show curve --csv
     """
+    _require_suffix(keep, KEPT)
+    _require_suffix(figure, FIGURES)
     from mdr_dask.fit.master_curve import master_curve as superpose
     from mdr_dask.fit.master_curve import rereferenced
 
-    path = Path(source)
-    if path.suffix == ".json" and path.is_file():
-        curve = _read(path)
-        curve = curve if reference is None else rereferenced(curve, reference)
-    else:
+    kept = _kept(source)
+    if kept is None:
         curve = superpose(_open(source, series, selections), over, ordinate, by, vertical, reference, bootstrap)
+    elif vertical or bootstrap or over or ordinate or by or selections or series:
+        raise click.UsageError(
+            f"{source} is a kept result, of which only --reference may change: give the table itself"
+        )
+    else:
+        curve = kept if reference is None else rereferenced(kept, reference)
     if keep is not None:
-        keep.write_text(json.dumps(curve.to_dict()))
+        _keep(curve, part, keep)
     if figure is not None:
         from mdr_dask.plots.master_curve import draw_master_curve
 
         figure.parent.mkdir(parents=True, exist_ok=True)
         draw_master_curve(curve).savefig(figure, dpi=150)
-    _print(curve, form)
+    _print(curve, part, form)
+
+
+def _require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
+    if path is not None and path.suffix not in known:
+        raise click.UsageError(
+            f"expected a file that ends in {', '.join(known[:-1])} or {known[-1]}, got {str(path)!r}"
+        )
+
+
+def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.suffix == ".json":
+        path.write_text(json.dumps(curve.to_dict()))
+        return
+    with path.open("w") as stream, contextlib.redirect_stdout(stream):
+        _print_table(curve, part, "csv")
 
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
@@ -80,17 +127,38 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
 
     path = Path("/dev/stdin" if source == "-" else source)
     if path.is_file() or path.is_fifo() or source == "-":
-        return read_table(path)
+        if series is not None:
+            raise click.UsageError(f"a table has no series, got --series {series}")
+        return _rows(read_table(path), selections)
+    if "://" not in source and not path.exists():
+        raise DataError(f"{source}: no such table or store")
     groups = store.datasets(source)
     if series is None and len(groups) > 1:
         return selection.select(friction_of_roughness(groups), selections)
     return selection.select(selection.group(groups, series), selections)
 
 
-def _read(path: Path) -> xr.Dataset:
+def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
+    """Return the rows of a table whose columns have the values selected."""
+    import numpy as np
     import xarray as xr
 
-    from mdr_dask.errors import DataError
+    units = frame.attrs.get("units", {})
+    columns = {name: (name, np.unique(frame[name]), {"units": units.get(name, "1")}) for name in frame.columns}
+    kept = selection.select(xr.Dataset(coords=columns), selections)
+    within = [frame[name].isin(kept[name].to_numpy()) for name in frame.columns]
+    return frame[np.logical_and.reduce(within)]
+
+
+def _kept(source: str) -> xr.Dataset | None:
+    """Return a result that --keep wrote, or nothing if the source is something else."""
+    path = Path(source)
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        if path.suffix != ".json" and file.read(1) != b"{":
+            return None
+    import xarray as xr
 
     try:
         curve = xr.Dataset.from_dict(json.loads(path.read_text()))
@@ -101,18 +169,29 @@ def _read(path: Path) -> xr.Dataset:
     return curve
 
 
-def _print(curve: xr.Dataset, form: str | None) -> None:
+def _print_table(curve: xr.Dataset, part: str, form: str) -> None:
+    """Print a part of the result; two groups have a table of factors each."""
+    shown = [curve[[f"{part}_abscissa", f"{part}_ordinate", "curve_error"]]] if part == "curve" else []
+    if part == "points":
+        shown = [curve[[name for name in curve.data_vars if curve[name].dims == ("point",)]]]
+    if part == "factors":
+        kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
+        columns = ("", "_error", "_low", "_high", "_bootstrap")
+        for names in (kept, ("second_factor", "second_vertical_factor")):
+            found = [f"{name}{column}" for name in names for column in columns if f"{name}{column}" in curve]
+            shown.extend([curve[found]] if found else [])
+    for dataset in shown:
+        rows, units = table(dataset)
+        print_rows(rows, units, form)
+
+
+def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
     if form == "json":
         print_json(curve.to_dict())
         return
     by = str(curve.attrs["group"])
-    kept = ("shift_factor", "vertical_factor") if curve["vertical_factor"].any() else ("shift_factor",)
-    factors = curve[[f"{name}{part}" for name in kept for part in ("", "_error", "_low", "_high")]]
-    rows, units = table(factors)
-    print_rows(rows, units, form or "table")
+    _print_table(curve, part, form or "table")
     if "second" in curve.attrs:
-        rows, units = table(curve[[f"second_factor{part}" for part in ("", "_error", "_low", "_high")]])
-        print_rows(rows, units, form or "table")
         click.echo(
             f"shift = {by} part + {curve.attrs['second']} part, zero at {curve.attrs['second_reference']:.6g}; "
             f"chi-squared of the sum {curve.attrs['chi_squared']:.3g} a degree of freedom, "
@@ -130,3 +209,36 @@ def _print(curve: xr.Dataset, form: str | None) -> None:
     for name, value in constants.items():
         interval = f"[{float(curve[f'{name}_low']):.5g}, {float(curve[f'{name}_high']):.5g}]"
         click.echo(f"{name} = {value:.5g} {curve[name].attrs['units']}, 95 %: {interval}".replace(" 1,", ","), err=True)
+    for law in LAWS:
+        if f"{law}_residual" in curve:
+            click.echo(
+                f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
+            )
+    _print_outliers(curve)
+    if 0 < curve.attrs["sampled"] < FEW:
+        click.echo(
+            f"the errors rest on {curve.attrs['sampled']:.0f} sampled points instead of {ENOUGH:.0f} and are rough: "
+            "the curves hardly decide between horizontal and vertical factors",
+            err=True,
+        )
+
+
+def _print_outliers(curve: xr.Dataset) -> None:
+    """Say which point lies farthest off the curve, if any lies farther than scatter brings it."""
+    import numpy as np
+
+    x, y = np.log10(curve["point_abscissa"].to_numpy()), np.log10(curve["point_ordinate"].to_numpy())
+    merged = np.log10(curve["curve_abscissa"].to_numpy()), np.log10(curve["curve_ordinate"].to_numpy())
+    off, scatter = y - np.interp(x, *merged), float(curve.attrs["noise"])
+    far = np.abs(off) > max(FAR * scatter, LEAST)
+    if not far.any():
+        return
+    worst, by, over = int(np.argmax(np.abs(off))), str(curve.attrs["group"]), str(curve.attrs["abscissa"])
+    group = float(curve["point_group"][worst])
+    shift = float(curve["point_shift"][worst] if "point_shift" in curve else curve["shift_factor"].sel({by: group}))
+    click.echo(
+        f"{far.sum()} of {far.size} points lie off the curve by more than {FAR:g} times the scatter, the farthest "
+        f"{off[worst]:+.2g} decades at {by} = {group:.6g}, {over} = {10 ** (x[worst] - shift):.4g}: "
+        "bars know of scatter only, look at the figure",
+        err=True,
+    )

@@ -77,7 +77,8 @@ def master_curve(
     vertical : bool
         Whether curves may shift along the ordinate too.
     reference : float, optional
-        Group whose factors are zero; the nearest one to it if it was not measured exactly; the middle one by default.
+        Where the factors are zero, between two groups by linear interpolation; the middle group by default. Of two
+        groups, the nearest value of the first one.
     draws : int
         Bootstrap samples of the factors.
 
@@ -90,8 +91,8 @@ def master_curve(
         ``point_group``: all
         points after shifting; ``curve_abscissa``, ``curve_ordinate``, ``curve_error``: the merged curve (the error in
         decades), with the range measured at the reference in its attrs; constants of the laws that apply. With two
-        groups also ``second_factor`` over the second one, the constants of its laws, and in the attrs ``second``,
-        ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
+        groups also ``second_factor`` (and ``second_vertical_factor``) over the second one, the constants of its laws,
+        and in the attrs ``second``, ``second_reference``, ``chi_squared`` and ``probability`` of the sum.
 
     Raises
     ------
@@ -102,12 +103,11 @@ def master_curve(
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
     if second is not None:
-        if vertical:
-            raise DataError(f"the table varies in {second!r} too: two shifts go without vertical factors")
-        return _of_two_groups(frame, over, values, (by, second), reference, draws)
+        return _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
     groups, curves = _curves(frame, over, values, by)
-    nearest = None if reference is None else _nearest(groups, reference)
-    result = superposition.superpose(groups, curves, vertical, nearest, draws)
+    zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
+    free = superposition.superpose(groups, curves, vertical, None, draws)
+    result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
     return dataset.assign(_laws(result, over, by, units.get(by, "")))
@@ -146,19 +146,21 @@ def _columns(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
         names = [
             _find(frame, name) if wish is None else _find(frame, wish) for wish, name in zip(given, family, strict=True)
         ]
-        if None not in names and (all(given) or _varies(frame, names)):
-            found.append(names)
-    if not found:
-        wanted = (
-            ", ".join(repr(name) for name in given if name is not None)
-            or "a coefficient over force or a modulus over time"
+        if None not in names:
+            found.append([str(name) for name in names])
+    varied = [names for names in found if all(frame[name].nunique() > 1 for name in (names[0], names[2]))]
+    if found and not varied:
+        constant = next(name for name in (found[0][2], found[0][0]) if frame[name].nunique() < 2)
+        raise DataError(
+            f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
         )
-        raise DataError(f"expected columns for {wanted}, got {[str(name) for name in frame.columns]!r}")
-    return str(found[0][0]), str(found[0][1]), str(found[0][2])
-
-
-def _varies(frame: pd.DataFrame, names: list[str | None]) -> bool:
-    return all(frame[name].nunique() > 1 for name in (names[0], names[2]))
+    if not found:
+        wanted = ", ".join(repr(name) for name in given if name is not None) or (
+            "a coefficient over force by velocity or temperature, or a modulus over frequency or time by temperature"
+        )
+        got = [str(name) for name in frame.columns]
+        raise DataError(f"expected columns for {wanted}, got {got!r}: name them by --over, --of and --by")
+    return varied[0][0], varied[0][1], varied[0][2]
 
 
 def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
@@ -174,7 +176,13 @@ def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
 
 
 def _of_two_groups(
-    frame: pd.DataFrame, over: str, values: str, by: tuple[str, str], reference: float | None, draws: int
+    frame: pd.DataFrame,
+    over: str,
+    values: str,
+    by: tuple[str, str],
+    vertical: bool,
+    reference: float | None,
+    draws: int,
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
@@ -191,18 +199,19 @@ def _of_two_groups(
         curves.append(curve)
     a, b = np.array(keys).T
     zero = _nearest(np.unique(a), np.unique(a)[np.unique(a).size // 2] if reference is None else reference)
-    found = two_shifts.superpose_twice(a, b, curves, (zero, float(np.unique(b)[np.unique(b).size // 2])), draws)
+    zeros = zero, float(np.unique(b)[np.unique(b).size // 2])
+    found = two_shifts.superpose_twice(a, b, curves, zeros, draws, vertical=vertical)
     units = frame.attrs.get("units", {})
     dataset = _dataset(found.first, over, values, by[0], units)
-    dataset["point_shift"] = (
-        "point",
-        (found.first.horizontal[found.first.member] + found.second.horizontal[found.second.member]),
-        {"units": "1"},
-    )
+    for name, along in (("point_shift", "horizontal"), ("point_rise", "vertical")):
+        parts = [getattr(part, along)[part.member] for part in (found.first, found.second)]
+        dataset[name] = ("point", parts[0] + parts[1], {"units": "1"})
     dataset["point_second"] = ("point", found.second.groups[found.second.member], {"units": units.get(by[1], "")})
     extra = _dataset(found.second, over, values, by[1], units)
-    for part in ("", "_error", "_low", "_high"):
+    for part in ("", "_error", "_low", "_high", *(("_bootstrap",) if draws else ())):
         dataset[f"second_factor{part}"] = extra[f"shift_factor{part}"]
+        if vertical:
+            dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     if draws:
         dataset["second_draws"] = extra["draws"]
     laws = _laws(found.first, over, by[0], units.get(by[0], "")) | _laws(
@@ -239,10 +248,25 @@ def _clusters(values: FloatArray) -> NDArray[np.intp]:
     return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
 
 
+def _inside(groups: FloatArray, reference: float) -> float:
+    """Return the reference, or the first or last group if it lies just outside: set points are met by so much."""
+    margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
+    if not groups.min() - margin <= reference <= groups.max() + margin:
+        raise DataError(f"the reference must lie between {groups.min():g} and {groups.max():g}, got {reference:g}")
+    return float(np.clip(reference, groups.min(), groups.max()))
+
+
+def _is_temperature(by: str) -> bool:
+    return by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
+
+
+def _is_logarithmic(by: str, groups: FloatArray) -> bool:
+    """Say whether factors are nearly linear in the logarithm of the group, as a power law of velocities is."""
+    return bool(np.all(groups > 0)) and not _is_temperature(by)
+
+
 def _nearest(groups: FloatArray, reference: float) -> float:
-    if len(groups) > 1 and not groups.min() - 0.5 * np.ptp(groups) <= reference <= groups.max() + 0.5 * np.ptp(groups):
-        raise DataError(f"the reference {reference:g} is far from the groups {groups.min():g} to {groups.max():g}")
-    return float(groups[np.argmin(np.abs(groups - reference))])
+    return float(groups[np.argmin(np.abs(groups - _inside(groups, reference)))])
 
 
 def _dataset(
@@ -258,6 +282,7 @@ def _dataset(
             "reference": result.reference,
             "noise": result.noise,
             "freedom": result.freedom,
+            "sampled": result.sampled,
         },
     )
     narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
@@ -278,8 +303,14 @@ def _dataset(
     dataset["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
     dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
     dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
+    dataset["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
     if result.draws.size:
+        for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
+            low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
+            about = {"units": "1", "long_name": "half width of 68 % of the bootstrap samples"}
+            dataset[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
         dataset["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+        dataset["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
     return dataset
 
 
@@ -287,10 +318,9 @@ def _laws(result: superposition.Superposition, over: str, by: str, unit: str) ->
     """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
     size = result.groups.size
     covariance = result.covariance[:size, :size]
-    is_temperature = by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
     fits = []
     try:
-        if is_temperature:
+        if _is_temperature(by):
             sign = -1 if over == "t" or over.lower() == "time" else 1
             kelvin = 0.0 if unit.upper() in ("K", "KELVIN", "") and np.all(result.groups > 0) else -ABSOLUTE_ZERO
             temperatures = result.groups + kelvin, sign * result.horizontal, covariance, result.reference + kelvin
@@ -341,21 +371,33 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_x=np.log10(curve["curve_abscissa"].to_numpy()),
         curve_y=np.log10(curve["curve_ordinate"].to_numpy()),
         curve_error=curve["curve_error"].to_numpy(),
+        curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
-        draws=np.empty((0, 2 * size)),
+        draws=_drawn(curve),
+        sampled=float(curve.attrs["sampled"]),
     )
     units = {
         by: curve[by].attrs.get("units", ""),
         over: curve["curve_abscissa"].attrs.get("units", ""),
         values: curve["curve_ordinate"].attrs.get("units", ""),
     }
-    new = superposition.rereference(old, reference)
+    new = superposition.rereference(old, _inside(groups, reference), _is_logarithmic(by, groups))
     dataset = _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
-    for name in set(curve.data_vars) - set(dataset.data_vars):
+    for name in [name for name in curve.data_vars if name not in dataset]:
         dataset[name] = curve[name]
     if "point_shift" in curve:
         dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])
+        dataset["point_rise"] = curve["point_rise"] + float(new.vertical[0] - old.vertical[0])
     return dataset.assign_attrs({name: value for name, value in curve.attrs.items() if name not in dataset.attrs})
+
+
+def _drawn(curve: xr.Dataset) -> FloatArray:
+    """Return the bootstrap samples of a kept result, horizontal and vertical side by side."""
+    if "draws" not in curve:
+        return np.empty((0, 2 * curve["shift_factor"].size))
+    across = curve["draws"].to_numpy()
+    along = curve["vertical_draws"].to_numpy() if "vertical_draws" in curve else np.zeros_like(across)
+    return np.hstack([across, along])
 
 
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:

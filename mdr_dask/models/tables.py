@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import reprlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,5 +123,5 @@ def _is_number(text: str) -> bool:
 
 def _numbers(row: list[str], width: int, place: str) -> list[float]:
     if len(row) != width or not all(_is_number(entry) or entry == "" for entry in row):
-        raise DataError(f"{place}: expected {width} numbers, got {row!r}")
+        raise DataError(f"{place}: expected {width} numbers, got {reprlib.repr(row)}")
     return [float(entry) if entry else np.nan for entry in row]

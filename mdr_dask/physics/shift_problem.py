@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -72,20 +73,24 @@ class Problem:
         return rows / scale, np.full(self.curves - 1, self.usual / scale)
 
 
-def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:
+@njit(nogil=True, cache=True, error_model="numpy")
+def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:  # pragma: no cover
     """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
     more.
     """
     shorter = min(np.ptp(x), np.ptp(other_x))
     low, high = x[0] - other_x[-1] + shorter / 6, x[-1] - other_x[0] - shorter / 6
-    best = (np.inf, 0.0)
+    least, best = np.inf, 0.0
     for shift in np.linspace(low, high, 61):
         moved = other_x + shift
         inside, own = (moved >= x[0]) & (moved <= x[-1]), (x >= moved[0]) & (x <= moved[-1])
-        difference = np.append(
-            np.interp(moved[inside], x, y) - other_y[inside], y[own] - np.interp(x[own], moved, other_y)
-        )
-        if difference.size >= 2:
-            overlap = np.ptp(np.clip(moved, x[0], x[-1]))
-            best = min(best, (float(np.mean(difference**2)) * (1 + 0.1 * shorter / overlap), float(shift)))
-    return best[1]
+        count = np.sum(inside) + np.sum(own)
+        if count < 2:
+            continue
+        squares = np.sum((np.interp(moved[inside], x, y) - other_y[inside]) ** 2)
+        squares += np.sum((y[own] - np.interp(x[own], moved, other_y)) ** 2)
+        overlap = min(moved[-1], x[-1]) - max(moved[0], x[0])
+        score = squares / count * (1 + 0.1 * shorter / overlap)
+        if score < least:
+            least, best = score, shift
+    return best

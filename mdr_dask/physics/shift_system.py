@@ -85,13 +85,17 @@ class System:
         solution: FloatArray = spline_system.solve(self._factor(weight), self.right)
         return solution
 
-    def misfit(self, weight: float) -> float:
-        """Return the sum of squares with its penalty for the best curve through these shifts."""
+    def best_curve(self, weight: float) -> FloatArray:
+        """Return the spline coefficients that fit best at these shifts."""
         inner = slice(self.splines)
         matrix = self.normal[inner, inner] + weight * self.penalty[inner, inner]
         spline_system.factorise(matrix)
-        right = self.right[inner].copy()
-        return self.total - float(right @ spline_system.solve(matrix, right))
+        found: FloatArray = spline_system.solve(matrix, self.right[inner].copy())
+        return found
+
+    def misfit(self, weight: float) -> float:
+        """Return the sum of squares with its penalty for the best curve through these shifts."""
+        return self.total - float(self.right[: self.splines] @ self.best_curve(weight))
 
     def _scores(self) -> FloatArray:
         numbers = self.right, self.total, self.target.size, self.splines - 2, SMOOTHING

@@ -55,12 +55,17 @@ class Superposition:
     member : array of int, shape (points,)
         The group of each.
     curve_x, curve_y, curve_error : array, shape (curve points,)
-        The merged curve with its standard error.
+        The merged curve with its standard error, where the reference is held in place.
+    curve_cross : array, shape (curve points, 2 groups)
+        Covariance of the curve and the factors.
     measured : tuple of float
         Range of log10 x in which the reference itself was measured; the merged curve beyond is extrapolated by
         superposition.
     draws : array, shape (draws, 2 groups)
         Bootstrap samples of the factors; none unless asked for.
+    sampled : float
+        Number of points of even weight on which vertical fits rest: below some 200 their bars are rough. 0 where
+        nothing was sampled.
     """
 
     groups: FloatArray
@@ -76,8 +81,10 @@ class Superposition:
     curve_x: FloatArray
     curve_y: FloatArray
     curve_error: FloatArray
+    curve_cross: FloatArray
     measured: tuple[float, float]
     draws: FloatArray
+    sampled: float = 0.0
 
     @property
     def horizontal_error(self) -> FloatArray:
@@ -152,6 +159,8 @@ def _sorted(
             raise DataError(f"the curve at {values[place]:g} needs two or more distinct points with finite logarithms")
         order = np.argsort(x, kind="stable")
         arrays.append((x[order], y[order]))
+    if all(np.ptp(y) == 0 for _, y in arrays):
+        raise DataError("every curve is constant: nothing tells how far to shift them")
     return np.sort(values), arrays
 
 
@@ -180,11 +189,12 @@ def _fit(
 def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: FloatArray, seed: int) -> Superposition:
     system = System.at(problem, shifts, settled)
     solution, covariance, noise, freedom = system.posterior(settled.weight)
-    spread = covariance[system.splines :, system.splines :]
+    spread, sampled = covariance[system.splines :, system.splines :], 0.0
     if problem.vertical:
-        shifts, spread = _walked(problem, shifts, settled, spread, freedom, seed)
+        shifts, spread, sampled = _sampled(problem, shifts, settled, freedom, seed)
         system = System.at(problem, shifts, settled)
-        solution = np.append(system.solve(settled.weight)[: system.splines], shifts)
+        solution = system.best_curve(settled.weight)
+        covariance = _widened(system.posterior(settled.weight)[1], system.splines, spread)
     horizontal, vertical = problem.split(shifts)
     full = np.zeros((2 * problem.curves, 2 * problem.curves))
     places = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][: problem.free]
@@ -193,8 +203,10 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
     order = np.argsort(x, kind="stable")
     grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
     rows = system.curve(grid)
-    inner = covariance[: system.splines, : system.splines]
-    error = np.sqrt(np.maximum(np.sum((rows @ inner) * rows, axis=1), 0))
+    along = rows @ covariance[: system.splines]
+    error = np.sqrt(np.maximum(np.sum(along[:, : system.splines] * rows, axis=1), 0))
+    cross = np.zeros((grid.size, 2 * problem.curves))
+    cross[:, places] = along[:, system.splines :]
     own = x[problem.member == 0]
     return Superposition(
         values,
@@ -210,18 +222,28 @@ def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: Floa
         grid,
         rows @ solution[: system.splines],
         error,
+        cross,
         (float(own.min()), float(own.max())),
         np.empty((0, 2 * problem.curves)),
+        sampled,
     )
 
 
-def _walked(
-    problem: Problem, shifts: FloatArray, settled: Settled, spread: FloatArray, freedom: float, seed: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return mean and covariance of the posterior, the latter as the square of a scale for Student's t."""
-    visited = sample(problem, shifts, settled, spread, seed)
-    narrower = (freedom - 2) / freedom if freedom > 4 else 0.5
-    return visited.mean(axis=0), np.atleast_2d(np.cov(visited.T)) * narrower
+def _widened(covariance: FloatArray, splines: int, spread: FloatArray) -> FloatArray:
+    """Return the covariance of curve and shifts with another one of the shifts; the curve depends on them as before."""
+    inner, outer = slice(splines), slice(splines, None)
+    gain = covariance[inner, outer] @ np.linalg.pinv(covariance[outer, outer], hermitian=True)
+    change = spread - covariance[outer, outer]
+    both = np.vstack([gain, np.eye(spread.shape[0])])
+    return np.asarray(covariance + both @ change @ both.T, dtype=np.float64)
+
+
+def _sampled(
+    problem: Problem, shifts: FloatArray, settled: Settled, freedom: float, seed: int
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return mean and covariance of the posterior, as the square of a scale for Student's t, and the points drawn."""
+    mean, covariance, points = sample(problem, shifts, settled, seed)
+    return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5), points
 
 
 def _bootstrap(problem: Problem, shifts: FloatArray, settled: Settled, draws: int, seed: int) -> FloatArray:
@@ -249,11 +271,39 @@ def _require_overlap(result: Superposition) -> None:
     gaps = np.flatnonzero(low[order][1:] > reach[:-1])
     if gaps.size:
         after = result.groups[order[gaps[0] + 1]]
-        raise DataError(f"the curve at {after:g} does not overlap the others after shifting: measure in between")
+        choice = " or do without vertical factors" if result.vertical.any() else ""
+        raise DataError(
+            f"the curve at {after:g} does not overlap the others after shifting: measure in between{choice}"
+        )
 
 
-def rereference(result: Superposition, reference: float) -> Superposition:
+def moved_with(
+    error: FloatArray, cross: FloatArray, gradient: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return error of a curve that moves with factors, and its covariance with them.
+
+    Parameters
+    ----------
+    error, cross : arrays, shapes (curve points,) and (curve points, factors)
+        As they were.
+    gradient : array, shape (curve points, factors)
+        How far each factor moves the curve up.
+    covariance : array, shape (factors, factors)
+    """
+    along = gradient @ covariance
+    variance = error**2 + np.sum(gradient * (2 * cross + along), axis=1)
+    return np.sqrt(np.maximum(variance, 0)), cross + along
+
+
+def rereference(result: Superposition, reference: float, logarithmic: bool = False) -> Superposition:
     """Return the same master curve with the factors zero at another group, or between two by linear interpolation.
+
+    Parameters
+    ----------
+    reference : float
+        In the range of the groups.
+    logarithmic : bool
+        Whether factors are linear in the logarithm of the groups, as those of velocities are.
 
     Raises
     ------
@@ -263,12 +313,16 @@ def rereference(result: Superposition, reference: float) -> Superposition:
     groups = result.groups
     if not groups[0] <= reference <= groups[-1]:
         raise DataError(f"the reference must lie between {groups[0]:g} and {groups[-1]:g}, got {reference:g}")
-    share = np.array([np.interp(reference, groups, unit) for unit in np.eye(groups.size)])
+    place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
+    share = np.array([np.interp(place, places, unit) for unit in np.eye(groups.size)])
     one = np.eye(groups.size) - np.outer(np.ones(groups.size), share)
     change = np.kron(np.eye(2), one)
     across, along = float(share @ result.horizontal), float(share @ result.vertical)
-    nearest = int(np.argmin(np.abs(groups - reference)))
+    nearest = int(np.argmin(np.abs(places - place)))
     own = result.x[result.member == nearest] - across
+    slope = np.gradient(result.curve_y, result.curve_x)
+    gradient = np.hstack([np.outer(slope, share), -np.outer(np.ones(slope.size), share)])
+    error, cross = moved_with(result.curve_error, result.curve_cross, gradient, result.covariance)
     return replace(
         result,
         horizontal=one @ result.horizontal,
@@ -279,6 +333,8 @@ def rereference(result: Superposition, reference: float) -> Superposition:
         y=result.y - along,
         curve_x=result.curve_x - across,
         curve_y=result.curve_y - along,
+        curve_error=error,
+        curve_cross=cross @ change.T,
         measured=(float(own.min()), float(own.max())),
         draws=result.draws @ change.T,
     )

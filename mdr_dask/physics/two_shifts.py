@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.stats import chi2
 
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition import Superposition, superpose
+from mdr_dask.physics.superposition import Superposition, moved_with, superpose
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class TwoShifts:
-    """Factors ``h(v, T) = a(v) + b(T)`` and the curve they make.
+    """Factors ``h(v, T) = a(v) + b(T)``, perhaps vertical ones of that form too, and the curve they make.
 
     Parameters
     ----------
@@ -44,6 +44,7 @@ def superpose_twice(
     references: tuple[float, float] | None = None,
     draws: int = 0,
     seed: int = 0,
+    vertical: bool = False,
 ) -> TwoShifts:
     """Shift curves that differ in two things into one, and split the factors into a sum of two.
 
@@ -60,6 +61,8 @@ def superpose_twice(
         Groups whose factors are zero; the middle ones if not given.
     draws, seed : int
         Bootstrap samples, as of `superpose`; each is split into a sum as the factors are.
+    vertical : bool
+        Whether curves may move along the ordinate as well, by factors that are such a sum, too.
 
     Raises
     ------
@@ -71,67 +74,94 @@ def superpose_twice(
     if min(group.size for group in groups) < 2:
         raise DataError("two shifts need two or more values of each group")
     order = _serpentine(places[0], places[1])
-    free = superpose(np.arange(order.size), [curves[k] for k in order], reference=0.0, draws=draws, seed=seed)
+    free = superpose(np.arange(order.size), [curves[k] for k in order], vertical, 0.0, draws, seed)
     zeros = [_nearest(group, None if references is None else references[i]) for i, group in enumerate(groups)]
-    return _split(free, groups, [place[order] for place in places], zeros)
+    return _split(free, groups, [place[order] for place in places], zeros, 1 + vertical)
 
 
 def _split(
-    free: Superposition, groups: Sequence[FloatArray], places: Sequence[NDArray[np.intp]], zeros: Sequence[int]
+    free: Superposition,
+    groups: Sequence[FloatArray],
+    places: Sequence[NDArray[np.intp]],
+    zeros: Sequence[int],
+    axes: int,
 ) -> TwoShifts:
-    """Fit the sum to free factors, which are zero for the first curve, in the covariance of the others."""
-    size = groups[0].size
+    """Fit the sum to free factors, which are zero for the first curve, in the covariance of the others.
+
+    `axes` is two if there are vertical factors, of which the same sum holds, else one.
+    """
+    size, curves = groups[0].size, free.groups.size
     columns = np.delete(np.arange(size + groups[1].size), [zeros[0], size + zeros[1]])
     design = np.hstack([np.eye(group.size)[place] for group, place in zip(groups, places, strict=True)])
     rows = (design - design[0])[1:, columns]
     if np.linalg.matrix_rank(rows) < columns.size:
         raise DataError("the curves fall into parts that share neither group: measure one value of each with the other")
-    whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[1 : len(places[0]), 1 : len(places[0])]))
-    projected, target = whiten @ rows, whiten @ free.horizontal[1:]
+    moved = np.concatenate([curves * axis + np.arange(1, curves) for axis in range(axes)])
+    kept = np.concatenate([design.shape[1] * axis + columns for axis in range(axes)])
+    whiten = np.linalg.inv(np.linalg.cholesky(free.covariance[np.ix_(moved, moved)]))
+    projected = whiten @ np.kron(np.eye(axes), rows)
+    target = whiten @ np.append(free.horizontal, free.vertical)[moved]
     spread = np.linalg.inv(projected.T @ projected)
-    found = spread @ (projected.T @ target)
-    drawn = np.zeros((free.draws.shape[0], design.shape[1]))
-    drawn[:, columns] = free.draws[:, 1 : len(places[0])] @ (spread @ projected.T @ whiten).T
-    freedom = rows.shape[0] - columns.size
-    misfit = float(np.sum((target - projected @ found) ** 2))
+    project = spread @ projected.T
+    misfit = float(np.sum((target - projected @ (project @ target)) ** 2))
+    freedom = target.size - kept.size
     reduced = misfit / freedom if freedom else 0.0
-    both, covariance = np.zeros(design.shape[1]), np.zeros((design.shape[1], design.shape[1]))
-    both[columns] = found
-    covariance[np.ix_(columns, columns)] = spread * max(reduced, 1.0)
-    sums, offset = design @ both, float(design[0] @ both)
-    x = free.x + (sums - free.horizontal)[free.member]
-    own = x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
-    own = own if own.size else x[places[0][free.member] == zeros[0]]
-    moved = replace(free, x=x, curve_x=free.curve_x + offset, measured=(float(own.min()), float(own.max())))
-    parts = slice(size), slice(size, None)
+    both, covariance = np.zeros(2 * design.shape[1]), np.zeros((2 * design.shape[1], 2 * design.shape[1]))
+    both[kept], covariance[np.ix_(kept, kept)] = project @ target, spread * max(reduced, 1.0)
+    drawn = np.zeros((free.draws.shape[0], both.size))
+    drawn[:, kept] = free.draws[:, moved] @ (project @ whiten).T
+    cross = np.zeros((free.curve_x.size, both.size))
+    cross[:, kept] = free.curve_cross[:, moved] @ (project @ whiten).T
+    summed = _summed(replace(free, curve_cross=cross), design, both, covariance)
+    own = summed.x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
+    own = own if own.size else summed.x[places[0][free.member] == zeros[0]]
+    summed = replace(summed, measured=(float(own.min()), float(own.max())))
     one, other = (
-        _one(moved, groups[i], zeros[i], both[part], covariance[part, part], places[i], drawn[:, part])
-        for i, part in enumerate(parts)
+        _one(summed, groups[i], zeros[i], both, covariance, places[i], drawn, columns_of + np.arange(groups[i].size))
+        for i, columns_of in enumerate((0, size))
     )
     return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
 
 
+def _summed(free: Superposition, design: FloatArray, both: FloatArray, covariance: FloatArray) -> Superposition:
+    """Return points and curve shifted by the sums of factors, horizontal ones first, instead of freely."""
+    across, along = both.reshape(2, -1) @ design.T
+    slope = np.gradient(free.curve_y, free.curve_x)
+    gradient = np.hstack([-np.outer(slope, design[0]), np.outer(np.ones(slope.size), design[0])])
+    error, cross = moved_with(free.curve_error, free.curve_cross, gradient, covariance)
+    return replace(
+        free,
+        x=free.x + (across - free.horizontal)[free.member],
+        y=free.y + (along - free.vertical)[free.member],
+        curve_x=free.curve_x + across[0],
+        curve_y=free.curve_y + along[0],
+        curve_error=error,
+        curve_cross=cross,
+    )
+
+
 def _one(
-    moved: Superposition,
+    summed: Superposition,
     groups: FloatArray,
     zero: int,
     factors: FloatArray,
     covariance: FloatArray,
     place: NDArray[np.intp],
     drawn: FloatArray,
+    own: NDArray[np.intp],
 ) -> Superposition:
-    """Return the superposition as seen by one of the groups."""
-    full = np.zeros((2 * groups.size, 2 * groups.size))
-    full[: groups.size, : groups.size] = covariance
+    """Return the superposition as seen by one of the groups, whose horizontal factors are at `own`."""
+    kept = np.append(own, factors.size // 2 + own)
     return replace(
-        moved,
+        summed,
         groups=groups,
-        horizontal=factors,
-        vertical=np.zeros(groups.size),
-        covariance=full,
+        horizontal=factors[own],
+        vertical=factors[factors.size // 2 + own],
+        covariance=covariance[np.ix_(kept, kept)],
+        curve_cross=summed.curve_cross[:, kept],
         reference=float(groups[zero]),
-        member=place[moved.member],
-        draws=np.hstack([drawn, np.zeros_like(drawn)]),
+        member=place[summed.member],
+        draws=drawn[:, kept],
     )
 
 

@@ -27,15 +27,20 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
     """
     from matplotlib.figure import Figure
 
-    second = curve.attrs.get("second")
-    panels = 3 if second is None else 4
+    shown = [(str(curve.attrs["group"]), "shift_factor", "vertical_factor", curve.attrs["reference"])]
+    if "second" in curve.attrs:
+        second = str(curve.attrs["second"]), "second_factor", "second_vertical_factor", curve.attrs["second_reference"]
+        shown.append(second)
+    rising = bool(curve["vertical_factor"].any())
+    panels = 2 + len(shown) * (1 + rising)
     figure = Figure(figsize=(4.4 * panels, 4.2), layout="constrained")
-    axes = figure.subplots(1, panels)
-    _measured(axes[0], curve)
-    _merged(axes[1], curve)
-    _factors(axes[2], curve, str(curve.attrs["group"]), "shift_factor", curve.attrs["reference"])
-    if second is not None:
-        _factors(axes[3], curve, str(second), "second_factor", curve.attrs["second_reference"])
+    axes = list(figure.subplots(1, panels))
+    _measured(axes.pop(0), curve)
+    _merged(axes.pop(0), curve)
+    for by, across, along, reference in shown:
+        _factors(axes.pop(0), curve, by, across, reference)
+        if rising:
+            _factors(axes.pop(0), curve, by, along, reference)
     return figure
 
 
@@ -70,7 +75,7 @@ def _measured(axes: Axes, curve: xr.Dataset) -> None:
     groups = _by_group(curve)
     for (value, points, shift, rise), colour in zip(groups, _colours(curve), strict=True):
         shifts = points.get("point_shift", shift)
-        x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10**rise
+        x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10 ** points.get("point_rise", rise)
         if "point_second" not in points:
             axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}")
             continue
@@ -104,14 +109,17 @@ def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: flo
     groups = curve[by].to_numpy()
     error = BAR * curve[f"{factor}_error"]
     axes.errorbar(groups, curve[factor], error, fmt="o", color="k", label="factors, 68 %")
+    across = "vertical" not in factor
     if "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp"):
         exponent = float(curve["power_exponent"])
-        axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
+        if across:
+            axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
         axes.set_xscale("log")
         _plain_ticks(axes, groups)
     axes.set_xlabel(_label(by, curve[by]))
-    axes.set_ylabel(f"shift of log10 {str(curve.attrs['abscissa']).replace('_', ' ')} (decades)")
-    axes.set_title("shift factors")
+    moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")
+    axes.set_ylabel(f"shift of log10 {moved} (decades)")
+    axes.set_title("shift factors" if across else "vertical factors")
     axes.legend(fontsize="small")
 
 

@@ -108,8 +108,23 @@ def test_saved_curves_can_be_rereferenced(tmp_path):
     assert again["curve_abscissa"].attrs["measured_low"] == pytest.approx(1.0)
 
 
-def test_bootstrap_is_kept():
-    assert master_curve(store()[["friction_coefficient"]], draws=5)["draws"].shape == (5, 7)
+def test_bootstrap_is_kept_and_referenced_anew():
+    curve = master_curve(store()[["friction_coefficient"]], draws=5)
+    assert curve["draws"].shape == (5, 7)
+    velocity = float(curve["velocity"][1])
+    moved = rereferenced(curve, velocity)
+    assert np.all(moved["draws"].sel(velocity=velocity) == 0)
+    assert moved["shift_factor_bootstrap"].sel(velocity=velocity) == 0
+    assert np.all(moved["shift_factor_bootstrap"].drop_sel(velocity=velocity) > 0)
+
+
+def test_a_reference_between_velocities_follows_their_logarithm():
+    exact = store(noise=0.0)[["friction_coefficient"]]
+    middle = float(np.sqrt(exact["velocity"][2] * exact["velocity"][3]))
+    for curve in (master_curve(exact, reference=middle), rereferenced(master_curve(exact), middle)):
+        law_says = EXPONENT * np.log10(curve["velocity"] / middle)
+        np.testing.assert_allclose(curve["shift_factor"], law_says, atol=0.01)
+        assert curve.attrs["reference"] == middle
 
 
 @pytest.mark.parametrize(
@@ -146,8 +161,10 @@ def test_tables_that_are_ambiguous_or_incomplete_are_refused():
         master_curve(frame, ordinate="hardness")
     with pytest.raises(DataError, match="must be positive"):
         master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
-    with pytest.raises(DataError, match="the reference 50 is far"):
+    with pytest.raises(DataError, match="must lie between 1 and 2, got 50"):
         master_curve(frame, reference=50.0)
+    with pytest.raises(DataError, match="two or more values of 'velocity', got one value"):
+        master_curve(frame.assign(velocity=1.0))
 
 
 def two_groups():
@@ -173,3 +190,17 @@ def test_velocity_and_temperature_give_a_shift_each():
     assert moved["second_factor"].identical(result["second_factor"])
     again = moved["point_abscissa"] / 10 ** moved["point_shift"]
     np.testing.assert_allclose(np.unique(again.round(6)), np.unique(two_groups()["force"].round(6)), rtol=1e-5)
+
+
+def test_vertical_factors_of_two_groups_are_sums_too():
+    """Friction that rises by 1 % a kelvin besides: points taken back by both sums are those of the table."""
+    table = two_groups()
+    table["mu"] *= 1.01 ** (table["temperature"] - 300)
+    result = master_curve(table, vertical=True)
+    truth = -np.log10(1.01) * (result["temperature"] - 300)
+    bars = 4 * result["second_vertical_factor_error"] + 1e-9
+    assert np.all(np.abs(result["second_vertical_factor"] - truth) < bars)
+    assert np.all(np.abs(result["vertical_factor"]) < 4 * result["vertical_factor_error"] + 1e-9)
+    for curve in (result, rereferenced(result, 1.0)):
+        mu = curve["point_ordinate"] / 10 ** curve["point_rise"]
+        np.testing.assert_allclose(np.sort(mu), np.sort(table["mu"]), rtol=1e-9)

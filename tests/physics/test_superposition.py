@@ -1,6 +1,3 @@
-import csv
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.stats import t as student
@@ -8,8 +5,6 @@ from scipy.stats import t as student
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.physics.shift_laws import fit_arrhenius, fit_power, fit_wlf
 from mdr_dask.physics.superposition import rereference, superpose
-
-DATA = Path(__file__).parents[1] / "data" / "dma"
 
 
 def sigmoid(x):
@@ -145,6 +140,31 @@ def test_merged_curve_reaches_beyond_what_was_measured():
     assert np.mean(inside < 3 * result.curve_error + 0.005) > 0.95
 
 
+@pytest.mark.parametrize("vertical", [False, True])
+def test_the_band_of_the_merged_curve_covers_it_where_the_reference_was_measured(vertical):
+    """Six families of four shapes; a curve has a few independent points, so that the share is known to 0.05."""
+    shares = []
+    for shape in [shape for shape in SHAPES if shape != "power"]:
+        for seed in range(3000, 3006):
+            groups, curves, _, _ = family(seed, 0.01, shape=SHAPES[shape], rise=0.02 * vertical)
+            result = superpose(groups, curves, vertical, reference=5.0)
+            own = (result.curve_x > -1) & (result.curve_x < 1)
+            miss = np.abs(result.curve_y - SHAPES[shape](result.curve_x))
+            shares.append(np.mean((miss <= result.curve_error)[own]))
+    assert 0.60 <= np.mean(shares) <= 0.85
+
+
+@pytest.mark.parametrize("vertical", [False, True])
+def test_the_band_does_not_depend_on_the_way_to_the_reference(vertical):
+    groups, curves, _, _ = family(7, rise=0.02)
+    first = superpose(groups, curves, vertical, reference=0.0)
+    one, other = rereference(first, 5.0), rereference(rereference(first, 8.0), 5.0)
+    np.testing.assert_allclose(one.curve_error, other.curve_error, rtol=1e-6)
+    np.testing.assert_allclose(one.curve_cross, other.curve_cross, atol=1e-9)
+    own = np.abs(one.curve_x) < 1
+    assert np.median(one.curve_error[own]) < np.median(one.curve_error[~own])
+
+
 @pytest.mark.parametrize(
     ("groups", "curves", "message"),
     [
@@ -196,25 +216,23 @@ def test_laws_refuse_groups_they_do_not_know():
         fit_power(np.array([1.0, 2.0]), np.zeros(2), np.zeros((2, 2)), 1.0)
 
 
-def test_relaxation_data_agree_with_their_authors():
-    """The authors shift neighbours pair by pair and take 3 C as reference; here all curves are fitted at once.
-
-    Above -15 C both agree within 0.35 of 21 decades. Below, neighbours share hardly any range of modulus beyond its
-    scatter, and every pair's difference adds to the next: 0.85 decades at -50 C.
-    """
-    table = np.array(read("time_user_raw.csv"))
-    authors = np.array(read("time_user_raw__shift_factors.csv"))[::-1]
-    sets = [table[table[:, 3] == number] for number in range(21)]
-    temperatures = np.array([part[:, 2].mean() for part in sets])
-    curves = [(np.log10(part[:, 0]), np.log10(part[:, 1])) for part in sets]
-    result = superpose(temperatures, curves, reference=temperatures[7])
-    difference = np.abs(-result.horizontal - authors[:, 1])
-    assert np.all(np.diff(result.horizontal) > 0)
-    assert np.all(difference[temperatures > -15] < 0.35)
-    assert np.all(difference < 0.9)
-    assert result.noise < 0.005
+def test_constant_curves_are_refused():
+    with pytest.raises(DataError, match="every curve is constant"):
+        superpose([1.0, 2.0], [([0, 1, 2], [3, 3, 3]), ([0, 1, 2], [4, 4, 4])])
 
 
-def read(name):
-    with (DATA / name).open(encoding="utf-8-sig") as file:
-        return [[float(value) for value in row] for row in list(csv.reader(file))[2:]]
+def test_vertical_factors_of_many_kinds_of_tables_have_finite_bars():
+    """Warnings are errors: from two curves of two points to curves without scatter and axes far from zero."""
+    random = np.random.default_rng(0)
+    for curves, points, noise, away in (
+        (2, 2, 0.01, 0),
+        (2, 30, 0.01, 0),
+        (4, 3, 0.1, 0),
+        (5, 20, 0.0, 0),
+        (6, 9, 1e-3, 50),
+    ):
+        x = np.linspace(-1, 1, points)
+        table = [(x + away, sigmoid(x + 0.4 * k) + noise * random.standard_normal(points)) for k in range(curves)]
+        result = superpose(np.arange(curves), [(x, y - away) for x, y in table], vertical=True)
+        assert np.all(np.isfinite(result.covariance))
+        assert np.count_nonzero(result.vertical_error) == curves - 1

@@ -7,8 +7,11 @@ from mdr_dask.physics.two_shifts import superpose_twice
 VELOCITIES, TEMPERATURES = np.geomspace(1e-3, 1e-1, 4), np.array([280.0, 290.0, 300.0, 310.0, 320.0])
 
 
-def family(seed, noise=0.01, cross=0.0):
-    """Curves on a sigmoid at every pair; `cross` is a part of the shift that is no sum."""
+RISES = 0.02 * np.arange(-2, 2), 0.03 * np.arange(-2, 3)
+
+
+def family(seed, noise=0.01, cross=0.0, rise=0.0):
+    """Curves on a sigmoid at every pair; `cross` is a part of the shift that is no sum, `rise` scales vertical ones."""
     random = np.random.default_rng(seed)
     x = np.linspace(-1, 1, 20)
     a, b = -0.4 * np.log10(VELOCITIES / VELOCITIES[2]), 0.03 * (TEMPERATURES - 300.0)
@@ -18,7 +21,8 @@ def family(seed, noise=0.01, cross=0.0):
             shift = a[i] + b[j] + cross * (i - 2) * (j - 2)
             first.append(velocity)
             second.append(temperature)
-            curves.append((x, 2 * np.tanh((x + shift) / 2) + noise * random.standard_normal(x.size)))
+            height = rise * (RISES[0][i] + RISES[1][j])
+            curves.append((x, 2 * np.tanh((x + shift) / 2) - height + noise * random.standard_normal(x.size)))
     return first, second, curves, a, b
 
 
@@ -35,6 +39,22 @@ def test_both_shifts_are_found_within_their_bars():
         chances.append(found.probability)
     assert 0.60 <= np.mean(covered) <= 0.78
     assert 0.3 < np.mean(chances) < 0.7  # uniform if the chi-squared is right; 30 of them are known to 0.05
+
+
+def test_both_shifts_along_both_axes_are_found_within_their_bars():
+    """20 families: 14 factors each, whose errors are correlated within a family."""
+    covered = []
+    for seed in range(20):
+        first, second, curves, a, b = family(seed, rise=1.0)
+        found = superpose_twice(first, second, curves, vertical=True)
+        for part, truth, rise in ((found.first, a, RISES[0]), (found.second, b, RISES[1])):
+            np.testing.assert_allclose(part.horizontal, truth, atol=0.15)
+            np.testing.assert_allclose(part.vertical, rise, atol=0.15)
+            errors = np.append(part.horizontal_error, part.vertical_error)
+            inside = np.abs(np.append(part.horizontal - truth, part.vertical - rise)) <= errors
+            covered.extend(inside[errors > 0])
+    assert len(covered) == 20 * 14
+    assert 0.55 <= np.mean(covered) <= 0.8
 
 
 def test_bootstrap_of_a_sum_agrees_with_its_covariance():
