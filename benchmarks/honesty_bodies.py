@@ -1,17 +1,20 @@
 """How honest error estimates are beyond cubic cells on planes: ``python -m benchmarks.honesty_bodies [cases [seed]]``.
 
-Random cases of three kinds: indenters of the Kelvin body by cubic cells, the other schemes on planes and indenters, and
-materials of up to five arms with or without a dashpot. The reference is the cubic sweep at oversampling 128, or for
-materials the extrapolated solution at 64.
+Random cases of four kinds: indenters of the Kelvin body by cubic cells, the other schemes on planes and indenters,
+materials of up to five arms with or without a dashpot, and measured lines with spikes and steps. The reference is the
+cubic sweep at oversampling 128, or for materials and measured lines the extrapolated solution at 64.
 """
 
 import sys
+import tempfile
+from pathlib import Path
 
 import numpy as np
 
 from mdr_dask.models.base import Block
 from mdr_dask.models.indenter import Power
 from mdr_dask.models.material import Material
+from mdr_dask.models.profile_file import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics import indenter, roughness
 
@@ -44,8 +47,8 @@ def kelvin_case(generator, rough, on_plane):
     return SlidingFriction(**line, **kelvin)
 
 
-def material_case(generator, on_plane):
-    line, force, _ = line_and_body(generator, True, on_plane)
+def random_series(generator):
+    """Return a material of up to five arms with or without a dashpot, and a speed on a line of length 1."""
     arms = generator.integers(0, 6)
     series = {
         "static_modulus": 1.0,
@@ -53,11 +56,28 @@ def material_case(generator, on_plane):
         "times": tuple(10 ** generator.uniform(-6, 3, arms)),
         "viscosity": float(10 ** generator.uniform(-6, 0)) if arms == 0 or generator.uniform() < 0.5 else 0.0,
     }
-    line["points"] = min(line["points"], 400)
     velocity = float(10 ** generator.uniform(-5, 2))
-    return SlidingFriction(
-        **line, material=Material.model_validate({"prony": series}), normal_force=force, velocity=velocity
-    )
+    return {"material": Material.model_validate({"prony": series}), "velocity": velocity}
+
+
+def material_case(generator, on_plane, rough=True):
+    line, force, _ = line_and_body(generator, rough, on_plane)
+    line["points"] = min(line["points"], 400)
+    return SlidingFriction(**line, **random_series(generator), normal_force=force)
+
+
+def measured_case(generator, shape, path):
+    """Return a case on a line of 64 to 512 samples with the rms height 1, written to a file."""
+    count = int(generator.choice([64, 200, 512]))
+    heights = {
+        "spikes": np.where(generator.uniform(size=count) < 0.05, generator.exponential(1, count), 0.0),
+        "steps": np.repeat(generator.standard_normal(8), count // 8),
+        "noise": generator.standard_normal(count),
+    }[shape]
+    heights = (heights - heights.mean()) / max(float(heights.std()), 1e-3)
+    np.savetxt(path, np.column_stack([np.arange(count) / count, heights]), delimiter=",", fmt="%.17g")
+    profile = ProfileFile.model_validate({"file": str(path)})
+    return SlidingFriction(profile=profile, **random_series(generator), normal_force=10 ** generator.uniform(-3, 3))
 
 
 def solve(case, realisation, accuracy=None, **changes):
@@ -70,7 +90,7 @@ def judge(found, exact):
     """Return the share of errors below their estimate, and the median of estimate over error, of cases with results."""
     (friction, estimates), exact = np.array(found).T, np.array(exact)
     known = np.isfinite(friction) & np.isfinite(exact) & (exact != 0)
-    errors, estimates = np.abs(friction / exact - 1)[known], estimates[known]
+    errors, estimates = np.abs(friction[known] / exact[known] - 1), estimates[known]
     over = np.median((estimates / np.maximum(errors, 1e-12))[errors > ROUNDING]) if np.any(errors > ROUNDING) else 1.0
     return float(np.mean(errors <= estimates + ROUNDING)), float(over), int(known.sum())
 
@@ -105,19 +125,33 @@ def schemes(cases, seed, accuracies=(0.05, 0.01)):
 
 
 def materials(cases, seed, grids=(4, 8, 16)):
-    """Yield the judgement of general materials on every grid, on planes and rough indenters."""
-    for body in ("plane", "indenter"):
+    """Yield the judgement of general materials on every grid, on planes and on rough and smooth indenters."""
+    for body in ("plane", "indenter", "smooth indenter"):
         generator = np.random.default_rng(seed)
-        drawn = [material_case(generator, body == "plane") for _ in range(cases)]
-        exact = [solve(case, k, oversampling=64)[0] for k, case in enumerate(drawn)]
-        for grid in grids:
-            found = [solve(case, k, oversampling=grid) for k, case in enumerate(drawn)]
-            yield f"{body}, material, grid {grid}", judge(found, exact)
+        drawn = [material_case(generator, body == "plane", body != "smooth indenter") for _ in range(cases)]
+        yield from on_grids(f"{body}, material", drawn, grids)
+
+
+def measured(cases, seed, grids=(4, 8, 16)):
+    """Yield the judgement of measured lines on every grid."""
+    with tempfile.TemporaryDirectory() as folder:
+        for shape in ("spikes", "steps", "noise"):
+            generator = np.random.default_rng(seed)
+            drawn = [measured_case(generator, shape, Path(folder, f"{shape}_{k}.csv")) for k in range(cases)]
+            yield from on_grids(f"measured {shape}", drawn, grids)
+
+
+def on_grids(name, drawn, grids):
+    """Yield the judgement of cases on every grid, and by `auto` at 1 %, against grid 64."""
+    exact = [solve(case, k, oversampling=64)[0] for k, case in enumerate(drawn)]
+    yield f"{name}, 0.01", judge([solve(case, k, 0.01) for k, case in enumerate(drawn)], exact)
+    for grid in grids:
+        yield f"{name}, grid {grid}", judge([solve(case, k, oversampling=grid) for k, case in enumerate(drawn)], exact)
 
 
 def main(cases=200, seed=0):
     print("| cases | error below the estimate | estimate / error, median | number |\n|---|---|---|---|")
-    for kind in (indenters, schemes, materials):
+    for kind in (indenters, schemes, materials, measured):
         for name, (share, over, number) in kind(int(cases), int(seed)):
             print(f"| {name} | {share:.1%} | {over:.1f} | {number} |", flush=True)
 

@@ -1,7 +1,8 @@
 """How honest the error estimate of sliding friction is: ``python -m benchmarks.honesty_friction [cases [seed]]``.
 
-Random cases in all regions, solved with ``oversampling: auto``, against oversampling 128; every tenth is a fine line
-under the loads of the spacing series of the PRL campaign, against oversampling 16.
+Random cases in all regions, solved with ``oversampling: auto``, against oversampling 128; every tenth is a line of 9000
+or 30000 points under the loads of the spacing series of the PRL campaign, against oversampling 64. Then the long lines
+of that series, against 32 or 64: the grid of the reference has to be that fine, or its own error is what is seen.
 """
 
 import sys
@@ -13,9 +14,13 @@ from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics import roughness
 
 OUTPUTS = ("friction_coefficient", "discretisation_error", "rms_slope")
+LONG = {20000: 64, 50000: 64, 97200: 32, 200000: 32}  # points, and oversampling of the reference
+ROUNDING = 1e-9
 
 
 def solve(hurst, points, force, reach, realisation, oversampling, accuracy=0.01):
+    """Return the outputs of cases on one line, one for every force and reach."""
+    force, reach = np.atleast_1d(force), np.atleast_1d(reach)
     parameters = SlidingFriction(
         length=1.0,
         points=points,
@@ -24,11 +29,18 @@ def solve(hurst, points, force, reach, realisation, oversampling, accuracy=0.01)
         rms_roughness=1.0,
         shear_modulus=1.0,
         relaxation_time=1.0,
-        normal_force=force,
-        velocity=reach,
+        normal_force=float(force[0]),
+        velocity=float(reach[0]),
     )
     outputs = OUTPUTS if oversampling == "auto" else OUTPUTS[:1]
-    return MODEL.compute(Block(parameters, {}, 1, (realisation,), 1, outputs, accuracy)).values
+    columns = {"normal_force": force, "velocity": reach}
+    return MODEL.compute(Block(parameters, columns, force.size, (realisation,), 1, outputs, accuracy)).values
+
+
+def judged(found, exact):
+    """Return errors and estimates of cases."""
+    errors = np.abs(found["friction_coefficient"] / exact["friction_coefficient"] - 1)
+    return errors.ravel(), found["discretisation_error"].ravel()
 
 
 def honesty(cases=500, accuracy=0.01, seed=0):
@@ -46,16 +58,41 @@ def honesty(cases=500, accuracy=0.01, seed=0):
         reach = 10 ** generator.uniform(-2, 3) / slope if k % 5 else 10 ** generator.uniform(-8, 2)
         line = 1000 * seed + k
         found = solve(hurst, points, force, reach, line, "auto", accuracy)
-        exact = solve(hurst, points, force, reach, line, 16 if fine else 128)["friction_coefficient"]
-        errors[k] = abs(found["friction_coefficient"] / exact - 1).item()
-        estimates[k] = found["discretisation_error"].item()
-    # below 1e-9 both are rounding
-    return float(np.mean(errors <= estimates + 1e-9)), float(np.median(estimates / np.maximum(errors, 1e-12)))
+        exact = solve(hurst, points, force, reach, line, 64 if fine else 128)
+        errors[k], estimates[k] = (column.item() for column in judged(found, exact))
+    return summary(errors, estimates)
+
+
+def long_lines(hurst, points, lines=8, accuracy=0.01, seed=0, speeds=20):
+    """Return the same of the spacing series, every other case under another load, and the share within the accuracy."""
+    generator = np.random.default_rng((seed, points))
+    columns = []
+    for line in range(lines):
+        reach = 5e-2 * 10 ** generator.uniform(-4, 3, speeds)
+        force = np.where(np.arange(speeds) % 2, 15.0, 10 ** generator.uniform(0, 2, speeds))
+        found = solve(hurst, points, force, reach, 1000 * seed + line, "auto", accuracy)
+        columns.append(judged(found, solve(hurst, points, force, reach, 1000 * seed + line, LONG[points])))
+    errors, estimates = np.concatenate(columns, axis=1)
+    return *summary(errors, estimates), float(np.mean(errors <= accuracy))
+
+
+def summary(errors, estimates):
+    """Return the share of errors below their estimate, and the median of estimate over error."""
+    over = np.median(estimates / np.maximum(errors, 1e-12))
+    return float(np.mean(errors <= estimates + ROUNDING)), float(over)
+
+
+def main(cases=500, seed=0):
+    for target in (0.05, 0.01, 0.002):
+        share, over = honesty(cases, target, seed)
+        print(f"{cases} cases at {target:g}: {share:.1%} below the estimate, {over:.1f} times too large (median)")
+    print("| long lines at 1 %: points | H | below the estimate | estimate / error, median | within 1 % |")
+    print("|---|---|---|---|---|")
+    for points in LONG:
+        for hurst in (0.0, 0.1, 0.3):
+            share, over, within = long_lines(hurst, points, seed=seed)
+            print(f"| {points} | {hurst} | {share:.1%} | {over:.1f} | {within:.1%} |", flush=True)
 
 
 if __name__ == "__main__":
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else 500
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    for target in (0.05, 0.01, 0.002):
-        share, over = honesty(number, target, first)
-        print(f"{number} cases at {target:g}: {share:.1%} below the estimate, {over:.1f} times too large (median)")
+    main(*(int(argument) for argument in sys.argv[1:]))

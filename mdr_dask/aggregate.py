@@ -97,7 +97,8 @@ def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:
     -------
     DataArray
         With the dimension ``bound`` (``low``, ``high``) instead of ``realisation``, at the confidence `CONFIDENCE`;
-        deviations are stretched by sqrt(n / (n - 1)), without which small ensembles are covered too rarely.
+        deviations are stretched by sqrt(n / (n - 1)) and by Student's t over the normal quantile, without which small
+        ensembles are covered too rarely.
     """
     return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(
         bound=np.array(["low", "high"], dtype=object)
@@ -117,13 +118,17 @@ def _bootstrap(values: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
 
 
 def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.special import ndtri, stdtrit
+
     valid = np.isfinite(rows)
     number = valid.sum(axis=1)
+    spare = np.maximum(number - 1, 1)
     mean = np.where(valid, rows, 0.0).sum(axis=1) / np.maximum(number, 1)
     deviations = np.where(valid, rows - mean[:, None], 0.0) @ weights
     drawn = valid.astype(float) @ weights
-    stretch = np.sqrt(number / np.maximum(number - 1, 1))
-    shifts = np.quantile(deviations / np.maximum(drawn, 1.0), [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], axis=1).T
+    low, high = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
+    stretch = np.sqrt(number / spare) * stdtrit(spare, high) / ndtri(high)
+    shifts = np.quantile(deviations / np.maximum(drawn, 1.0), [low, high], axis=1).T
     return np.where(number[:, None] > 1, mean[:, None] + stretch[:, None] * shifts, np.nan)
 
 

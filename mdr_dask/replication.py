@@ -13,6 +13,10 @@ from mdr_dask.models.base import Status
 
 #: Each round adds about this share of the realisations there are.
 GROWTH = 0.5
+#: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
+FEWEST = 10
+#: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
+NEGLIGIBLE = 1e-3
 
 
 def rounds(replication: Replication) -> Iterator[int]:
@@ -42,15 +46,16 @@ def needs_more(
     Returns
     -------
     bool array, shape (...)
-        True where the standard error of some output is above its tolerance or not known yet; a case that never succeeds
-        is not tried for ever.
+        True where the standard error of some output is above its tolerance or not known well yet (`FEWEST`); a case
+        that never succeeds is not tried for ever.
     """
     done = status == Status.DONE
     count = done.sum(axis=-1)
     wide = np.zeros(count.shape, dtype=bool)
+    trusted = np.where(count < FEWEST, NEGLIGIBLE, 1.0)
     for name, tolerance in until.items():
         mean, error = mean_and_error(values[name], done)
-        wide |= ~(error <= np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean)))
+        wide |= ~(error <= trusted * np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean)))
     return np.asarray(wide & (count > 0))
 
 

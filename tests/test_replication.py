@@ -35,29 +35,46 @@ def test_a_case_that_never_succeeds_is_given_up_and_a_single_success_is_not_enou
     assert needs_more(values, status, {"y": Tolerance(relative=0.5)}).tolist() == [False, True]
 
 
-@pytest.mark.parametrize(("at_least", "promised"), [(20, 0.94), (10, 0.94), (5, 0.93), (2, 0.89)])
-def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, promised):
-    """4000 campaigns stopped by their own standard error: 95 % intervals cover as often as promised, within 4 sigma.
+def test_few_results_are_enough_only_where_they_hardly_scatter():
+    generator = np.random.default_rng(0)
+    scatter = np.array([0.0, 1e-6, 1e-3, 1e-3])[:, None]
+    values = {"y": 1 + scatter * generator.standard_normal((4, 10))}
+    status = np.full((4, 10), Status.DONE, dtype=np.int8)
+    status[2, 0] = Status.FAILED
+    until = {"y": Tolerance(relative=0.01)}
+    assert needs_more({"y": values["y"][:, :3]}, status[:, :3], until).tolist() == [False, False, True, True]
+    assert needs_more(values, status, until).tolist() == [False, False, True, False]
 
-    Stopping early favours ensembles that happen to look narrow, which costs coverage, and more of it the smaller the
-    first round is.
-    """
+
+CAMPAIGNS = 4000
+
+
+def coverage(at_least, tolerance, values):
+    """Return the share of campaigns whose 95 % interval holds the truth 1, having stopped by their standard error."""
     from scipy.stats import t
 
-    campaigns = 4000
-    plan = Replication(at_least, 640, {"y": Tolerance(relative=0.03)})
-    generator = np.random.Generator(np.random.Philox(11))
-    values = 1.0 + 0.2 * generator.standard_normal((campaigns, 640))
-    used = np.full(campaigns, plan.at_most)
-    open_cases = np.ones(campaigns, dtype=bool)
+    most = values.shape[1]
+    plan = Replication(at_least, most, {"y": Tolerance(relative=tolerance)})
+    used = np.full(len(values), most)
+    running = np.arange(len(values))
     for count in rounds(plan):
-        status = np.full((campaigns, count), Status.DONE, dtype=np.int8)
-        wide = needs_more({"y": values[:, :count]}, status, plan.until)
-        used[open_cases & ~wide] = count
-        open_cases &= wide
-    valid = np.arange(640) < used[:, None]
-    mean, error = mean_and_error(values, valid)
-    covered = np.mean(np.abs(mean - 1.0) <= t.ppf(0.975, used - 1) * error)
-    assert (error[used < 640] <= 0.03 * mean[used < 640]).all()
-    scatter = np.sqrt(promised * (1 - promised) / campaigns)
-    assert promised - 4 * scatter <= covered <= 0.95 + 4 * scatter
+        status = np.full((running.size, count), Status.DONE, dtype=np.int8)
+        used[running] = count
+        running = running[needs_more({"y": values[running, :count]}, status, plan.until)]
+    mean, error = mean_and_error(values, np.arange(most) < used[:, None])
+    assert (error[used < most] <= tolerance * mean[used < most]).all()
+    return np.mean(np.abs(mean - 1.0) <= t.ppf(0.975, used - 1) * error)
+
+
+@pytest.mark.parametrize("tolerance", [0.03, 0.04, 0.06])
+@pytest.mark.parametrize("at_least", [2, 3, 5, 8, 10, 20])
+def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, tolerance):
+    """4000 campaigns of scatter 0.2: 95 % intervals cover 94 % or more, within 3 sigma, whatever the first round.
+
+    Stopping early favours ensembles that happen to look narrow. That costs most where about 10 to 40 are needed, which
+    these tolerances ask for.
+    """
+    values = 1.0 + 0.2 * np.random.Generator(np.random.Philox(11)).standard_normal((CAMPAIGNS, 160))
+    covered = coverage(at_least, tolerance, values)
+    scatter = np.sqrt(0.94 * 0.06 / CAMPAIGNS)
+    assert 0.94 - 3 * scatter <= covered <= 0.95 + 4 * scatter

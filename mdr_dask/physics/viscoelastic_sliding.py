@@ -31,6 +31,15 @@ It is rounding but for contacts far shorter than a cell, whose ends are known to
 RESOLVED = 0.5
 """Largest relative change of a number between two grids that is extrapolated."""
 
+HARDLY = 1.5
+"""Cells in contact below which the change between two grids is a part of the error only, which is their share of it."""
+
+CELLS_OF_A_PEAK = 16
+"""Cells in contact for every peak of the line beyond which their errors are not independent."""
+
+BY_CHANCE = 0.03
+"""Part of the last change between grids that the estimate is never below: three grids may agree by chance."""
+
 GRIDS = (1, 2, 4)
 """Every point, every second and every fourth: extrapolation and its error estimate."""
 
@@ -122,7 +131,8 @@ def steady_viscoelastic_sliding(
             found = _solve(below[::step], step, load, periodic, None)
         solutions.append(found)
     mean = float(heights.mean()) if periodic else 0.0
-    return _extrapolated(solutions, mean - float(heights[top]), below.size - 1)
+    peaks = int(np.count_nonzero((below[1:-1] > below[:-2]) & (below[1:-1] >= below[2:]))) + 1
+    return _extrapolated(solutions, mean - float(heights[top]), below.size - 1, peaks)
 
 
 @dataclass(frozen=True)
@@ -180,12 +190,13 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     return _Solution(values, unknown, imbalance, status, sweeps)
 
 
-def _extrapolated(solutions: list[_Solution], mean: float, cells: int) -> ViscoelasticSteady:
+def _extrapolated(solutions: list[_Solution], mean: float, cells: int, peaks: int) -> ViscoelasticSteady:
     """Extrapolate the two finest grids by their second order; the coarsest tells how well that works.
 
     The error is estimated by a geometric mean of the last change of the extrapolation, counted twice, and of the last
     change of the grids, since the former may be small by accident. It falls with the number of cells in contact, whose
-    errors are independent.
+    errors are independent. Where hardly a cell is in contact the friction halves with the cells, and the exact one may
+    lie far below.
     """
     coarsest, coarse, fine = solutions
     if any(solution.status != CONVERGED for solution in solutions):
@@ -195,10 +206,13 @@ def _extrapolated(solutions: list[_Solution], mean: float, cells: int) -> Viscoe
     before = coarse.values + (coarse.values - coarsest.values) / 3
     resolved = 3 * np.abs(correction) <= RESOLVED * np.abs(fine.values)
     values = np.where(resolved, fine.values + correction, fine.values)
-    change = 3 * float(abs(correction[0]))
-    if resolved[0]:
-        touching = max(float(fine.values[2]) * cells, 1.0)
-        change = SAFETY * float(np.cbrt((values[0] - before[0]) ** 2 * change) / touching**0.25)
+    change, touching = 3 * float(abs(correction[0])), float(fine.values[2]) * cells
+    if touching < 1 or (touching < HARDLY and not resolved[0]):
+        change = change * HARDLY / touching if touching > 0 else np.inf
+    elif resolved[0]:
+        independent = min(touching, CELLS_OF_A_PEAK * peaks)
+        extrapolated = SAFETY * float(np.cbrt((values[0] - before[0]) ** 2 * change) / independent**0.25)
+        change = max(extrapolated, BY_CHANCE * change)
     friction, depth, fraction, slope = (float(value) for value in values)
     error = change / abs(friction) if friction else change
     fraction = min(max(fraction, 0.0), 1.0)

@@ -216,3 +216,35 @@ def test_extremes_are_right_to_their_own_estimates(material):
     estimate = (found.values["discretisation_error"] + exact.values["discretisation_error"])[known]
     assert np.mean(miss <= estimate + 1e-9) >= 0.9
     assert np.max(miss / (estimate + 1e-9)) < 20
+
+
+def test_a_peak_between_nodes_that_holds_an_element_above_the_highest_node():
+    """On this line the highest node is not on the highest peak, which a fast element still feels when it gets there."""
+    parameters = LINE | KELVIN | {"points": 500, "hurst": 0.5, "length": 1.0, "rms_roughness": 1.0}
+    columns = {"velocity": np.array([3e3, 1e4, 3e4]), "normal_force": 4e7 * np.array([0.5, 1.0, 2.0])}
+
+    def friction(oversampling):
+        case = SlidingFriction.model_validate(parameters | LOAD | {"oversampling": oversampling})
+        return MODEL.compute(Block(case, columns, 3, (112,), 3, ALL, 0.01)).values
+
+    found, exact = friction("auto"), friction(64)["friction_coefficient"]
+    miss = np.abs(found["friction_coefficient"] / exact - 1)
+    assert np.all(miss <= found["discretisation_error"])
+
+
+@pytest.mark.parametrize("realisation", range(4))
+def test_the_estimate_knows_a_peak_that_hardly_a_node_touches(realisation):
+    """Two grids that touch a peak on less than a node have the curvature of its cubic only, and agree by chance."""
+    columns = {"velocity": np.geomspace(2e4, 1e8, 24), "normal_force": np.geomspace(1e4, 1e8, 24)}
+    parameters = LINE | KELVIN | LOAD | {"length": 1.0, "rms_roughness": 1.0, "hurst": 0.3}
+
+    def friction(oversampling):
+        case = SlidingFriction.model_validate(parameters | {"oversampling": oversampling})
+        return MODEL.compute(Block(case, columns, 24, (realisation,), 9, ALL, 0.01)).values
+
+    exact = friction(256)["friction_coefficient"]
+    for oversampling in (2, 4, 16):
+        found = friction(oversampling)
+        miss = np.abs(found["friction_coefficient"] / exact - 1)
+        assert np.all(found["contact_fraction"] * LINE["points"] * oversampling < 2)
+        assert np.all(miss <= found["discretisation_error"])

@@ -1,0 +1,204 @@
+"""A slow reference for steady friction: one element is followed along a fine line, step by step, and its losses summed.
+
+It shares nothing with the solvers but the equations. In a step the displacement is a straight line; it is that of the
+line where the force is not negative, and otherwise that of no force. Friction is what arms and dashpot dissipate. Grids
+are refined until three of them agree.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+TURNS = 300  # in which a periodic state is found, or it is not known
+DEEP = 8  # turns that the next one is made from
+CLOSED = 1e-9  # change of the state over a turn, relative to the largest displacement
+AGREED = 5e-4  # relative change between grids that is small enough
+COARSEST, WORK = 2**12, 2**22  # cells to begin with, and cells times arms in the end
+
+
+@dataclass(frozen=True)
+class Body:
+    """A linear solid as a line of length 1 passes by: static modulus 1, arms with their reaches, and the dashpot's."""
+
+    moduli: np.ndarray
+    reaches: np.ndarray
+    dashpot: float
+
+
+@dataclass(frozen=True)
+class Reference:
+    """F_N / (4 G L), the coefficient of friction, and how far grids differ in both, relatively."""
+
+    load: float
+    friction: float
+    doubt: float
+
+
+@njit
+def _coefficients(step, reaches, keep, hold, gain):
+    """Write what an arm keeps over a step, takes of the displacement before, and of a displacement that grows by 1."""
+    for m in range(reaches.size):
+        x = step / reaches[m]
+        keep[m] = np.exp(-x)
+        gain[m] = 1 + np.expm1(-x) / x if x > 1e-4 else 0.5 * x - x * x / 6
+        hold[m] = -np.expm1(-x)
+
+
+@njit
+def _free(u, step, moduli, dashpot, keep, hold, gain, arms):
+    """Return the displacement after a step without force."""
+    stiffness, pull = 1 + dashpot / step, dashpot / step * u
+    for m in range(moduli.size):
+        stiffness += moduli[m] * (1 - gain[m])
+        pull += moduli[m] * (keep[m] * arms[m] + (hold[m] - gain[m]) * u)
+    return pull / stiffness
+
+
+@njit
+def _energy(u, moduli, arms):
+    stored = 0.5 * u * u
+    for m in range(moduli.size):
+        stored += 0.5 * moduli[m] * (u - arms[m]) ** 2
+    return stored
+
+
+@njit
+def _move(before, u, keep, hold, gain, arms):
+    for m in range(keep.size):
+        arms[m] = keep[m] * arms[m] + hold[m] * before + gain[m] * (u - before)
+
+
+@njit
+def _loss(before, u, step, moduli, reaches, dashpot, arms_before, arms):
+    """Return what arms and dashpot lose in a step in which the displacement is a straight line."""
+    speed = (u - before) / step
+    lost = dashpot * speed * speed * step
+    for m in range(moduli.size):
+        first, last = before - arms_before[m], u - arms[m]
+        if reaches[m] > step:
+            lost += moduli[m] * step / reaches[m] * (first * first + first * last + last * last) / 3
+        else:
+            moved = reaches[m] * (arms[m] - arms_before[m])
+            lost += moduli[m] * (speed * moved - 0.5 * (last * last - first * first))
+    return lost
+
+
+@njit
+def _pass(w, moduli, reaches, dashpot, arms, fresh, u, sums):
+    """Follow an element from node to node; sums are integrals of u and of the loss, and nodes in contact at the ends.
+
+    What the arms would be had they come with nothing is in `fresh`.
+    """
+    whole = 1 / (w.size - 1)
+    keep, hold, gain = np.empty(moduli.size), np.empty(moduli.size), np.empty(moduli.size)
+    part_keep, part_hold, part_gain = np.empty(moduli.size), np.empty(moduli.size), np.empty(moduli.size)
+    _coefficients(whole, reaches, keep, hold, gain)
+    old = np.empty(moduli.size)
+    sums[:] = 0.0
+    fresh[:] = 0.0
+    was = False
+    for i in range(1, w.size):
+        step, used_keep, used_hold, used_gain = whole, keep, hold, gain
+        free = _free(u, step, moduli, dashpot, keep, hold, gain, arms)
+        touching = w[i] >= free
+        if touching and not was and u > w[i - 1]:
+            # it flies on to where it touches
+            used_keep, used_hold, used_gain = part_keep, part_hold, part_gain
+            flight = min((u - w[i - 1]) / (u - w[i - 1] + w[i] - free + 1e-300), 0.999999)
+            step = flight * whole
+            _coefficients(step, reaches, part_keep, part_hold, part_gain)
+            free = _free(u, step, moduli, dashpot, part_keep, part_hold, part_gain, arms)
+            old[:] = arms
+            _move(u, free, part_keep, part_hold, part_gain, arms)
+            _move(u, free, part_keep, part_hold, part_gain, fresh)
+            sums[0] += 0.5 * step * (u + free)
+            sums[1] += _loss(u, free, step, moduli, reaches, dashpot, old, arms)
+            u, step = free, whole - step
+            _coefficients(step, reaches, part_keep, part_hold, part_gain)
+        then = w[i] if touching else free
+        old[:] = arms
+        _move(u, then, used_keep, used_hold, used_gain, arms)
+        _move(u, then, used_keep, used_hold, used_gain, fresh)
+        sums[0] += 0.5 * step * (u + then)
+        sums[1] += _loss(u, then, step, moduli, reaches, dashpot, old, arms)
+        sums[2] += touching and (i == 1 or i == w.size - 1)
+        u, was = then, touching
+    return u
+
+
+def _ahead(states, images):
+    """Return where a fixed point is expected after some states and their images (Anderson)."""
+    residual = np.array(images) - np.array(states)
+    steps, rises = np.diff(images, axis=0), np.diff(residual, axis=0)
+    weights = np.linalg.lstsq(rises.T, residual[-1], rcond=1e-10)[0] if len(rises) else np.zeros(0)
+    return images[-1] - weights @ steps if len(rises) else images[-1]
+
+
+def _solved(w, body, periodic, arms):
+    """Return load and loss of a line of nodes, or None where the state is not found or leaves the line."""
+    moduli, reaches, sums, fresh = body.moduli, body.reaches, np.zeros(3), np.empty(body.moduli.size)
+    solid = moduli, reaches, body.dashpot
+    if not periodic:
+        arms[:] = 0.0
+        u = _pass(w, *solid, arms, fresh, 0.0, sums)
+        # beyond the line what is stored is lost, and the integral of u is what dashpot and arms hold
+        beyond = body.dashpot * u + moduli @ (reaches * arms)
+        return None if sums[2] else (sums[0] + beyond, sums[1] + _energy(u, moduli, arms))
+    lost = -np.expm1(-1 / reaches)
+    u, states, images = max(w[0], 0.0), [], []
+    for _ in range(TURNS):
+        began, u_began = arms.copy(), u
+        u = _pass(w, *solid, arms, fresh, u, sums)
+        # as if the displacement of this turn had always been
+        arms[:] = fresh / lost
+        if max(abs(u - u_began), np.max(np.abs(arms - began), initial=0.0)) < CLOSED * max(w.max(), u):
+            return sums[0], sums[1]
+        states, images = [*states[-DEEP:], began], [*images[-DEEP:], arms.copy()]
+        arms[:] = _ahead(states, images)
+    return None
+
+
+def reference(line, depth, body, periodic=True):
+    """Return the steady state at a depth of a function line(nodes) that gives heights at nodes, both ends included."""
+    cells, before, earlier = COARSEST, None, np.inf
+    arms = np.full(body.moduli.size, np.maximum(depth + line(cells + 1), 0.0).mean())
+    while True:
+        found = _solved(depth + line(cells + 1), body, periodic, arms)
+        if found is None or min(found) <= 0:
+            return None
+        load, friction = found[0], found[1] / found[0]
+        if before is not None:
+            change = abs(load / before[0] - 1) + abs(friction / before[1] - 1)
+            # two grids may agree by chance
+            doubt = max(change, earlier / 3)
+            if doubt < AGREED or 2 * cells * (body.moduli.size + 1) > WORK:
+                return Reference(load, friction, doubt)
+            earlier = change
+        cells, before = 2 * cells, (load, friction)
+
+
+def waves(amplitude, phase):
+    """Return the function of a periodic line that is a sum of cosines."""
+
+    def line(nodes):
+        spectrum = np.zeros(nodes // 2 + 1, dtype=complex)
+        spectrum[1 : amplitude.size + 1] = 0.5 * (nodes - 1) * amplitude * np.exp(1j * phase)
+        turn = np.fft.irfft(spectrum, nodes - 1)
+        return np.append(turn, turn[0])
+
+    return line
+
+
+def samples(heights):
+    """Return the function of a periodic line of the waves that an even number of samples holds."""
+    count = heights.size
+
+    def line(nodes):
+        spectrum = np.zeros(nodes // 2 + 1, dtype=complex)
+        spectrum[: count // 2 + 1] = np.fft.rfft(heights) * (nodes - 1) / count
+        spectrum[count // 2] /= 2
+        turn = np.fft.irfft(spectrum, nodes - 1)
+        return np.append(turn, turn[0])
+
+    return line
