@@ -1,5 +1,10 @@
+import hypothesis
 import pytest
 import toy as toy_model
+
+# the same examples every time; `--hypothesis-profile=default` looks for new ones
+hypothesis.settings.register_profile("repeatable", derandomize=True)
+hypothesis.settings.load_profile("repeatable")
 
 
 @pytest.fixture
