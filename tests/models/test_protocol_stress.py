@@ -52,7 +52,7 @@ def powers(low: float, high: float) -> st.SearchStrategy[float]:
 SPEEDS = st.one_of(st.just(0.0), powers(-6, 0), powers(-3, 0).map(lambda v: -v))
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None)
 @given(
     speeds=st.lists(SPEEDS, min_size=3, max_size=3),
     forces=st.lists(powers(-5, 3), min_size=3, max_size=3),
@@ -72,7 +72,7 @@ def of(body: str) -> dict[str, object]:
     return {"shear_modulus": None, "relaxation_time": None, "material": solid if body == "standard_solid" else ARMS}
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12, deadline=None)
 @given(frequency=powers(0, 5), part=st.floats(0, 3), load=st.floats(0, 0.999), force=powers(-5, 2))
 def test_oscillation_slower_and_faster_than_relaxation(
     frequency: float, part: float, load: float, force: float

@@ -81,7 +81,7 @@ def test_planes_are_right_to_their_own_estimates(kind):
     """From one point in contact to all of the line."""
     judge = Judge()
 
-    @settings(max_examples=EXAMPLES[kind], deadline=None, derandomize=True, database=None)
+    @settings(max_examples=EXAMPLES[kind], deadline=None, database=None)
     @given(material=MATERIALS[kind], hurst=st.floats(0, 1), share=decades(-3, 1), realisation=st.integers(0, 1000))
     def draw(material, hurst, share, realisation):
         line = waves(roughness.amplitudes(POINTS // 2, hurst), roughness.phases(SEED, realisation, POINTS // 2))
@@ -99,7 +99,7 @@ def test_indenters_are_right_to_their_own_estimates(kind, rough):
     """Bodies of exponents 1 to 6 whose contact takes 2 to 40 % of the line, from flat to steep ones."""
     judge = Judge()
 
-    @settings(max_examples=EXAMPLES[kind] // 2, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=EXAMPLES[kind] // 2, deadline=None, database=None)
     @given(
         material=MATERIALS[kind],
         hurst=st.floats(0, 1),
@@ -131,7 +131,7 @@ def test_measured_lines_are_right_to_their_own_estimates(tmp_path, shape):
     """A measured line is the band-limited one through its samples, however they jump."""
     judge, path = Judge(), tmp_path / "line.csv"
 
-    @settings(max_examples=15, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=15, deadline=None, database=None)
     @given(
         material=st.one_of(MATERIALS["kelvin"], few_arms),
         seed=st.integers(0, 1000),

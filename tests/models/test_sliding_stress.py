@@ -47,7 +47,7 @@ def assert_answers_or_says_why(result):
         assert found["discretisation_error"] >= 0
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(
     hurst=st.floats(0, 1),
     force=fifteen_decades,
@@ -115,7 +115,7 @@ QUANTITIES = {
 }
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25, deadline=None)
 @given(data=st.data(), body=st.sampled_from(BODIES), general=st.booleans())
 def test_units_do_not_matter(data, body, general):
     """One case in metres, millimetres or micrometres: the same friction, bit by bit, and lengths to rounding."""
@@ -141,7 +141,7 @@ def test_units_do_not_matter(data, body, general):
         assert one.values["contact_fraction"].tobytes() == two.values["contact_fraction"].tobytes()
 
 
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40, deadline=None)
 @given(
     kind=st.sampled_from(["spikes", "steps", "needle", "saw", "flat", "noise"]),
     seed=st.integers(0, 1000),
@@ -181,7 +181,7 @@ def fifty_arms(seed):
     }
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 100), force=st.floats(-7, 7), velocity=st.floats(-9, 6), body=st.sampled_from(BODIES))
 def test_fifty_arms_over_twenty_decades(seed, force, velocity, body):
     parameters = LINE | {"material": {"prony": fifty_arms(seed)}, "indenter": body, "oversampling": 8}

@@ -15,7 +15,7 @@ def solve(height, slope, reach, load, scheme):
     return sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]), scheme)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150, deadline=None)
 @given(
     hurst=st.floats(0, 1),
     points=st.sampled_from([16, 50, 300]),
@@ -43,7 +43,7 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
     assert 0 <= steady.contact_fraction[0] <= 1 + 1e-9
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60, deadline=None)
 @given(
     exponent=st.floats(1, 6),
     coefficient=st.floats(-3, 3),
