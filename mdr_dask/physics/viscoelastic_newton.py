@@ -13,6 +13,9 @@ from mdr_dask.physics.viscoelastic_sweep import CLOSED, multiply, sweep
 FloatArray = NDArray[np.float64]
 
 
+DEEPEST_STEP = 0.7
+"""Largest step back of the depth on a line that elements enter undeformed, relative to it."""
+
 LINEAR = 1e-10
 """Residual of a step of Newton's method, relative to what it is to remove: far below what the next one brings."""
 
@@ -297,7 +300,8 @@ def solve_sliding(
         else:
             residual[:] = 1.0  # a unit of depth while the memory stays: elements enter at rest
             follow(residual, swept, False, turned, scratch)
-            step[arms] = (strain_area - totals[1]) / turned[arms]
+            # a contact that reaches the end of the line is larger than the sweep sees
+            step[arms] = max((strain_area - totals[1]) / turned[arms], -DEEPEST_STEP * unknown[arms])
         largest = 0.0
         for j in range(size):
             weight = min(1.0, moduli[j]) if j < arms else 1.0  # a soft arm cannot matter
