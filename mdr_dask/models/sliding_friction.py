@@ -25,7 +25,7 @@ IntArray = NDArray[np.intp]
 ACCURACY = 0.01  # where the campaign does not say
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
-POINT_LINE, POINT_SAMPLED = 2e-7, 2.5e-8  # and for every Nyquist point gone along from node to node
+POINT_LINE, POINT_SAMPLED = 1.2e-7, 1.5e-8  # and for every Nyquist point gone along from node to node
 ARRAYS = 30  # arrays of the length of the line that a solution holds
 
 
