@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mdr_dask.physics.profile import highest_point
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -82,7 +84,7 @@ def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float
     top : float
         Height of that point.
     """
-    best, place, top = _summit(height, slope)
+    best, place, top = highest_point(height, slope)
     n = height.size
     heights, slopes, area, square = np.empty((4, n + 2))
     _turned(height, slope, best, top, heights, slopes, area, square)
@@ -114,27 +116,6 @@ def _turned(
         # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
         bend = (leave**2 - before**2 - after**2 + enter**2) / 24
         square[i + 1] = square[i] + (0.5 * (enter**2 + leave**2) + bend) * n
-
-
-@njit(nogil=True, cache=True)
-def _summit(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
-    """Return the cell of the highest point, where in the cell it is, 0..1, and its height."""
-    n = height.size
-    best, best_place, highest = 0, 0.0, -np.inf
-    for i in range(n):
-        following = i + 1 if i + 1 < n else 0
-        after, enter, leave = height[following], slope[i] / n, slope[following] / n
-        place = 0.0
-        if enter > 0 > leave:
-            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
-            b, c = b * place * place, c * place**3
-        else:
-            b, c = 0.0, 0.0
-        peak = height[i] + place * enter + b + c
-        if peak > highest:
-            best, best_place, highest = i, place, peak
-    return best, best_place, highest
 
 
 class Patches(NamedTuple):

@@ -13,6 +13,8 @@ from mdr_dask.physics.sweep import BLOCK, Cells, summit
 
 FloatArray = NDArray[np.float64]
 
+STEEPEST_RISE = 4 / 27  # of a cubic over its ends, of the slopes there
+
 
 @dataclass(frozen=True)
 class Profile:
@@ -165,3 +167,30 @@ def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
     summed += (summed[first] - stretch[first]) / max(n - 1, 1)
     summed[first] = stretch[first]
     return summed
+
+
+@njit(nogil=True, cache=True)
+def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
+    """Return the cell of the highest point of a periodic line of cubic cells, the place in it, 0..1, and the height.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+        Heights and derivatives by position over the length of the line.
+    """
+    n = height.size
+    best, best_place, highest = 0, 0.0, -np.inf
+    for i in range(n):
+        following = i + 1 if i + 1 < n else 0
+        after, enter, leave = height[following], slope[i] / n, slope[following] / n
+        place = 0.0
+        if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
+            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
+            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            b, c = b * place * place, c * place**3
+        else:
+            b, c = 0.0, 0.0
+        peak = height[i] + place * enter + b + c
+        if peak > highest:
+            best, best_place, highest = i, place, peak
+    return best, best_place, highest

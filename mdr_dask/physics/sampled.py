@@ -13,13 +13,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from mdr_dask.physics.profile import highest_point
 from mdr_dask.physics.sampled_nodes import (
     AFTER,
     BEFORE,
     BLOCK,
     FloatArray,
     Nodes,
-    after_summit,
     halved,
     nodes,
     summit,
@@ -204,7 +204,8 @@ def begin(
 def finer(height: FloatArray, slope: FloatArray) -> Nodes:
     """Return the line that :func:`begin` was given on cells of half the width, from its summit on."""
     height, slope = halved(height, slope)
-    return nodes(height, slope, after_summit(height, slope), 1, True)
+    cell, _, _ = highest_point(height, slope)
+    return nodes(height, slope, (cell + 1) % height.size, 1, True)
 
 
 def settle(

@@ -13,7 +13,6 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 32  # cells
 BEFORE, AFTER = 4, 5  # nodes of the turns before and after, as many as `refine` reads
-TINY = 1e-300
 SUMMIT = 64  # nodes in a cell that its highest point is taken from
 WING = 4  # nodes to either side that the middle of a cell follows from
 
@@ -55,23 +54,6 @@ def slope_square(s: FloatArray, i: int) -> float:
     before, first, last, after = s[i - 1] * s[i - 1], s[i] * s[i], s[i + 1] * s[i + 1], s[i + 2] * s[i + 2]
     square: float = 0.5 * (first + last) + (first + last - before - after) / 24
     return square
-
-
-@njit(nogil=True, cache=True)
-def after_summit(height: FloatArray, slope: FloatArray) -> int:
-    """Return the node after the cell that holds the highest point of a line."""
-    n = height.size
-    best, highest = 0, -np.inf
-    for i in range(n):
-        following = i + 1 if i + 1 < n else 0
-        enter, leave = slope[i] / n, slope[following] / n
-        if enter >= 0 >= leave and max(height[i], height[following]) + 0.125 * (enter - leave) > highest:
-            x = enter / (enter - leave + TINY)
-            rise = height[following] - height[i]
-            peak = height[i] + x * (enter + x * (3 * rise - 2 * enter - leave + x * (enter + leave - 2 * rise)))
-            if peak > highest:
-                best, highest = following, peak
-    return best
 
 
 @njit(nogil=True, cache=True)

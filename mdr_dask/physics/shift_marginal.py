@@ -209,6 +209,15 @@ def log_posterior(
     return -0.5 * (volume + freedom * np.log(misfit) + unusual), misfit / (freedom - 2)
 
 
+@njit(nogil=True, cache=True)
+def _room(
+    splines: int, curves: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, IntArray]:  # pragma: no cover
+    """Return what `log_posterior` works in: band, right, cross, schur, heights and first."""
+    cross, schur = np.empty((curves, splines)), np.empty((curves, curves))
+    return np.empty((splines, 4)), np.empty(splines), cross, schur, np.empty(curves), np.empty(curves, np.intp)
+
+
 @njit(nogil=True, cache=True, error_model="numpy")
 def log_posteriors(
     points: FloatArray,
@@ -227,9 +236,7 @@ def log_posteriors(
     `bounds` is the range of the logarithm of the weight of the curvature.
     """
     curves = points.shape[1] - 2
-    band, right, cross = np.empty((splines, 4)), np.empty(splines), np.empty((curves, splines))
-    schur, heights, first = np.empty((curves, curves)), np.empty(curves), np.empty(curves, np.intp)
-    room = band, right, cross, schur, heights, first
+    room = _room(splines, curves)
     found = np.full(points.shape[0], -np.inf)
     for i in range(points.shape[0]):
         if bounds[0] < points[i, curves + 1] < bounds[1]:
@@ -252,9 +259,8 @@ def heights_of(
 ) -> tuple[FloatArray, FloatArray]:  # pragma: no cover
     """Return the mean vertical shifts at points, and the mean of their covariance there by weights that sum to one."""
     curves = points.shape[1] - 2
-    band, right, cross = np.empty((splines, 4)), np.empty(splines), np.empty((curves, splines))
-    schur, heights, first = np.empty((curves, curves)), np.empty(curves), np.empty(curves, np.intp)
-    room = band, right, cross, schur, heights, first
+    room = _room(splines, curves)
+    schur, heights = room[3], room[4]
     means, spread = np.empty((points.shape[0], curves)), np.zeros((curves, curves))
     for i in range(points.shape[0]):
         variance = log_posterior(points[i], x, y, member, low, step, curvature, expected, *room)[1]
