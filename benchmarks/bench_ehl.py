@@ -8,9 +8,9 @@ import pytest
 
 from mdr_dask.models.base import Block
 from mdr_dask.models.ehl_line import MODEL, EhlLineParameters
-from mdr_dask.physics.deformation import influence_matrix
-from mdr_dask.physics.ehl_newton import solve_linear
-from mdr_dask.physics.line_contact import line_contact, solve
+from mdr_dask.physics.lubrication.deformation import influence_matrix
+from mdr_dask.physics.lubrication.line_contact import line_contact, solve
+from mdr_dask.physics.lubrication.newton import solve_linear
 
 E_STAR = 115.385e9
 CASES = {

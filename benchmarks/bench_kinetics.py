@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics import roughness
-from mdr_dask.physics.kinetics import CONVERGED, velocity_jump
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.transients.velocity_jump import CONVERGED, velocity_jump
 
 POINTS = 1000
 

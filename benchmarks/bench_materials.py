@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics import roughness
-from mdr_dask.physics.rheology import prony, recovery
-from mdr_dask.physics.superposition import superpose
-from mdr_dask.physics.viscoelastic_sliding import steady_viscoelastic_sliding
+from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
+from mdr_dask.physics.solids import prony, recovery
+from mdr_dask.physics.superposition.master_curve import superpose
+from mdr_dask.physics.surfaces import roughness
 
 LENGTH, POINTS = 0.02, 4000
 

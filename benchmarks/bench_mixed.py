@@ -8,8 +8,8 @@ import pytest
 
 from mdr_dask.models import load
 from mdr_dask.models.base import Block
-from mdr_dask.physics import breakthrough as bt
-from mdr_dask.physics import roughness
+from mdr_dask.physics.lubrication import breakthrough as bt
+from mdr_dask.physics.surfaces import roughness
 
 SPACING = 2 * np.pi * 0.05 / 10**6
 STRENGTH = float(bt.layer_strength(1e6, 115.385e9, 5e-9))

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 import toy
 
 from mdr_dask import Resources, datasets, run, store
-from mdr_dask.aggregate import aggregate
+from mdr_dask.aggregation import aggregate
 
 BLOCKS = 500
 

@@ -6,14 +6,14 @@ import pytest
 from mdr_dask.models.base import Block
 from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.parameters import FrettingWear
-from mdr_dask.physics import wear
-from mdr_dask.physics.panels import graded_panels
-from mdr_dask.physics.revolution import PowerProfile
-from mdr_dask.physics.transforms import inverse_transform
-from mdr_dask.physics.wear_exact import exact_without_error
-from mdr_dask.physics.wear_force import exact_forced, limit_forced
-from mdr_dask.physics.wear_force_fast import fast_forced
-from mdr_dask.physics.wear_literal import literal
+from mdr_dask.physics.mdr.half_integrals import graded_panels
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.mdr.transforms import inverse_transform
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.exact import exact_without_error
+from mdr_dask.physics.wear.forced import exact_forced, limit_forced
+from mdr_dask.physics.wear.forced_fast import fast_forced
+from mdr_dask.physics.wear.literal import literal
 
 PARABOLA = PowerProfile(2.0)
 

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from mdr_dask.models.base import Block
-from mdr_dask.models.indenter import Power
-from mdr_dask.models.material import Material
-from mdr_dask.models.profile_file import ProfileFile
+from mdr_dask.models.parts.indenter import Power
+from mdr_dask.models.parts.material import Material
+from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics import indenter, roughness
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces import shapes as indenter
 
 OUTPUTS = ("friction_coefficient", "discretisation_error")
 POINTS = (100, 400, 1600)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdr_dask.models.base import Block
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics import roughness
+from mdr_dask.physics.surfaces import roughness
 
 OUTPUTS = ("friction_coefficient", "discretisation_error", "rms_slope")
 LONG = {20000: 64, 50000: 64, 97200: 32, 200000: 32}  # points, and oversampling of the reference

@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.measures import alone
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump
-from mdr_dask.physics import roughness
+from mdr_dask.physics.surfaces import roughness
 
 TRACE = (
     "friction_coefficient_before",

@@ -10,12 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.measures import print_table, timed
-from mdr_dask.physics import ehl_grid, ehl_levels
-from mdr_dask.physics.deformation import influence_matrix
-from mdr_dask.physics.ehl_blocks import newton_by_blocks
-from mdr_dask.physics.ehl_newton import newton, nodal_film
-from mdr_dask.physics.line_contact import line_contact, solve
-from mdr_dask.physics.line_kernel import deform, line_kernel
+from mdr_dask.physics.lubrication import grids as ehl_grid
+from mdr_dask.physics.lubrication import levels as ehl_levels
+from mdr_dask.physics.lubrication.blocks import newton_by_blocks
+from mdr_dask.physics.lubrication.deformation import influence_matrix
+from mdr_dask.physics.lubrication.line_contact import line_contact, solve
+from mdr_dask.physics.lubrication.line_kernel import deform, line_kernel
+from mdr_dask.physics.lubrication.newton import newton, nodal_film
 
 E_STAR = 115.385e9
 CASES = {

@@ -16,9 +16,9 @@ from numba import njit
 
 from mdr_dask.fit import bootstrap
 from mdr_dask.fit.relaxation import exponential, point_weights, widths
-from mdr_dask.physics import roughness
-from mdr_dask.physics.backward_euler import solve
-from mdr_dask.physics.kinetics import velocity_jump
+from mdr_dask.physics.sliding.backward_euler import solve
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.transients.velocity_jump import velocity_jump
 
 POINTS, HURST, LOAD, REACH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
 LAW = (REACH * np.pi * POINTS) ** (1 - HURST)

@@ -10,9 +10,11 @@ import sys
 import numpy as np
 
 from mdr_dask.models.base import Block
-from mdr_dask.models.indenter import Cone, Parabola
+from mdr_dask.models.parts.indenter import Cone, Parabola
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics import indenter, laws, roughness
+from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces import shapes as indenter
 
 LENGTH, HURST, RMS, POINTS, FORCE, MODULUS, TAU = 0.01, 0.4, 5e-5, 2000, 10.0, 1e6, 1e-3
 #: the line's coefficient is tan(10 deg) for the cone and 1 / (1 cm) for the parabola

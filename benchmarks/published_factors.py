@@ -12,7 +12,7 @@ from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
 from mdr_dask.fit.master_curve import read_table
-from mdr_dask.physics.superposition import superpose
+from mdr_dask.physics.superposition.master_curve import superpose
 
 DATA = Path(__file__).parents[1] / "tests" / "data" / "dma"
 REFERENCE = 7

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition import superpose
+from mdr_dask.physics.superposition.master_curve import superpose
 
 SHAPES = {
     "sigmoid": lambda x: 2 * np.tanh(x / 2),

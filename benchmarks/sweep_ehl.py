@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.measures import timed
-from mdr_dask.physics import ehl_lattice
-from mdr_dask.physics.ehl_lattice import solve_beside_lattice
-from mdr_dask.physics.line_contact import line_contact, solve
+from mdr_dask.physics.lubrication import lattice as ehl_lattice
+from mdr_dask.physics.lubrication.lattice import solve_beside_lattice
+from mdr_dask.physics.lubrication.line_contact import line_contact, solve
 
 E_STAR = 115.385e9
 ROELANDS = {"viscosity_law": "roelands", "viscosity": 0.08}

@@ -11,10 +11,11 @@ import sys
 import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
-from mdr_dask.physics import ehl_grid, line_contact
-from mdr_dask.physics.deformation import influence_matrix
-from mdr_dask.physics.ehl_levels import expected_film
-from mdr_dask.physics.ehl_newton import CONVERGED, newton
+from mdr_dask.physics.lubrication import grids as ehl_grid
+from mdr_dask.physics.lubrication import line_contact
+from mdr_dask.physics.lubrication.deformation import influence_matrix
+from mdr_dask.physics.lubrication.levels import expected_film
+from mdr_dask.physics.lubrication.newton import CONVERGED, newton
 
 E_STAR = 115.385e9
 CASES = {

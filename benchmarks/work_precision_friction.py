@@ -9,7 +9,8 @@ import sys
 import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
-from mdr_dask.physics import roughness, sliding
+from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.surfaces import roughness
 
 SCHEMES = {"backward_euler": "thesis: backward Euler", "piecewise_linear": "straight cells", "hermite": "cubic cells"}
 #: name: (Hurst exponent, force number F_N / (G h L), v tau slope / h)

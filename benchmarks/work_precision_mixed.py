@@ -11,8 +11,8 @@ import sys
 import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
-from mdr_dask.physics import breakthrough as bt
-from mdr_dask.physics import roughness
+from mdr_dask.physics.lubrication import breakthrough as bt
+from mdr_dask.physics.surfaces import roughness
 
 CASES = {"800 N 40 C": (945, 1.0431e-6), "800 N 60 C": (945, 0.5317e-6), "800 N 80 C": (945, 0.3080e-6)}
 STRENGTH = float(bt.layer_strength(1e6, 115.385e9, 5e-9))

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.measures import Curve, draw_errors, print_table, timed
-from mdr_dask.physics import wear_cases
-from mdr_dask.physics.revolution import PowerProfile
-from mdr_dask.physics.wear import Worn, fast
-from mdr_dask.physics.wear_exact import exact, exact_without_error
-from mdr_dask.physics.wear_literal import literal
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.wear import rules as wear_cases
+from mdr_dask.physics.wear.exact import exact, exact_without_error
+from mdr_dask.physics.wear.literal import literal
+from mdr_dask.physics.wear.worn import Worn, fast
 
 PARABOLA = PowerProfile(2.0)
 STICK = 0.455

@@ -6,11 +6,11 @@ The names below are loaded when they are first used: importing the package loads
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from mdr_dask.version import __version__
 
 _HOMES = {
     "Resources": "mdr_dask.execute",
-    "aggregate": "mdr_dask.aggregate",
+    "aggregate": "mdr_dask.aggregation",
     "datasets": "mdr_dask.store",
     "estimate": "mdr_dask.plan",
     "load": "mdr_dask.campaign",
@@ -19,13 +19,13 @@ _HOMES = {
 }
 
 if TYPE_CHECKING:
-    from mdr_dask.aggregate import aggregate
+    from mdr_dask.aggregation import aggregate
     from mdr_dask.campaign import load, loads
     from mdr_dask.execute import Resources, run
     from mdr_dask.plan import estimate
     from mdr_dask.store import datasets
 
-__all__ = ["Resources", "aggregate", "datasets", "estimate", "load", "loads", "run"]
+__all__ = ["Resources", "__version__", "aggregate", "datasets", "estimate", "load", "loads", "run"]
 
 
 def __getattr__(name: str) -> Any:

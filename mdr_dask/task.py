@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import mdr_dask
 from mdr_dask import models, store
 from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Block, Model, Result, Status
 from mdr_dask.store import Place
+from mdr_dask.version import __version__
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Outcome:
 
 def versions(model: str) -> tuple[str, int]:
     """Return what decides the numbers of a model: the versions of the program and of the model."""
-    return mdr_dask.__version__, models.load(model).version
+    return __version__, models.load(model).version
 
 
 def run_block(work: Work) -> Outcome:

@@ -120,7 +120,7 @@ def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
 
 
 def test_errors_that_rest_on_few_points_are_told(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("mdr_dask.physics.shift_posterior.MOST_STAGES", 1)
+    monkeypatch.setattr("mdr_dask.physics.superposition.posterior.MOST_STAGES", 1)
     path = tmp_path / "table.csv"
     table_of_two_groups(path)
     assert main(["master-curve", str(path), "--vertical"]) == 0

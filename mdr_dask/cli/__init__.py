@@ -9,11 +9,11 @@ import sys
 
 import click
 
-from mdr_dask import __version__
 from mdr_dask.cli.campaigns import check, models, run, schema
 from mdr_dask.cli.figures import figures
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
+from mdr_dask.version import __version__
 
 INTERRUPTED = 130
 

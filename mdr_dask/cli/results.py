@@ -138,7 +138,7 @@ def show(
     mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s:1 m/s' --csv
     """
     from mdr_dask import store as room
-    from mdr_dask.aggregate import aggregate as reduce
+    from mdr_dask.aggregation import aggregate as reduce
 
     dataset = selection.group(room.datasets(store), series)
     wanted = selection.select(selection.outputs(dataset, outputs), selections)
@@ -166,7 +166,7 @@ def aggregate(
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
     """
     from mdr_dask import store as room
-    from mdr_dask.aggregate import aggregate as reduce
+    from mdr_dask.aggregation import aggregate as reduce
 
     if output is not None:
         _check_target(output)

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fit.base import Fit
-from mdr_dask.models.base import FloatArray
 from mdr_dask.models.ehl_line import groups as groups_of
 
 _FILMS = {"central_film": "central", "minimum_film": "minimum"}

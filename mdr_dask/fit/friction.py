@@ -7,14 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fit.base import Fit
 from mdr_dask.fit.bootstrap import weights
-from mdr_dask.physics import indenter, laws, roughness
+from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces import shapes as indenter
 
-FloatArray = NDArray[np.float64]
 Series = Mapping[str, xr.Dataset]
 
 MODELS = ("sliding_friction",)

@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fit import bootstrap
-
-FloatArray = NDArray[np.float64]
 
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 LEAST = 2  # realisations of a case that must have succeeded

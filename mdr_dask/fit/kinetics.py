@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fit import bootstrap
 from mdr_dask.fit.base import Fit
@@ -21,7 +22,6 @@ from mdr_dask.fit.relaxation import (
     relaxation_of,
 )
 
-FloatArray = NDArray[np.float64]
 Series = Mapping[str, xr.Dataset]
 
 LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis

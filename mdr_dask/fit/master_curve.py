@@ -11,12 +11,13 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
-from mdr_dask.models.tables import parse_table
-from mdr_dask.physics import shift_laws, superposition, two_shifts
-
-FloatArray = NDArray[np.float64]
+from mdr_dask.models.parts.tables import parse_table
+from mdr_dask.physics.superposition import laws as shift_laws
+from mdr_dask.physics.superposition import master_curve as superposition
+from mdr_dask.physics.superposition import two_factors as two_shifts
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),

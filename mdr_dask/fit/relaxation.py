@@ -7,7 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from mdr_dask.arrays import FloatArray
+
 Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 WINDOW = 8.0  # over the expected rate

@@ -41,7 +41,7 @@ def _fit(
     choose: Callable[[FrettingWear], str],
 ) -> xr.Dataset:
     """Fit one factor in every series that names a table."""
-    from mdr_dask.physics.wear_fit import fit_factor
+    from mdr_dask.physics.wear.factor import fit_factor
 
     found: dict[str, dict[str, float]] = {}
     meanings: dict[str, tuple[str, str]] = {}
@@ -83,8 +83,8 @@ def _dataset(found: dict[str, dict[str, float]], meanings: dict[str, tuple[str, 
 
 def _prediction(parameters: FrettingWear, method: str) -> tuple[Callable[[float], np.ndarray], np.ndarray]:
     """Return what the law predicts for a factor of N, and the measurements, both dimensionless."""
-    from mdr_dask.physics.revolution import PowerProfile
-    from mdr_dask.physics.wear_fit import at_cycles, profile_curve, volume_curve
+    from mdr_dask.physics.mdr.revolution import PowerProfile
+    from mdr_dask.physics.wear.factor import at_cycles, profile_curve, volume_curve
 
     if method not in {"fast", "exact"}:
         raise FitError(f"a wear law is fitted by method fast or exact, got {method!r}")

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-
-FloatArray = NDArray[np.float64]
 
 
 class Status(IntEnum):

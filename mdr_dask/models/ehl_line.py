@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Block, Coordinate, FloatArray, Model, Output, Parameters, Result, Status, quantity
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, Result, Status, quantity
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.line_contact import LineContact, LineSolution
+    from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -131,7 +132,7 @@ def _groups(block: Block[EhlLineParameters]) -> tuple[FloatArray, FloatArray, Fl
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[tuple[LineContact, bool]]:
     """Return the dimensionless case of every case, and whether it is solved beside the lattice; equal ones share."""
-    from mdr_dask.physics.line_contact import line_contact
+    from mdr_dask.physics.lubrication.line_contact import line_contact
 
     names = ("contact_modulus", "viscosity_law", "viscosity", "compressible", "inlet")
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
@@ -171,7 +172,7 @@ def _case_outputs(
     if "pressure" in wanted:
         values["pressure"] = solution.pressure_at(position) * p0
     if {"traction_coefficient", "traction_error", "rolling_coefficient"} & set(wanted):
-        from mdr_dask.physics.ehl_traction import traction
+        from mdr_dask.physics.lubrication.traction import traction
 
         stress = parameters.eyring_stress / p0 if parameters.shear_law == "eyring" else None
         friction = traction(solution, W, parameters.slide_roll_ratio, stress)
@@ -187,9 +188,9 @@ def _positions(parameters: EhlLineParameters) -> FloatArray:
 
 def compute(block: Block[EhlLineParameters]) -> Result:
     """Solve every different case of a block once; realisations of a case are the same."""
-    from mdr_dask.physics.ehl_lattice import solve_beside_lattice
-    from mdr_dask.physics.film import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, moes_parameters
-    from mdr_dask.physics.line_contact import solve
+    from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, moes_parameters
+    from mdr_dask.physics.lubrication.lattice import solve_beside_lattice
+    from mdr_dask.physics.lubrication.line_contact import solve
 
     W, U, G = _groups(block)
     moes = moes_parameters(W, U, G)
@@ -228,7 +229,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
 
 def _warnings(block: Block[EhlLineParameters], index: int, groups: tuple[float, float, float]) -> list[str]:
     """Return what a user of the wanted outputs should know about one case."""
-    from mdr_dask.physics.film import PAN_HAMROCK_CENTRAL
+    from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL
 
     notes = []
     if {"formula_central_film", "formula_minimum_film"} & set(block.outputs):

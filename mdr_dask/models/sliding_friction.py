@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from mdr_dask.models import general_sliding
-from mdr_dask.models.base import Block, FloatArray, Model, Output, Result, Status, canonical, quantity
-from mdr_dask.models.indenter import Plane
-from mdr_dask.models.material import fit_notes
-from mdr_dask.models.rough_line import FINEST, Line, Task
-from mdr_dask.models.sliding_body import SlidingBody
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.models.base import Block, Model, Output, Result, Status, canonical, quantity
+from mdr_dask.models.parts import general_sliding
+from mdr_dask.models.parts.indenter import Plane
+from mdr_dask.models.parts.material import fit_notes
+from mdr_dask.models.parts.rough_line import FINEST, Line, Task
+from mdr_dask.models.parts.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.sliding import Scheme
+    from mdr_dask.physics.sliding.steady import Scheme
 
-IntArray = NDArray[np.intp]
 
 ACCURACY = 0.01  # where the campaign does not say
 CLOSED_FORM = 1e-12  # error of a smooth indenter: rounding
@@ -91,7 +91,7 @@ class _Cases:
 
 def _shapes(block: Block[SlidingFriction]) -> list[tuple[float, float]]:
     """Return coefficient and exponent of the line c |x|^n of every case, 0 and 1 for a plane."""
-    from mdr_dask.physics.indenter import mapped
+    from mdr_dask.physics.surfaces.shapes import mapped
 
     shapes = []
     varied = any(path.split(".")[0] == "indenter" for path in block.columns)
@@ -135,7 +135,7 @@ class _Answer:
 
     def put(self, members: IntArray, realisation: int, found: dict[str, Any], state: NDArray[np.int8]) -> None:
         """Write cases of one realisation, and why those with a state other than 0 failed."""
-        from mdr_dask.physics import sliding
+        from mdr_dask.physics.sliding import steady as sliding
 
         for name in self.block.outputs:
             self.values[name][members, realisation] = np.where(state == 0, found[name], np.nan)
@@ -227,7 +227,7 @@ class _Group:
 
     def solve(self, r: int, realisation: int, answer: _Answer) -> None:
         """Solve the cases in one realisation, the r-th of the block."""
-        from mdr_dask.physics import roughness
+        from mdr_dask.physics.surfaces import roughness
 
         block = answer.block
         turned = roughness.turns(block.seed, realisation, self.line.points // 2)
@@ -260,7 +260,8 @@ class _Group:
 
 def _smooth(cases: _Cases, answer: _Answer) -> None:
     """Solve the cases without roughness in closed form."""
-    from mdr_dask.physics import indenter, sliding
+    from mdr_dask.physics.sliding import steady as sliding
+    from mdr_dask.physics.surfaces import shapes as indenter
 
     members = np.flatnonzero(cases.height == 0)
     if not members.size:

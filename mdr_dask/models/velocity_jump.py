@@ -9,26 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import (
-    Block,
-    Coordinate,
-    FloatArray,
-    Model,
-    Output,
-    Result,
-    Status,
-    canonical,
-    quantity,
-)
-from mdr_dask.models.material import solid_of
-from mdr_dask.models.profile_file import line_of
-from mdr_dask.models.protocol import Jump, Protocol, Scale, Trace, pieces, trace
-from mdr_dask.models.sliding_body import SlidingBody
+from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Status, canonical, quantity
+from mdr_dask.models.parts.loading_history import Jump, Protocol, Scale, Trace, pieces, trace
+from mdr_dask.models.parts.material import solid_of
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.kinetics import Jump as Relaxation
-    from mdr_dask.physics.protocol_forces import Line
+    from mdr_dask.physics.transients.forces import Line
+    from mdr_dask.physics.transients.velocity_jump import Jump as Relaxation
 
 SECONDS_NODE, SECONDS_MOMENT = 1.6e-8, 2.7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
@@ -106,7 +97,7 @@ class _Case:
         return *grid, self.steps_per_decade, self.times
 
     def amplitudes(self) -> FloatArray:
-        from mdr_dask.physics import roughness
+        from mdr_dask.physics.surfaces import roughness
 
         return roughness.amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
 
@@ -134,7 +125,7 @@ def _solve(
     cases: list[_Case], height: FloatArray, slope: FloatArray, accuracies: FloatArray, coarser: bool
 ) -> list[Relaxation]:
     """Solve the cases of one line on the nodes given, or on every other one with half as many steps."""
-    from mdr_dask.physics.kinetics import velocity_jumps
+    from mdr_dask.physics.transients.velocity_jump import velocity_jumps
 
     shared = cases[0]
     every, steps = (2, shared.steps_per_decade / 2) if coarser else (1, shared.steps_per_decade)
@@ -160,7 +151,7 @@ def _error(fine: Relaxation, coarse: Relaxation) -> float:
 
 def compute(block: Block[VelocityJump]) -> Result:
     """Solve the cases of a block, each different one once a realisation."""
-    from mdr_dask.physics import kinetics
+    from mdr_dask.physics.transients import velocity_jump as kinetics
 
     shape = (block.cases, len(block.realisations))
     times = len(block.parameters.relaxation_times)
@@ -201,7 +192,8 @@ def _line_results(
     block: Block[VelocityJump], cases: list[_Case], realisation: int
 ) -> tuple[list[int], list[dict[str, float | FloatArray]]]:
     """Return status and outputs of the cases of one line, for unit slope h / L."""
-    from mdr_dask.physics import kinetics, roughness
+    from mdr_dask.physics.surfaces import roughness
+    from mdr_dask.physics.transients import velocity_jump as kinetics
 
     amplitude = cases[0].amplitudes()
     slope_rms = roughness.spectral_slope(amplitude)
@@ -239,7 +231,7 @@ def _follow(
     messages: dict[tuple[int, int], str],
 ) -> None:
     """Write what following every element gives: all outputs, or the depth alone beside the quick solution of a jump."""
-    from mdr_dask.physics import roughness
+    from mdr_dask.physics.surfaces import roughness
 
     found, code, sentence = _along(case, roughness.phases(block.seed, block.realisations[place[1]], case.points // 2))
     if case.is_general or code != Status.DONE:
@@ -252,8 +244,8 @@ def _follow(
 
 def _along(case: VelocityJump, phase: FloatArray) -> tuple[dict[str, float | FloatArray], int, str]:
     """Follow a line through a course; return outputs, status and a sentence where it fails."""
-    from mdr_dask.physics.protocol import foundation
-    from mdr_dask.physics.protocol_kernels import CONVERGED, NOT_CONVERGED
+    from mdr_dask.physics.transients.elements import CONVERGED, NOT_CONVERGED
+    from mdr_dask.physics.transients.protocol import foundation
 
     try:
         surface = _surface(case, phase)
@@ -311,7 +303,7 @@ def _surface(case: VelocityJump, phase: FloatArray) -> _Surface:
     DataError, ValueError
         If there is none, or it is flat.
     """
-    from mdr_dask.physics import measured, roughness
+    from mdr_dask.physics.surfaces import measured, roughness
 
     if case.profile is not None:
         found = line_of(case.profile)
@@ -348,8 +340,8 @@ def time_unit(case: VelocityJump) -> float:
 
 def _under(case: VelocityJump, surface: _Surface, every: int) -> Line:
     """Return every so many nodes of a line in units of its length and the rms height, with the indenter."""
-    from mdr_dask.physics.indenter import mapped
-    from mdr_dask.physics.protocol import closed_line, indented_line
+    from mdr_dask.physics.surfaces.shapes import mapped
+    from mdr_dask.physics.transients.protocol import closed_line, indented_line
 
     height, slope = surface.height[::every], surface.slope[::every]
     if case.indenter.shape == "plane":

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import FloatArray
 from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.plots.base import Plot
 
@@ -131,7 +131,7 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the films found over those of Pan and Hamrock, against these, for every series that varies W, U or G."""
     from matplotlib.figure import Figure
 
-    from mdr_dask.physics.film import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
+    from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -178,7 +178,7 @@ def draw_regimes(groups: Mapping[str, xr.Dataset]) -> Figure:
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-    from mdr_dask.physics.film import limiting_films, moes_parameters
+    from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
 
     figure = Figure(figsize=(7.5, 5.2), layout="constrained")
     axes = figure.add_subplot()
@@ -205,7 +205,7 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
     from matplotlib.colors import ListedColormap
     from matplotlib.figure import Figure
 
-    from mdr_dask.physics.film import REGIMES, limiting_films, moes_parameters, regime
+    from mdr_dask.physics.lubrication.film_formulas import REGIMES, limiting_films, moes_parameters, regime
 
     columns: list[list[FloatArray]] = []
     for dataset in _film_maps(groups, "minimum_film").values():

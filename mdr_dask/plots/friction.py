@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask.errors import DataError
 from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
-from mdr_dask.physics import laws
+from mdr_dask.physics.sliding import laws
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import FloatArray
-from mdr_dask.models.protocol import pieces
+from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.velocity_jump import VelocityJump, time_unit
 from mdr_dask.plots.base import Plot
 

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
-from mdr_dask import __version__, models
+from mdr_dask import models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import DataFile, Status, unit_of
 from mdr_dask.plan import Template
 from mdr_dask.store.files import LAYOUT, clear, group_name, only_claimed, read_json, write_bytes
+from mdr_dask.version import __version__
 
 _COORDINATE_CHUNK = 4096
 #: What `_series_attributes` writes; at the root it outlasts campaigns of which that study is no part.

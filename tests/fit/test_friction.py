@@ -4,7 +4,7 @@ from friction_store import store
 
 from mdr_dask.errors import FitError
 from mdr_dask.fit.friction import FITS, within_indenter_law
-from mdr_dask.physics import laws
+from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit.compute for fit in FITS}
 ZONE_ONE = FITS[0]

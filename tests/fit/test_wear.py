@@ -9,11 +9,11 @@ from mdr_dask.fit.wear import FITS, best_xi, wear_coefficient
 from mdr_dask.models.base import DataFile
 from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.parameters import FrettingWear
-from mdr_dask.physics import wear
-from mdr_dask.physics.revolution import PowerProfile
-from mdr_dask.physics.wear_fit import at_cycles, fit_factor, volume_curve
-from mdr_dask.physics.wear_force import exact_forced
-from mdr_dask.physics.wear_force_fast import fast_forced
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.factor import at_cycles, fit_factor, volume_curve
+from mdr_dask.physics.wear.forced import exact_forced
+from mdr_dask.physics.wear.forced_fast import fast_forced
 
 PARABOLA = PowerProfile(2.0)
 

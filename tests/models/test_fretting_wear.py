@@ -5,9 +5,9 @@ from pydantic import ValidationError
 from mdr_dask.models.base import Block, DataFile, Status
 from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.parameters import FrettingWear, LoadStep, PowerShape, TableShape
-from mdr_dask.physics import wear
-from mdr_dask.physics.revolution import PowerProfile
-from mdr_dask.physics.wear_exact import exact
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.exact import exact
 
 STEEL = {
     "curvature_radius": 0.01,

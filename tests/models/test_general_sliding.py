@@ -3,8 +3,8 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.material import Material
-from mdr_dask.models.profile_file import ProfileFile
+from mdr_dask.models.parts.material import Material
+from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 
 ALL = tuple(output.name for output in MODEL.outputs)
@@ -75,7 +75,7 @@ def test_material_can_vary():
 
 
 def test_measured_line_is_the_generated_line_it_was_written_from(tmp_path):
-    from mdr_dask.physics import roughness
+    from mdr_dask.physics.surfaces import roughness
 
     phase = roughness.phases(7, 0, 100)
     height = 5e-7 * roughness.line(roughness.amplitudes(100, 0.7), phase, 400)

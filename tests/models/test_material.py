@@ -5,8 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.material import Material, fit_error, fit_notes, solid_of
-from mdr_dask.physics.rheology import complex_modulus
+from mdr_dask.models.parts.material import Material, fit_error, fit_notes, solid_of
+from mdr_dask.physics.solids import complex_modulus
 
 TABLE = "tests/data/dma/freq_user_raw.csv"
 

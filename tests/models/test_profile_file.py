@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.profile_file import ProfileFile, line_of
+from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 
 HEIGHT = np.sin(2 * np.pi * np.arange(16) / 16)
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from slow_friction import Body, reference, samples, waves
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.profile_file import ProfileFile
+from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics import roughness
+from mdr_dask.physics.surfaces import roughness
 
 POINTS, SEED = 32, 7
 LINE = {"length": 1.0, "points": POINTS}

@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute, coordinates, distinct, seconds
-from mdr_dask.physics import kinetics
+from mdr_dask.physics.transients import velocity_jump as kinetics
 
 EVERY = tuple(output.name for output in MODEL.outputs if output.default)
 BASE = {

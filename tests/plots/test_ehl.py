@@ -11,7 +11,7 @@ import xarray as xr
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block
 from mdr_dask.models.ehl_line import MODEL, STEEL, EhlLineParameters, compute, coordinates
-from mdr_dask.physics.film import REGIMES
+from mdr_dask.physics.lubrication.film_formulas import REGIMES
 from mdr_dask.plots.ehl import PLOTS
 
 CONTACT = {"load_parameter": 2.0452e-5, "speed_parameter": 1e-11, "material_parameter": 5007.0}

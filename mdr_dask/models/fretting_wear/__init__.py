@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Coordinate, Model, Output, Result, Status
 from mdr_dask.models.fretting_wear.parameters import FrettingWear, TableShape
 from mdr_dask.models.fretting_wear.reduction import Numbers, reduce_block, refuse_gross_slip, shapes
 from mdr_dask.models.fretting_wear.solutions import BLOCK_OUTPUTS, axes, on_grid, solve_each, solves_of, tasks
-
-FloatArray = NDArray[np.float64]
 
 #: Outputs that are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border", "discretisation_error")
@@ -75,7 +74,7 @@ def _solve_plain(
     block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
 ) -> int:
     """Solve limits and fast rules of power laws, all at once; return how many were distinct."""
-    from mdr_dask.physics.wear_cases import fast_cases, limit_cases
+    from mdr_dask.physics.wear.rules import fast_cases, limit_cases
 
     methods = np.asarray(block.column("method") == "fast")
     fast = np.broadcast_to(methods[:, None], good.shape)[good]

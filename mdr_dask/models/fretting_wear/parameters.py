@@ -79,7 +79,7 @@ class FrettingWear(Parameters):
     @classmethod
     def _is_profile(cls, shape: object) -> object:
         if isinstance(shape, TableShape):
-            from mdr_dask.physics.profile_table import read_table
+            from mdr_dask.physics.mdr.profile_table import read_table
 
             try:
                 read_table(shape.table.read_text())

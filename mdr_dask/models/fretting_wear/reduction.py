@@ -7,15 +7,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.fretting_wear.parameters import EXPONENTS, FrettingWear, PowerShape, TableShape
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.revolution import TableProfile
-
-FloatArray = NDArray[np.float64]
+    from mdr_dask.physics.mdr.revolution import TableProfile
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,7 @@ def _first_contact(
     block: Block[FrettingWear], n: FloatArray, modulus: FloatArray, messages: dict[tuple[int, int], str]
 ) -> tuple[FloatArray, FloatArray]:
     """Return a0 and d0 of dimensional cases; a table that cannot be pressed so deep is a message."""
-    from mdr_dask.physics import axisymmetric as contact
+    from mdr_dask.physics.mdr import power_law_contact as contact
 
     depth, load, angle = _column(block, "depth"), _column(block, "load"), _column(block, "angle")
     if any(isinstance(shape, TableShape) for shape in shapes(block)):
@@ -135,8 +133,8 @@ def table_profile(shape: object, depth: float) -> TableProfile:
 
 @lru_cache(maxsize=64)
 def _pressed_table(text: str, depth: float) -> TableProfile:
-    from mdr_dask.physics.profile_table import read_table
-    from mdr_dask.physics.revolution import from_table
+    from mdr_dask.physics.mdr.profile_table import read_table
+    from mdr_dask.physics.mdr.revolution import from_table
 
     return from_table(*read_table(text), depth)
 

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.fretting_wear.parameters import FrettingWear, TableShape
 from mdr_dask.models.fretting_wear.reduction import Numbers, table_profile
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.revolution import Profile
-    from mdr_dask.physics.wear import Worn
-    from mdr_dask.physics.wear_exact import Slid
-    from mdr_dask.physics.wear_history import Record
+    from mdr_dask.physics.mdr.revolution import Profile
+    from mdr_dask.physics.wear.exact import Slid
+    from mdr_dask.physics.wear.history import Record
+    from mdr_dask.physics.wear.worn import Worn
 
 Contact: TypeAlias = "Worn | Slid | Loaded"
-FloatArray = NDArray[np.float64]
 
 
 #: Outputs with a value for every block of a history, and what they are of one contact.
@@ -138,10 +138,10 @@ def _has_tolerance(parameters: FrettingWear) -> bool:
 
 def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact]:
     """Solve a task for all its (N, xi), or all paths of sliding."""
-    from mdr_dask.physics import wear
-    from mdr_dask.physics.revolution import PowerProfile
-    from mdr_dask.physics.wear_exact import exact, gross
-    from mdr_dask.physics.wear_literal import literal
+    from mdr_dask.physics.mdr.revolution import PowerProfile
+    from mdr_dask.physics.wear import worn as wear
+    from mdr_dask.physics.wear.exact import exact, gross
+    from mdr_dask.physics.wear.literal import literal
 
     profile = PowerProfile(task.exponent) if task.shape is None else table_profile(task.shape, task.depth)
     if task.method == "sliding":
@@ -164,9 +164,9 @@ def _contacts(task: Task, wanted: list[tuple[float, float]]) -> Sequence[Contact
 
 def _forced(task: Task, profile: Profile, stick: float, wanted: list[tuple[float, float]]) -> Sequence[Contact]:
     """Solve a task under constant force."""
-    from mdr_dask.physics.wear_force import exact_forced, limit_forced
-    from mdr_dask.physics.wear_force_fast import fast_forced
-    from mdr_dask.physics.wear_literal import literal
+    from mdr_dask.physics.wear.forced import exact_forced, limit_forced
+    from mdr_dask.physics.wear.forced_fast import fast_forced
+    from mdr_dask.physics.wear.literal import literal
 
     if task.method == "limit":
         return [limit_forced(profile, stick, task.tolerance)] * len(wanted)
@@ -179,8 +179,8 @@ def _forced(task: Task, profile: Profile, stick: float, wanted: list[tuple[float
 
 def _loaded(task: Task, profile: Profile) -> Loaded:
     """Run the blocks of a history."""
-    from mdr_dask.physics.transforms import gauss
-    from mdr_dask.physics.wear_history import LoadBlock, history
+    from mdr_dask.physics.mdr.transforms import gauss
+    from mdr_dask.physics.wear.history import LoadBlock, history
 
     if task.method in {"limit", "fast"}:
         raise ValueError(f"the {task.method} method holds for one block of load only; use method exact for histories")
@@ -222,8 +222,8 @@ def _answer(contact: Contact, name: str, x: FloatArray) -> float | FloatArray:
 
 
 def _of_one(contact: Worn | Record | Slid, name: str, x: FloatArray) -> float | FloatArray:
-    from mdr_dask.physics.wear import Worn
-    from mdr_dask.physics.wear_exact import Slid
+    from mdr_dask.physics.wear.exact import Slid
+    from mdr_dask.physics.wear.worn import Worn
 
     border = "stick_border" if isinstance(contact, Worn) else "stick_radius"
     plain = {"stick_border": border, "discretisation_error": "error"}.get(name, name)

@@ -16,7 +16,7 @@ from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 from mdr_dask.models.mixed_lubrication.turn import POSITIONS, Turn, creeping, profiles, rolling, trace, turn_values
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.breakthrough import Excursions
+    from mdr_dask.physics.lubrication.breakthrough import Excursions
 
 LOAD_SHARE_WARNING = 0.03  # of the load on asperities, beyond which the film formula no longer holds
 FILM_RATIO_WARNING = 0.5  # below it overlapping asperities merge into clusters that no longer break
@@ -120,7 +120,7 @@ def _realise(
 
     Returns the share of the load on asperities of each case.
     """
-    from mdr_dask.physics import breakthrough
+    from mdr_dask.physics.lubrication import breakthrough
 
     lines = source.lines(block.seed, block.realisations[position])
     above: Excursions | None = None

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mdr_dask.models.base import FloatArray
-from mdr_dask.models.profile_file import ProfileFile, line_of
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Generated:
 
     def lines(self, seed: int, realisation: int) -> tuple[FloatArray, FloatArray]:
         """Return both lines; one stream feeds them in turn, so that a shorter cut-off keeps the longer waves."""
-        from mdr_dask.physics import roughness
+        from mdr_dask.physics.surfaces import roughness
 
         amplitude = roughness.amplitudes(self.modes, self.hurst, longest=self.longest)
         phase = roughness.phases(seed, realisation, 2 * self.modes).reshape(-1, 2)
@@ -89,7 +89,7 @@ class Measured:
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
         """Return the lines without mean and tilt, so that their ends nearly meet."""
-        from mdr_dask.physics.measured import detrended, rms_height
+        from mdr_dask.physics.surfaces.measured import detrended, rms_height
 
         lines = [detrended(line_of(file).height[: self.points], "line") for file in (self.file_1, self.file_2)]
         first, second = (line / rms_height(line) if self.scaled else line for line in lines)

@@ -12,8 +12,8 @@ from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.film import Groups, HertzLine
-    from mdr_dask.physics.line_contact import LineContact
+    from mdr_dask.physics.lubrication.film_formulas import Groups, HertzLine
+    from mdr_dask.physics.lubrication.line_contact import LineContact
 
 
 class Film(NamedTuple):
@@ -50,7 +50,8 @@ class Operation:
 
 def operation_of(case: MixedLubrication) -> Operation:
     """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours."""
-    from mdr_dask.physics import breakthrough, film, oil
+    from mdr_dask.physics.lubrication import breakthrough, oil
+    from mdr_dask.physics.lubrication import film_formulas as film
 
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
@@ -85,7 +86,8 @@ def operation_of(case: MixedLubrication) -> Operation:
 
 
 def _film(case: MixedLubrication, groups: Groups, E_star: float, viscosity: float) -> Film:
-    from mdr_dask.physics import film, line_contact
+    from mdr_dask.physics.lubrication import film_formulas as film
+    from mdr_dask.physics.lubrication import line_contact
 
     W, U, G = (float(group) for group in groups)
     if case.film_formula == "ehl":
@@ -98,7 +100,7 @@ def _film(case: MixedLubrication, groups: Groups, E_star: float, viscosity: floa
 @lru_cache(maxsize=1024)
 def _solved(contact: LineContact, W: float) -> Film:
     """Return the central film of the EHL solution, once for all realisations: Hertz units are ``a^2/R^2 = 8 W/pi``."""
-    from mdr_dask.physics import line_contact
+    from mdr_dask.physics.lubrication import line_contact
 
     solution = line_contact.solve(contact)
     if solution.status:
@@ -115,7 +117,8 @@ def fixed_values(operation: Operation) -> dict[str, float]:
 
 def friction(operation: Operation, share: float) -> float:
     """Return the coefficient of friction: solid over the share of the width in intimate contact, film elsewhere."""
-    from mdr_dask.physics import film, oil
+    from mdr_dask.physics.lubrication import film_formulas as film
+    from mdr_dask.physics.lubrication import oil
 
     case = operation.case
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius

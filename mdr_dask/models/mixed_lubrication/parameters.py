@@ -10,11 +10,11 @@ from pydantic import Field, model_validator
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
-from mdr_dask.models.profile_file import ProfileFile
+from mdr_dask.models.parts.measured_line import ProfileFile
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.film import HertzLine
-    from mdr_dask.physics.oil import Oil
+    from mdr_dask.physics.lubrication.film_formulas import HertzLine
+    from mdr_dask.physics.lubrication.oil import Oil
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -36,7 +36,7 @@ class OilData(Parameters):
 
     @model_validator(mode="after")
     def _falls(self) -> Self:
-        from mdr_dask.physics.oil import walther_constants
+        from mdr_dask.physics.lubrication.oil import walther_constants
 
         walther_constants(self.temperature_1, self.viscosity_1, self.temperature_2, self.viscosity_2)
         return self
@@ -146,7 +146,7 @@ class MixedLubrication(Parameters):
 
     def oil_data(self) -> Oil:
         """Return the oil, whether named or given."""
-        from mdr_dask.physics import oil
+        from mdr_dask.physics.lubrication import oil
 
         data = self.oil
         if isinstance(data, str):
@@ -167,12 +167,12 @@ class MixedLubrication(Parameters):
 
     def dry_contact(self, force: float) -> HertzLine:
         """Return the Hertzian contact of the smooth rollers under a normal force in N."""
-        from mdr_dask.physics import film
+        from mdr_dask.physics.lubrication import film_formulas as film
 
         return film.hertz_line(force / self.roller_width, self.contact_modulus(), self.roller_radius / 2)
 
     def contact_modulus(self) -> float:
         """Return E* of the rollers in Pa."""
-        from mdr_dask.physics import film
+        from mdr_dask.physics.lubrication import film_formulas as film
 
         return float(film.reduced_modulus(*(self.young_modulus, self.poisson_ratio) * 2))

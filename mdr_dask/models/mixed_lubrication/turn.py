@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.models.base import FloatArray
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.mixed_lubrication.operation import Operation, friction
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.breakthrough import Excursions
+    from mdr_dask.physics.lubrication.breakthrough import Excursions
 
 STRIDES = 8  # windows with creep that overlap by more than 1 - 1/8 tell the same
 #: Places of the profiles in half widths of the contact.
@@ -39,7 +39,7 @@ def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:
 
     With ``coarser = 2`` it is that of every second point.
     """
-    from mdr_dask.physics import breakthrough
+    from mdr_dask.physics.lubrication import breakthrough
 
     points = above if coarser == 1 else above.every_second()
     window = _window(operation, coarser)
@@ -50,7 +50,7 @@ def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:
 
 def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], coarser: int = 1) -> Turn:
     """Return a turn with creep, from windows an eighth of their width apart, or that of every second point."""
-    from mdr_dask.physics import breakthrough
+    from mdr_dask.physics.lubrication import breakthrough
 
     even = lines[0].size // coarser * coarser
     line_1, line_2 = (np.ascontiguousarray(line[:even:coarser]) for line in lines)
@@ -77,7 +77,7 @@ def turn_values(
     operation: Operation, turn: Turn, halved: Callable[[], Turn], wanted: Collection[str]
 ) -> dict[str, float]:
     """Return those scalar outputs of a realisation that are wanted; `halved` gives the turn of every second point."""
-    from mdr_dask.physics import breakthrough
+    from mdr_dask.physics.lubrication import breakthrough
 
     case = operation.case
     length = float(turn.contact_points.sum(dtype=np.int64)) / turn.contact_points.size * operation.spacing
@@ -98,7 +98,7 @@ def turn_values(
 
 def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]) -> FloatArray:
     """Return the contact length at the angles of the trace."""
-    from mdr_dask.physics import breakthrough
+    from mdr_dask.physics.lubrication import breakthrough
 
     case, points = operation.case, operation.source.points
     way = np.arange(case.trace_points) * points // case.trace_points
@@ -118,7 +118,8 @@ def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]
 
 def profiles(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]) -> dict[str, FloatArray]:
     """Return both surfaces around the contact at the moment when most of it is in intimate contact."""
-    from mdr_dask.physics import breakthrough, film
+    from mdr_dask.physics.lubrication import breakthrough
+    from mdr_dask.physics.lubrication import film_formulas as film
 
     case, points = operation.case, operation.source.points
     way = np.linspace(0, points, turn.contact_points.size, endpoint=False)

@@ -1,0 +1,422 @@
+"""Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
+
+The two lines are held apart by the film ``h0``; where the sum of their heights ``z`` exceeds it, they overlap. A run
+of overlapping points is a cluster, of length ``D = n dx`` and force ``F = E* dx sum(z - h0)`` (eq. 5.5). It breaks the
+layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is if ``sum(z - h0) > s n^3 dx^2`` with the layer strength
+``s = pi tau0/(12 E* h_c)``, the only place where tau0, E* and h_c appear. Lines are closed (periodic); the contact is
+a window of ``window`` points that starts at each position in turn.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from mdr_dask.arrays import FloatArray, IntArray
+
+#: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
+#: testing every window by itself), judged whole and counted with its part inside (``clip``), judged and counted whole
+#: (``whole``), or left out (``inside``).
+EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
+_PART, _CLIP, _WHOLE, _INSIDE = range(4)
+
+
+def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
+    """Return ``s = pi tau0/(12 E* h_c)`` in 1/m; a parabolic asperity breaks the layer if its curvature exceeds 12 s.
+
+    Parameters
+    ----------
+    shear_strength : array_like
+        Limiting shear stress of the layer, tau0, in Pa.
+    E_star : array_like
+        Contact modulus in Pa.
+    thickness : array_like
+        Critical thickness h_c of the layer in m.
+    """
+    return np.asarray(np.pi * np.asarray(shear_strength) / (12 * np.asarray(E_star) * np.asarray(thickness)))
+
+
+def window_points(half_width: float, spacing: float, points: int) -> int:
+    """Return the number of points in the contact window ``[-a, a]``, at least one.
+
+    Raises
+    ------
+    ValueError
+        If the window is wider than the line.
+    """
+    window = max(1, round(2 * half_width / spacing))
+    if window > points:
+        raise ValueError(
+            f"the contact is wider than the line: expected 2a of at most {points * spacing:.4g} m, "
+            f"got {2 * half_width:.4g} m"
+        )
+    return window
+
+
+class Excursions(NamedTuple):
+    """The points of a closed line above some level: all that higher levels need.
+
+    Parameters
+    ----------
+    place : int array, shape (n,)
+        Their numbers on the line, ascending.
+    height : array, shape (n,)
+        Their heights in m.
+    points : int
+        Number of points of the whole line.
+    """
+
+    place: IntArray
+    height: FloatArray
+    points: int
+
+    def above(self, level: float) -> Excursions:
+        """Return those above a higher level."""
+        keep = self.height > level
+        return Excursions(self.place[keep], self.height[keep], self.points)
+
+    def every_second(self) -> Excursions:
+        """Return the excursions of the line made of the even points, for an estimate of the grid's error."""
+        keep = (self.place % 2 == 0) & (self.place < self.points // 2 * 2)
+        return Excursions(self.place[keep] // 2, self.height[keep], self.points // 2)
+
+
+def excursions(line: FloatArray, level: float) -> Excursions:
+    """Return the points of a closed line (heights in m) that lie above a level (m)."""
+    place = np.flatnonzero(line > level)
+    return Excursions(place, line[place], line.size)
+
+
+class Clusters(NamedTuple):
+    """Clusters of overlapping points of a closed line, in the order of their starts.
+
+    Parameters
+    ----------
+    start, length : int array, shape (n,)
+        First point and number of points; a cluster across the seam has ``start + length > points``.
+    total : array, shape (n,)
+        Sum of ``z - h0`` over its points in m.
+    overlap : array, shape (length.sum(),)
+        ``z - h0`` of all points in m, cluster after cluster.
+    limit : float
+        ``s dx^2`` in m: the layer breaks where ``total > limit length^3``.
+    points : int
+        Number of points of the line.
+    """
+
+    start: IntArray
+    length: IntArray
+    total: FloatArray
+    overlap: FloatArray
+    limit: float
+    points: int
+
+    @property
+    def broken(self) -> NDArray[np.bool_]:
+        """Whether each cluster, taken whole, breaks the layer (thesis eq. 5.6)."""
+        return self.total > self.limit * self.length.astype(np.float64) ** 3
+
+
+@njit(nogil=True, cache=True)
+def _scan(place, height, points, level, start, length, total, overlap):  # type: ignore[no-untyped-def]
+    """Fill the clusters of excursions in the order of their starts; return their number."""
+    first = 0
+    while first < place.size and (place[first - 1] + 1) % points == place[first]:
+        first += 1
+    count = -1
+    for k in range(place.size):
+        j = (first + k) % place.size
+        if k == 0 or (place[j - 1] + 1) % points != place[j]:
+            count += 1
+            start[count] = place[j]
+            length[count] = 0
+            total[count] = 0.0
+        length[count] += 1
+        overlap[k] = height[j] - level
+        total[count] += overlap[k]
+    return count + 1
+
+
+def find_clusters(above: Excursions, level: float, spacing: float, strength: float) -> Clusters:
+    """Return the clusters at a film thickness.
+
+    Parameters
+    ----------
+    above : Excursions
+        The line's points above some level not higher than `level`.
+    level : float
+        Film thickness h0 in m.
+    spacing : float
+        Distance dx of the points in m.
+    strength : float
+        From `layer_strength`, in 1/m.
+    """
+    place, height, points = above.above(level)
+    start, length = np.empty(place.size, np.int64), np.empty(place.size, np.int64)
+    total, overlap = np.empty(place.size), np.empty(place.size)
+    n = _scan(place, height, points, level, start, length, total, overlap)
+    return Clusters(start[:n], length[:n], total[:n], overlap, strength * spacing**2, points)
+
+
+@njit(nogil=True, cache=True)
+def _block(jumps, begin, count, value):  # type: ignore[no-untyped-def]
+    """Add `value` to `count` positions of the circle from `begin` on, as jumps."""
+    points = jumps.size - 1
+    begin %= points
+    end = begin + count
+    jumps[begin] += value
+    if end > points:
+        jumps[0] += value
+        end -= points
+    jumps[end] -= value
+
+
+@njit(nogil=True, cache=True)
+def _add_parts(overlap, limit, window, start, always, judged, jumps):  # type: ignore[no-untyped-def]
+    """Add what the window's edges leave of a cluster: heads, middles (where it is longer than the window), tails.
+
+    A part counts if it breaks by itself where parts are `judged`, else if the cluster does (`always`).
+    """
+    n = overlap.size
+    whole_line = n == jumps.size - 1
+    part = 0 if whole_line else min(n - 1, window)
+    total = 0.0
+    for j in range(1, part + 1):
+        total += overlap[j - 1]
+        if total > limit * float(j) ** 3 if judged else always:
+            _block(jumps, start - window + j, 1, j)
+    total = overlap[:window].sum()
+    for j in range(n if whole_line else n - window - 1):
+        total += overlap[(j + window) % n] - overlap[j]
+        if total > limit * float(window) ** 3 if judged else always:
+            _block(jumps, start + j + 1, 1, window)
+    total = 0.0
+    for j in range(1, part + 1):
+        total += overlap[n - j]
+        if total > limit * float(j) ** 3 if judged else always:
+            _block(jumps, start + n - j, 1, j)
+
+
+@njit(nogil=True, cache=True)
+def _collect(start, length, total, overlap, limit, window, rule, jumps, trace):  # type: ignore[no-untyped-def]
+    """Gather the jumps of the trace cluster by cluster, then sum them up."""
+    points = trace.size
+    offset = 0
+    for c in range(start.size):
+        s, n = start[c], length[c]
+        broken = total[c] > limit * float(n) ** 3
+        if rule == _WHOLE and broken:
+            _block(jumps, s - window + 1, min(n + window - 1, points), n)
+        elif rule != _WHOLE and broken and n <= window and n < points:
+            _block(jumps, s + n - window, window - n + 1, n)
+        if rule == _PART or (rule == _CLIP and broken):
+            _add_parts(overlap[offset : offset + n], limit, window, s, broken, rule == _PART, jumps)
+        offset += n
+    height = 0
+    for p in range(points):
+        height += jumps[p]
+        trace[p] = height
+
+
+def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArray[np.int32]:
+    """Return the number of points in intimate contact for the window at every position, in O(points).
+
+    Parameters
+    ----------
+    clusters : Clusters
+        Classified once for the whole line.
+    window : int
+        Points in the window.
+    rule : str
+        One of `EDGE_RULES`.
+
+    Returns
+    -------
+    int array, shape (points,)
+        Entry p belongs to the window over points p to p + window - 1. The share of entries above zero is the
+        breakthrough probability; their mean times dx is the mean contact length.
+    """
+    start, length, total, overlap, limit, points = clusters
+    jumps, trace = np.zeros(points + 1, dtype=np.int32), np.zeros(points, dtype=np.int32)
+    if start.size:
+        _collect(start, length, total, overlap, limit, window, EDGE_RULES.index(rule), jumps, trace)
+    return trace
+
+
+def mean_overlap(clusters: Clusters, window: int) -> float:
+    """Return the mean over all positions of the sum of overlaps inside the window in m; E* dx times it is a force."""
+    return float(clusters.total.sum()) * window / clusters.points
+
+
+@njit(nogil=True, cache=True)
+def _beyond(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped-def]
+    """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
+    points = line_1.size
+    n = 0
+    total = 0.0
+    while n < most:
+        overlap = line_1[(p + n * step) % points] + line_2[(q + n * step) % points] - level
+        if overlap <= 0.0:
+            break
+        total += overlap
+        n += 1
+    return n, total
+
+
+@njit(nogil=True, cache=True)
+def _fill(line_1, line_2, level, p, q, overlap):  # type: ignore[no-untyped-def]
+    """Fill the overlaps of the window that stands at (p, q)."""
+    points = line_1.size
+    for k in range(overlap.size):
+        overlap[k] = line_1[p] + line_2[q] - level
+        p = p + 1 if p + 1 < points else 0
+        q = q + 1 if q + 1 < points else 0
+
+
+@njit(nogil=True, cache=True)
+def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, contact, total_overlap):  # type: ignore[no-untyped-def]
+    """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` room for a window."""
+    points, window = line_1.size, overlap.size
+    for w in range(first_1.size):
+        p, q = first_1[w], first_2[w]
+        _fill(line_1, line_2, level, p, q, overlap)
+        k = 0
+        while k < window:
+            if overlap[k] <= 0.0:
+                k += 1
+                continue
+            begin = k
+            total = 0.0
+            while k < window and overlap[k] > 0.0:
+                total += overlap[k]
+                k += 1
+            total_overlap[w] += total
+            n = inside = k - begin
+            if begin == 0 and rule != _PART:
+                more, extra = _beyond(line_1, line_2, level, p - 1, q - 1, -1, points - n)
+                n, total = n + more, total + extra
+            if k == window and rule != _PART:
+                more, extra = _beyond(line_1, line_2, level, p + k, q + k, 1, points - n)
+                n, total = n + more, total + extra
+            if total > limit * float(n) ** 3 and (rule != _INSIDE or n == inside):
+                contact[w] += inside if rule == _CLIP else n
+
+
+class Windows(NamedTuple):
+    """Points in intimate contact and sum of overlaps (m) of each window."""
+
+    contact_points: IntArray
+    overlap: FloatArray
+
+
+def judge_windows(
+    line_1: FloatArray,
+    line_2: FloatArray,
+    level: float,
+    spacing: float,
+    strength: float,
+    window: int,
+    positions: tuple[IntArray, IntArray],
+    rule: str = "part",
+) -> Windows:
+    """Judge windows one by one: the reference for pure rolling, and the way of rolling with creep.
+
+    Parameters
+    ----------
+    line_1, line_2 : array, shape (points,)
+        Heights of the two closed lines in m.
+    level, spacing, strength : float
+        As in `find_clusters`.
+    window : int
+        Points in the window.
+    positions : tuple of two int arrays, shape (n,)
+        Point of each line at the window's first place; see `creep_positions`.
+    rule : str
+        One of `EDGE_RULES`.
+    """
+    first_1, first_2 = positions
+    contact, total = np.zeros(first_1.size, dtype=np.int64), np.zeros(first_1.size)
+    if line_1.max() + line_2.max() > level:
+        limit, room = strength * spacing**2, np.empty(window)
+        _windows(line_1, line_2, level, limit, first_1, first_2, EDGE_RULES.index(rule), room, contact, total)
+    return Windows(contact, total)
+
+
+def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:
+    """Return where the window stands on each line after some way of the mean surface.
+
+    Parameters
+    ----------
+    way : array_like, shape (n,)
+        In points. For mean values, ways an eighth of the window apart lose nothing: closer windows tell the same.
+    points : int
+        Points of each line.
+    slide_roll_ratio : float
+        ``S = (v1 - v2)/u`` with the mean velocity u: the lines move by ``1 + S/2`` and ``1 - S/2`` of the way.
+
+    Returns
+    -------
+    two int arrays, shape (n,)
+        First point of the window on each line.
+    """
+    ways = np.asarray(way, dtype=np.float64)
+    first, second = (np.round(ways * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
+    return first, second
+
+
+def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:
+    """Return ``R_c = rho/L_cont`` in ohm (thesis eq. 5.1: spots of one material in parallel); infinite without contact.
+
+    Parameters
+    ----------
+    resistivity : array_like
+        Of the contacting materials in ohm m.
+    contact_length : array_like
+        Sum of the diameters of the spots in m.
+    """
+    length = np.asarray(contact_length, dtype=np.float64)
+    safe = np.where(length > 0, length, 1.0)
+    return np.where(length > 0, np.asarray(resistivity) / safe, np.inf)
+
+
+class Interval(NamedTuple):
+    """A probability with its standard error and the ends of its interval."""
+
+    mean: float
+    error: float
+    low: float
+    high: float
+
+
+def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence: float = 0.95) -> Interval:
+    """Return the probability of contact of one turn with an interval from its batches.
+
+    Parameters
+    ----------
+    in_contact : bool array, shape (positions,)
+        Whether the window at each position is in contact, in the order of time.
+    window : int
+        Positions after which windows share no point.
+    confidence : float
+        Level of the interval.
+
+    Returns
+    -------
+    Interval
+        From the means of batches at least five windows long (40 at most), with Student's t, cut to [0, 1]; NaN for all
+        but the mean if the trace is too short for two batches.
+    """
+    from scipy.special import stdtrit
+
+    mean = float(in_contact.mean())
+    batches = min(40, in_contact.size // (5 * window))
+    if batches < 2:
+        return Interval(mean, np.nan, np.nan, np.nan)
+    size = in_contact.size // batches
+    means = in_contact[: batches * size].reshape(batches, size).mean(axis=1)
+    error = float(means.std(ddof=1) / np.sqrt(batches))
+    reach = float(stdtrit(batches - 1, (1 + confidence) / 2)) * error
+    return Interval(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))

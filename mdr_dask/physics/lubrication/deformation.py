@@ -1,0 +1,91 @@
+"""Elastic deformation of a half-plane under a piecewise linear pressure, on any grid, exact for each element.
+
+Hertz units: positions in half widths a, pressures in p0, films and deformations in ``a^2/R`` (thesis eq. B.13, B.19).
+"""
+
+from __future__ import annotations
+
+from math import log, pi
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import FloatArray
+
+
+@njit(nogil=True, cache=True)
+def _second_integral(x: float) -> float:
+    """Return the function whose second derivative is ``ln|x|``."""
+    square = x * x
+    return 0.0 if square == 0.0 else 0.25 * square * (log(square) - 3.0)
+
+
+@njit(nogil=True, cache=True)
+def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
+    """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
+    left = _second_integral(point - nodes[0])
+    left_slope = 0.0
+    for j in range(nodes.size - 1):
+        right = _second_integral(point - nodes[j + 1])
+        slope = (right - left) / (nodes[j + 1] - nodes[j])
+        row[j] = slope - left_slope
+        left, left_slope = right, slope
+    row[0] = 0.0
+    row[-1] = 0.0
+
+
+@njit(nogil=True, cache=True)
+def influence_matrix(points: FloatArray, nodes: FloatArray) -> FloatArray:
+    """Return the matrix that turns nodal pressures into deformations relative to that of ``X = 0``.
+
+    Parameters
+    ----------
+    points : array, shape (m,)
+        Where the deformation is wanted, in half widths.
+    nodes : array, shape (n,)
+        Ascending nodes of the pressure, which is linear between them and zero at both ends.
+
+    Returns
+    -------
+    array, shape (m, n)
+        ``D`` with ``delta_i - delta(0) = sum_j D_ij P_j = -(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
+    """
+    matrix = np.empty((points.size, nodes.size))
+    origin = np.empty(nodes.size)
+    _influence_row(0.0, nodes, origin)
+    for i in range(points.size):
+        row = matrix[i]
+        _influence_row(points[i], nodes, row)
+        for j in range(nodes.size):
+            row[j] = (origin[j] - row[j]) / pi
+    return matrix
+
+
+@njit(nogil=True, cache=True)
+def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
+    """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points (thesis eq. B.19).
+
+    Parameters
+    ----------
+    points : array, shape (m,)
+        Positions in half widths.
+    nodes, pressure : array, shape (n,)
+        Ascending nodes and the pressure there in units of p0, zero at both ends.
+    central_film : float
+        Film at ``X = 0`` in units of ``a^2/R``.
+
+    Returns
+    -------
+    array, shape (m,)
+        Film in units of ``a^2/R``.
+    """
+    origin, row = np.empty(nodes.size), np.empty(nodes.size)
+    _influence_row(0.0, nodes, origin)
+    result = np.empty(points.size)
+    for i in range(points.size):
+        _influence_row(points[i], nodes, row)
+        total = 0.0  # summed here, as a threaded BLAS has other last bits with another number of threads
+        for j in range(nodes.size):
+            total += (origin[j] - row[j]) * pressure[j]
+        result[i] = central_film + 0.5 * points[i] ** 2 + total / pi
+    return result

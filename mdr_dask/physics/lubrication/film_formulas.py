@@ -1,0 +1,298 @@
+"""Film thickness of a lubricated line contact by formula: Hertz contact, regressions, regimes and their limits.
+
+Conventions (physics of thesis section 5.2.1 and appendix B): ``E* = E'/2`` with
+``1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2``; the velocity is the mean ``u = (u1 + u2)/2``;
+``W = F/(L' E' R)``, ``U = eta0 u/(E' R)``, ``G = alpha E'``; films are given as ``h/R``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mdr_dask.arrays import FloatArray
+
+
+def reduced_modulus(
+    modulus_1: ArrayLike, poisson_1: ArrayLike, modulus_2: ArrayLike, poisson_2: ArrayLike
+) -> FloatArray:
+    """Return the contact modulus E* of two bodies (thesis section 5.2.1).
+
+    Parameters
+    ----------
+    modulus_1, modulus_2 : array_like
+        Young's moduli in Pa.
+    poisson_1, poisson_2 : array_like
+        Poisson's ratios.
+
+    Returns
+    -------
+    array
+        ``E*`` in Pa, ``1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2``; the formulas' ``E'`` is twice that.
+    """
+    compliance = (1 - np.square(poisson_1)) / np.asarray(modulus_1) + (1 - np.square(poisson_2)) / np.asarray(modulus_2)
+    return np.asarray(1 / compliance, dtype=np.float64)
+
+
+def reduced_radius(radius_1: ArrayLike, radius_2: ArrayLike) -> FloatArray:
+    """Return the radius R* in m of the cylinder that meets a plane as the two meet: ``1/R* = 1/R1 + 1/R2``."""
+    return np.asarray(1 / (1 / np.asarray(radius_1, float) + 1 / np.asarray(radius_2, float)), dtype=np.float64)
+
+
+class HertzLine(NamedTuple):
+    """Half width (m) and highest pressure (Pa) of a dry line contact."""
+
+    half_width: FloatArray
+    pressure: FloatArray
+
+
+def hertz_line(line_load: ArrayLike, E_star: ArrayLike, radius: ArrayLike) -> HertzLine:
+    """Return half width and highest pressure of a Hertzian line contact (thesis eq. 5.2).
+
+    Parameters
+    ----------
+    line_load : array_like
+        Normal force per length of the line, ``w = F/L'``, in N/m.
+    E_star, radius : array_like
+        Contact modulus in Pa and reduced radius in m.
+
+    Returns
+    -------
+    HertzLine
+        ``a = sqrt(4 w R/(pi E*))`` and ``p0 = 2 w/(pi a)``.
+    """
+    load = np.asarray(line_load, dtype=np.float64)
+    half_width = np.sqrt(4 * load * np.asarray(radius) / (np.pi * np.asarray(E_star)))
+    return HertzLine(half_width, 2 * load / (np.pi * half_width))
+
+
+def hertz_gap(x: ArrayLike, half_width: float, radius: float) -> FloatArray:
+    """Return the gap in m between the bodies of a dry line contact at places x (m) from its middle, 0 inside."""
+    ratio = np.maximum(1.0, np.abs(np.asarray(x, dtype=np.float64)) / half_width)
+    root = np.sqrt(ratio**2 - 1)
+    return np.asarray(half_width**2 / (2 * radius) * (ratio * root - np.log(ratio + root)))
+
+
+def fluid_friction(
+    contact: HertzLine,
+    film: float,
+    sliding_velocity: float,
+    log_viscosity: Callable[[FloatArray], FloatArray],
+    eyring_stress: float,
+) -> float:
+    """Return the coefficient of friction of a uniform film under the Hertzian pressure.
+
+    Parameters
+    ----------
+    contact : HertzLine
+        Half width in m and highest pressure in Pa.
+    film : float
+        Film thickness in m.
+    sliding_velocity : float
+        Difference of the two surface velocities in m/s.
+    log_viscosity : callable
+        Natural logarithm of the viscosity in Pa s at pressures in Pa.
+    eyring_stress : float
+        Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; a great one makes the liquid Newtonian.
+
+    Returns
+    -------
+    float
+        Mean shear stress over mean pressure, by 64 Gauss points in the angle ``x = a sin(angle)``; rolling friction
+        is left out.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    cosine = np.cos(np.pi / 2 * nodes)
+    if sliding_velocity == 0:
+        return 0.0
+    logarithm = log_viscosity(contact.pressure * cosine) + np.log(abs(sliding_velocity) / (film * eyring_stress))
+    # asinh(e^l) is l + ln 2 long before e^l overflows
+    stress = eyring_stress * np.where(
+        logarithm > 30, logarithm + np.log(2), np.arcsinh(np.exp(np.minimum(logarithm, 30)))
+    )
+    return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
+
+
+class Groups(NamedTuple):
+    """Load, speed and material parameters ``W``, ``U``, ``G`` of a line contact."""
+
+    W: FloatArray
+    U: FloatArray
+    G: FloatArray
+
+
+def dimensionless_groups(
+    line_load: ArrayLike,
+    viscosity: ArrayLike,
+    mean_velocity: ArrayLike,
+    pressure_viscosity: ArrayLike,
+    E_star: ArrayLike,
+    radius: ArrayLike,
+) -> Groups:
+    """Return ``W = w/(E' R)``, ``U = eta0 u/(E' R)`` and ``G = alpha E'`` with ``E' = 2 E*``.
+
+    Parameters
+    ----------
+    line_load : array_like
+        Normal force per length in N/m.
+    viscosity : array_like
+        Dynamic viscosity at ambient pressure in Pa s.
+    mean_velocity : array_like
+        Mean velocity of the two surfaces, ``(u1 + u2)/2``, in m/s.
+    pressure_viscosity : array_like
+        Pressure-viscosity coefficient alpha in 1/Pa.
+    E_star, radius : array_like
+        Contact modulus in Pa and reduced radius in m.
+    """
+    modulus = 2 * np.asarray(E_star, dtype=np.float64)
+    stiffness = modulus * np.asarray(radius)
+    W = np.asarray(line_load) / stiffness
+    U = np.asarray(viscosity) * np.asarray(mean_velocity) / stiffness
+    return Groups(W, U, np.asarray(pressure_viscosity) * modulus)
+
+
+@dataclass(frozen=True)
+class FilmFormula:
+    """A regression ``h/R = factor W^load U^speed G^material`` and the box of points that it was fitted to.
+
+    Parameters
+    ----------
+    name : str
+        Authors and the film meant.
+    factor, load, speed, material : float
+        Its constants.
+    load_range, speed_range, material_range : tuple of float
+        Lowest and highest W, U, G of the points behind it; outside it is an extrapolation.
+    """
+
+    name: str
+    factor: float
+    load: float
+    speed: float
+    material: float
+    load_range: tuple[float, float]
+    speed_range: tuple[float, float]
+    material_range: tuple[float, float]
+
+    def __call__(self, W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
+        """Return h/R for arrays of W, U and G, which broadcast."""
+        return np.asarray(
+            self.factor
+            * np.asarray(W, float) ** self.load
+            * np.asarray(U, float) ** self.speed
+            * np.asarray(G, float) ** self.material
+        )
+
+    def outside(self, W: float, U: float, G: float) -> str:
+        """Say which of W, U, G lie outside the range of the formula; an empty string if none does."""
+        ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
+        parts = [
+            f"{symbol} = {value:.3g} is outside {low:g} to {high:g}"
+            for symbol, value, (low, high) in ranges
+            if not low <= value <= high
+        ]
+        return f"film formula {self.name}: {', '.join(parts)}" if parts else ""
+
+
+# Ranges as remembered from the papers; no open copy was at hand to compare them with (docs/mixed-lubrication.md).
+_PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
+_DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
+
+#: Pan and Hamrock (1989); 2.922 belongs to the central film (thesis eq. 5.3 and appendix B print 2.992 and 2.929).
+PAN_HAMROCK_CENTRAL = FilmFormula("Pan-Hamrock (central)", 2.922, -0.166, 0.692, 0.470, *_PAN_HAMROCK_RANGE)
+PAN_HAMROCK_MINIMUM = FilmFormula("Pan-Hamrock (minimum)", 1.714, -0.128, 0.694, 0.568, *_PAN_HAMROCK_RANGE)
+DOWSON_HIGGINSON_MINIMUM = FilmFormula("Dowson-Higginson (minimum)", 2.65, -0.13, 0.70, 0.54, *_DOWSON_HIGGINSON_RANGE)
+
+
+#: The formulas by the name that a campaign gives them.
+FORMULAS: dict[str, FilmFormula] = {
+    "pan_hamrock": PAN_HAMROCK_CENTRAL,
+    "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
+    "dowson_higginson": DOWSON_HIGGINSON_MINIMUM,
+}
+
+
+class Moes(NamedTuple):
+    """Moes' load and lubricant parameters; with them ``h/R (2 U)^(-1/2)`` depends on two numbers only."""
+
+    M: FloatArray
+    L: FloatArray
+
+
+def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
+    """Return ``M = W (2U)^(-1/2)`` and ``L = G (2U)^(1/4)``."""
+    speed = 2 * np.asarray(U, dtype=np.float64)
+    return Moes(np.asarray(W) / np.sqrt(speed), np.asarray(G) * speed**0.25)
+
+
+class Johnson(NamedTuple):
+    """Johnson's viscosity and elasticity parameters; the film is then ``(h/R) W/U``."""
+
+    g_v: FloatArray
+    g_e: FloatArray
+
+
+def johnson_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Johnson:
+    """Return ``g_v = G W^(3/2) U^(-1/2)`` and ``g_e = W U^(-1/2)``."""
+    root = np.sqrt(np.asarray(U, dtype=np.float64))
+    load = np.asarray(W, dtype=np.float64)
+    return Johnson(np.asarray(G) * load**1.5 / root, load / root)
+
+
+#: Names of the regimes, in the order of the rows of `limiting_films`.
+REGIMES: tuple[str, ...] = (
+    "rigid isoviscous",
+    "rigid piezoviscous",
+    "elastic isoviscous",
+    "elastic piezoviscous",
+)
+
+#: ``(h_min/R) W/U`` of a rigid parabola and an isoviscous liquid with the Reynolds exit condition (Kapitza).
+RIGID_ISOVISCOUS = 4.894968
+#: ``(h_min/R) (G U)^(-2/3)`` where the greatest isoviscous pressure reaches ``1/alpha`` (Blok).
+RIGID_PIEZOVISCOUS = 1.666297
+#: ``(h_min/R) M^(1/5) (2 U)^(-1/2)`` of soft bodies and an isoviscous liquid (Moes).
+ELASTIC_ISOVISCOUS = 2.05
+
+
+def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
+    """Return the minimum film ``h/R`` of each of the four limiting regimes.
+
+    Parameters
+    ----------
+    W, U, G : array_like
+        Load, speed and material parameters; they broadcast to ``shape``.
+
+    Returns
+    -------
+    array, shape (4, *shape)
+        In the order of `REGIMES`; the last row is the Dowson-Higginson formula, as in Johnson's map.
+    """
+    W, U, G = np.broadcast_arrays(np.asarray(W, float), np.asarray(U, float), np.asarray(G, float))
+    M = moes_parameters(W, U, G).M
+    return np.stack(
+        [
+            RIGID_ISOVISCOUS * U / W,
+            RIGID_PIEZOVISCOUS * (G * U) ** (2 / 3),
+            ELASTIC_ISOVISCOUS * M**-0.2 * np.sqrt(2 * U),
+            DOWSON_HIGGINSON_MINIMUM(W, U, G),
+        ]
+    )
+
+
+def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
+    """Return the index in `REGIMES` of the regime of each point.
+
+    Elastic flattening raises an isoviscous film and lowers a piezoviscous one: the thicker of the two isoviscous limits
+    competes with the thinner of the two piezoviscous ones, and the thicker of these is the film (the limit of Moes'
+    interpolation for a sharp transition).
+    """
+    rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(W, U, G)
+    isoviscous = np.where(elastic_iso > rigid_iso, 2, 0)
+    piezoviscous = np.where(elastic_piezo < rigid_piezo, 3, 1)
+    thick = np.minimum(rigid_piezo, elastic_piezo) > np.maximum(rigid_iso, elastic_iso)
+    return np.where(thick, piezoviscous, isoviscous).astype(np.intp)

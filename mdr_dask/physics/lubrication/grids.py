@@ -1,0 +1,103 @@
+"""Graded grids for a lubricated line contact: a first one from the expected film, then one from a solution.
+
+A grid is sampled from a density of nodes over position, so that grids of different size nest in the limit and their
+errors compare (Richardson). Positions in half widths, films in ``a^2/R``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+
+#: Fully flooded: the inlet lies this many times ``sqrt(2 Hc)`` upstream.
+FLOODED = 300.0
+
+
+def inlet_position(central_film: float) -> float:
+    """Return where a fully flooded film begins, in half widths."""
+    return -1.0 - FLOODED * float(np.sqrt(2 * central_film))
+
+
+def outlet_position(central_film: float) -> float:
+    """Return a position behind the rupture of the film, in half widths."""
+    return 1.1 + float(np.sqrt(2 * central_film))
+
+
+def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray:
+    """Return `count` nodes whose spacing is inverse to a density that is linear between positions.
+
+    Parameters
+    ----------
+    positions, density : array, shape (m,)
+        Ascending positions and positive density there; only its shape matters.
+    count : int
+        Number of nodes, both ends included.
+
+    Returns
+    -------
+    array, shape (count,)
+        Ascending nodes.
+    """
+    width = np.diff(positions)
+    number = np.concatenate([[0.0], np.cumsum(width * (density[1:] + density[:-1]) / 2)])
+    wanted = np.linspace(0.0, number[-1], count)
+    cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
+    rest = wanted - number[cell]
+    slope = (density[cell + 1] - density[cell]) / width[cell]
+    root = np.sqrt(np.maximum(density[cell] ** 2 + 2 * slope * rest, 0.0))
+    nodes = positions[cell] + 2 * rest / (density[cell] + root)
+    nodes[0], nodes[-1] = positions[0], positions[-1]
+    return np.asarray(nodes)
+
+
+def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
+    """Return a grid for an expected film: fine where a dry contact ends, or around the parabola of a rigid one.
+
+    Parameters
+    ----------
+    central_film : float
+        Expected film at ``X = 0`` in ``a^2/R``.
+    inlet : float
+        Where the film begins, in half widths.
+    count : int
+        Number of nodes.
+    """
+    length = max(1.0, float(np.sqrt(2 * central_film)))
+    finest = min(0.7 * central_film ** (2 / 3), length)
+    outlet = outlet_position(central_film)
+    offsets = np.geomspace(1e-7, max(-inlet, outlet) + length, 1000)
+    positions = np.concatenate(
+        [[-length], -length - offsets, -length + offsets, [length], length - offsets, length + offsets]
+    )
+    positions = np.unique(np.clip(positions, inlet, outlet))
+    distance = np.minimum(np.abs(positions + length), np.abs(positions - length))
+    if length > 1:
+        distance = np.maximum(0.0, np.abs(positions) - length)
+    density = 1 / (0.15 * (distance + 2 * finest))
+    return sample(positions, np.maximum(density, np.where(np.abs(positions) < 1.5 * length, 8 / length, 0.0)), count)
+
+
+def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the second divided differences at the nodes, those at the ends repeated from inside."""
+    width = np.diff(nodes)
+    inner = 2 * np.diff(np.diff(values) / width) / (width[1:] + width[:-1])
+    return np.concatenate([inner[:1], inner, inner[-1:]])
+
+
+def adapted_density(nodes: FloatArray, pressure: FloatArray, film: FloatArray, central_film: float) -> FloatArray:
+    """Return the density of nodes that a solution asks for, shape (n,).
+
+    The curvature of the film relative to the film itself gives the error of the flow (square root: second order), that
+    of the pressure the error of the deformation (cube root: integrated over an element); a floor keeps the contact and
+    the inlet covered, and smoothing keeps neighbouring cells alike.
+    """
+    length = max(1.0, float(np.sqrt(2 * central_film)))
+    of_film = np.sqrt(np.abs(second_derivative(nodes, film)) / film)
+    of_pressure = np.cbrt(np.abs(second_derivative(nodes, pressure)) / (pressure.max() * length))
+    floor = np.where(np.abs(nodes) < 1.2 * length, 1 / length, 0.0) + 0.5 / np.maximum(np.abs(nodes), length)
+    density = of_film + of_pressure + floor
+    for widen in (True,) * 4 + (False,) * 4:
+        mean = 0.25 * density[:-2] + 0.5 * density[1:-1] + 0.25 * density[2:]
+        density[1:-1] = np.maximum(density[1:-1], mean) if widen else mean
+    return np.asarray(density)

@@ -1,0 +1,243 @@
+"""Lubricating oils: viscosity over temperature and pressure, density, pressure-viscosity correlations.
+
+Temperatures in K, pressures in Pa, dynamic viscosities in Pa s, kinematic viscosities in m^2/s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdr_dask.arrays import FloatArray
+
+_MM2 = 1e-6
+#: Density of water at 15.6 C in kg/m^3, to which a specific gravity refers.
+WATER_DENSITY = 999.016
+#: Reference temperature of a specific gravity, 60 F.
+SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
+#: ASTM D1250 / API 54D, lubricating oils: thermal expansion at 60 F is this over the density there, 1/K.
+_LUBRICANT_EXPANSION = 0.6278
+
+#: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: (s, t) of each kind of oil (Gold et al. 2001,
+#: from memory; see docs/mixed-lubrication.md).
+GOLD: dict[str, tuple[float, float]] = {
+    "gold_mineral": (9.904, 0.1390),
+    "gold_polyalphaolefin": (7.382, 0.1335),
+    "gold_ester": (6.605, 0.1360),
+    "gold_polyglycol": (5.489, 0.1485),
+}
+#: Names that :func:`pressure_viscosity` knows.
+CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
+
+
+def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[float, float]:
+    """Return A and B of ASTM D341 from two kinematic viscosities.
+
+    Parameters
+    ----------
+    T1, T2 : float
+        Two different temperatures in K.
+    nu1, nu2 : float
+        Kinematic viscosities there in m^2/s, lower at the higher temperature.
+
+    Returns
+    -------
+    A, B : float
+        ``log10 log10(nu + 0.7) = A - B log10 T`` with nu in mm^2/s and T in K.
+
+    Raises
+    ------
+    ValueError
+        If the temperatures are equal, a viscosity is below 2 mm^2/s (where D341 needs more terms), or the viscosity
+        does not fall with temperature.
+    """
+    if T1 == T2:
+        raise ValueError(f"two viscosities at different temperatures are needed, got both at {T1!r} K")
+    if min(nu1, nu2) < 2 * _MM2:
+        raise ValueError(
+            f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {min(nu1, nu2)!r} m^2/s"
+        )
+    if (nu2 - nu1) * (T2 - T1) >= 0:
+        raise ValueError(
+            f"expected a viscosity that falls with temperature, got {nu1!r} at {T1!r} K, {nu2!r} at {T2!r} K"
+        )
+    y1, y2 = (np.log10(np.log10(nu / _MM2 + 0.7)) for nu in (nu1, nu2))
+    B = (y1 - y2) / np.log10(T2 / T1)
+    return float(y1 + B * np.log10(T1)), float(B)
+
+
+def kinematic_viscosity(temperature: ArrayLike, A: float, B: float) -> FloatArray:
+    """Return the kinematic viscosity in m^2/s at a temperature in K by ASTM D341 (Walther)."""
+    exponent = 10.0 ** (A - B * np.log10(np.asarray(temperature, dtype=np.float64)))
+    return np.asarray((10.0**exponent - 0.7) * _MM2)
+
+
+def density_at(temperature: ArrayLike, density: float, reference_temperature: float) -> FloatArray:
+    """Return the density of a lubricating oil at a temperature and ambient pressure.
+
+    Parameters
+    ----------
+    temperature : array_like
+        In K.
+    density : float
+        Known density in kg/m^3.
+    reference_temperature : float
+        Temperature in K at which it is known.
+
+    Returns
+    -------
+    array
+        ``rho_ref exp(-b dT (1 + 0.8 b dT))``, ``b = 0.6278/rho_ref`` (ASTM D1250, table 54D, whose reference is 60 F).
+    """
+    expansion = _LUBRICANT_EXPANSION / density * (np.asarray(temperature, dtype=np.float64) - reference_temperature)
+    return np.asarray(density * np.exp(-expansion * (1 + 0.8 * expansion)))
+
+
+def pressure_viscosity(correlation: str, kinematic: ArrayLike, dynamic: ArrayLike) -> FloatArray:
+    """Return the pressure-viscosity coefficient alpha in 1/Pa by a named correlation.
+
+    Parameters
+    ----------
+    correlation : str
+        One of `CORRELATIONS`: Gold's power laws of the kinematic viscosity by kind of oil, or Wooster's
+        ``alpha = (0.6 + 0.965 log10(eta0)) 1e-8`` with eta0 in mPa s (mineral oils).
+    kinematic, dynamic : array_like
+        Viscosities at ambient pressure in m^2/s and Pa s.
+
+    Raises
+    ------
+    ValueError
+        If there is no such correlation.
+    """
+    if correlation == "wooster":
+        return np.asarray((0.6 + 0.965 * np.log10(np.asarray(dynamic, dtype=np.float64) * 1e3)) * 1e-8)
+    if correlation not in GOLD:
+        raise ValueError(f"expected a pressure-viscosity correlation of {', '.join(CORRELATIONS)}, got {correlation!r}")
+    factor, exponent = GOLD[correlation]
+    return np.asarray(factor * (np.asarray(kinematic, dtype=np.float64) / _MM2) ** exponent * 1e-9)
+
+
+@dataclass(frozen=True)
+class Oil:
+    """An oil by what its data sheet says.
+
+    Parameters
+    ----------
+    T1, nu1, T2, nu2 : float
+        Two temperatures in K and the kinematic viscosities there in m^2/s.
+    density, density_temperature : float
+        Density in kg/m^3 and its temperature in K.
+    correlation : str
+        Pressure-viscosity correlation, one of `CORRELATIONS`.
+    lowest, highest : float
+        Temperatures in K between which the data hold.
+    source : str
+        Where the numbers stand.
+    """
+
+    T1: float
+    nu1: float
+    T2: float
+    nu2: float
+    density: float
+    density_temperature: float
+    correlation: str
+    lowest: float
+    highest: float
+    source: str
+
+    def kinematic(self, temperature: ArrayLike) -> FloatArray:
+        """Return the kinematic viscosity in m^2/s at temperatures in K."""
+        return kinematic_viscosity(temperature, *walther_constants(self.T1, self.nu1, self.T2, self.nu2))
+
+    def dynamic(self, temperature: ArrayLike) -> FloatArray:
+        """Return the viscosity at ambient pressure in Pa s at temperatures in K."""
+        return self.kinematic(temperature) * density_at(temperature, self.density, self.density_temperature)
+
+    def alpha(self, temperature: ArrayLike) -> FloatArray:
+        """Return the pressure-viscosity coefficient in 1/Pa at temperatures in K, by the oil's correlation."""
+        return pressure_viscosity(self.correlation, self.kinematic(temperature), self.dynamic(temperature))
+
+    def outside(self, temperature: float) -> str:
+        """Say that a temperature lies outside the oil's data; an empty string if it does not."""
+        if self.lowest <= temperature <= self.highest:
+            return ""
+        return (
+            f"expected a temperature within the oil's data, {self.lowest:g} to {self.highest:g} K, "
+            f"got {temperature:g} K"
+        )
+
+
+#: Oils by name.
+OILS: dict[str, Oil] = {
+    "mobilgear_shc_xmp_320": Oil(
+        T1=313.15,
+        nu1=335e-6,
+        T2=373.15,
+        nu2=38.3e-6,
+        density=0.860 * WATER_DENSITY,
+        density_temperature=SPECIFIC_GRAVITY_TEMPERATURE,
+        correlation="gold_polyalphaolefin",
+        lowest=313.15,
+        highest=373.15,
+        source="thesis table A.1: 335 cSt at 40 C, 38.3 cSt at 100 C, specific gravity 0.860 at 15.6 C; "
+        "alpha is not given there: Gold's law for polyalphaolefins",
+    ),
+}
+
+
+#: Roelands' constants: pressure in Pa and logarithm of the viscosity (Pa s) at the common pole, with opposite sign.
+ROELANDS_PRESSURE = 1.9609e8
+ROELANDS_LOGARITHM = 9.67
+
+
+def log_viscosity(law: str, pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return the natural logarithm of the viscosity (Pa s) under pressure, which does not overflow.
+
+    Parameters
+    ----------
+    law : str
+        ``barus``: ``ln eta0 + alpha p`` (thesis eq. B.4); ``roelands``: ``ln eta0 + s ((1 + p/p_r)^z - 1)`` with
+        ``s = ln eta0 + 9.67``, ``z = alpha p_r/s`` and p_r = 196.09 MPa, which has the slope alpha at ambient pressure.
+    pressure : array_like
+        In Pa.
+    viscosity, alpha : array_like
+        Viscosity in Pa s and pressure-viscosity coefficient in 1/Pa at ambient pressure.
+
+    Raises
+    ------
+    ValueError
+        If there is no such law.
+    """
+    p, logarithm = np.asarray(pressure, dtype=np.float64), np.log(np.asarray(viscosity, dtype=np.float64))
+    if law == "barus":
+        return np.asarray(logarithm + np.asarray(alpha) * p)
+    if law != "roelands":
+        raise ValueError(f"expected a viscosity law of barus, roelands, got {law!r}")
+    scale = logarithm + ROELANDS_LOGARITHM
+    return np.asarray(
+        logarithm + scale * ((1 + p / ROELANDS_PRESSURE) ** (np.asarray(alpha) * ROELANDS_PRESSURE / scale) - 1)
+    )
+
+
+def barus(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return ``eta0 exp(alpha p)`` in Pa s (thesis eq. B.4)."""
+    return np.exp(log_viscosity("barus", pressure, viscosity, alpha))
+
+
+def roelands(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> FloatArray:
+    """Return the viscosity in Pa s under pressure by Roelands' law; see `log_viscosity`."""
+    return np.exp(log_viscosity("roelands", pressure, viscosity, alpha))
+
+
+#: Constants of the density law in 1/Pa (thesis eq. B.6).
+DENSITY_RISE = 0.6e-9
+DENSITY_SATURATION = 1.7e-9
+
+
+def density_ratio(pressure: ArrayLike) -> FloatArray:
+    """Return ``rho/rho0 = 1 + 0.6e-9 p/(1 + 1.7e-9 p)`` (Dowson and Higginson; thesis eq. B.6 with its sign right)."""
+    p = np.asarray(pressure, dtype=np.float64)
+    return np.asarray(1 + DENSITY_RISE * p / (1 + DENSITY_SATURATION * p))

@@ -1,0 +1,186 @@
+"""Half-integrals of piecewise polynomials on graded panels: the two transforms as matrices, exact for the polynomials.
+
+In the square of the radius both transforms are half-integrals (Abel's), so that after z -> z - t^2 the weights are
+integrals of polynomials. One set of matrices, on [0, 1], serves every contact that is mapped onto it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.mdr.transforms import gauss
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """Nodes and matrices on [0, 1]; node 0 is left out (functions may jump there), node 1 is the last.
+
+    Parameters
+    ----------
+    edges : array, shape (panels + 1,)
+        Borders of the panels.
+    order : int
+        Nodes that each panel adds: the interior Lobatto points and its right end.
+    nodes : array, shape (n,)
+        All nodes, increasing.
+    inner : array, shape (n, n)
+        (1/pi) int_0^z u(z') / sqrt(z - z') dz'.
+    full : array, shape (n, n)
+        (1/pi) int_0^z u(z') / sqrt(z' (z - z')) dz'.
+    outer : array, shape (n, n)
+        (1/pi) int_z^1 u'(z') / sqrt(z' - z) dz'.
+    slope : array, shape (n, n)
+        u'(z) at the nodes, each from the panel that ends at or holds it.
+    weights : array, shape (n,)
+        int_0^1 u dz.
+    barycentric : array, shape (panels, order + 1)
+        Weights of the interpolation inside each panel (the first uses the last `order` of them).
+    """
+
+    edges: FloatArray
+    order: int
+    nodes: FloatArray
+    inner: FloatArray
+    full: FloatArray
+    outer: FloatArray
+    slope: FloatArray
+    weights: FloatArray
+    barycentric: FloatArray
+
+
+@lru_cache(maxsize=16)
+def graded_panels(left: int, right: int, order: int) -> Panels:
+    """Return panels that halve towards both ends.
+
+    Parameters
+    ----------
+    left, right : int
+        How often the panel at each end is halved.
+    order : int
+        Nodes a panel, at least 2.
+
+    Returns
+    -------
+    Panels
+        With (left + right + 2) * order nodes; cached.
+    """
+    towards_left = 0.5 * 0.5 ** np.arange(left, -1, -1.0)
+    towards_right = 1.0 - 0.5 * 0.5 ** np.arange(1.0, right + 1.0)
+    edges = np.concatenate([[0.0], towards_left, towards_right, [1.0]])
+    interior = np.sort(legendre.legroots(legendre.legder([0.0] * order + [1.0])).real)
+    local = np.append(0.5 * (1.0 + interior), 1.0)
+    nodes = (edges[:-1, None] + np.diff(edges)[:, None] * local).ravel()
+    n = nodes.size
+    matrices = tuple(np.zeros((n, n)) for _ in range(4))
+    weights = np.zeros(n)
+    barycentric = np.zeros((edges.size - 1, order + 1))
+    for panel in range(edges.size - 1):
+        members = panel_members(panel, order)
+        _add_panel(nodes, edges[panel], edges[panel + 1], members, matrices, weights)
+        scaled = (nodes[members] - edges[panel]) / (edges[panel + 1] - edges[panel])
+        distance = scaled[:, None] - scaled + np.eye(members.size)
+        barycentric[panel, -members.size :] = 1.0 / np.prod(distance, axis=1)
+    inner, full, outer, slope = matrices
+    return Panels(edges, order, nodes, inner, full, outer, slope, weights, barycentric)
+
+
+def panel_members(panel: int, order: int) -> NDArray[np.intp]:
+    """Return the numbers of the nodes that carry the polynomial of a panel: its own, and the last of its neighbour."""
+    return np.arange(max(panel * order - 1, 0), (panel + 1) * order)
+
+
+def _add_panel(
+    nodes: FloatArray,
+    low: float,
+    high: float,
+    members: NDArray[np.intp],
+    matrices: tuple[FloatArray, ...],
+    weights: FloatArray,
+) -> None:
+    """Add one panel's exact weights to the matrices and the rule for the whole integral."""
+    inner, full, outer, derivative = matrices
+    size = members.size
+    scale, middle = 2.0 / (high - low), 0.5 * (low + high)
+    to_series = np.linalg.inv(legendre.legvander((nodes[members] - middle) * scale, size - 1))
+    to_slope = legendre.legder(np.eye(size), axis=0) @ to_series * scale
+    abscissa, weight = gauss(size + 1)
+    many, heavy = gauss(2 * size + 8)
+    series = legendre.legvander(2.0 * abscissa - 1.0, size - 1)
+    weights[members] += (high - low) * weight @ series @ to_series
+    own = members[nodes[members] > low]
+    derivative[np.ix_(own, members)] = legendre.legvander((nodes[own] - middle) * scale, size - 2) @ to_slope
+    for row, z in enumerate(nodes):
+        if z > low:
+            first, last = np.sqrt(max(z - min(high, z), 0.0)), np.sqrt(z - low)
+            step = first + (last - first) * abscissa
+            basis = legendre.legvander((z - step**2 - middle) * scale, size - 1) @ to_series
+            inner[row, members] += 2.0 / np.pi * (last - first) * weight @ basis
+            begin, end = np.arcsin(np.sqrt(low / z)), np.arcsin(np.sqrt(min(high, z) / z))
+            angle = begin + (end - begin) * many
+            basis = legendre.legvander((z * np.sin(angle) ** 2 - middle) * scale, size - 1) @ to_series
+            full[row, members] += 2.0 / np.pi * (end - begin) * heavy @ basis
+        if z < high:
+            first, last = np.sqrt(max(low, z) - z), np.sqrt(high - z)
+            step = first + (last - first) * abscissa
+            slope = legendre.legvander((z + step**2 - middle) * scale, size - 2) @ to_slope
+            outer[row, members] += 2.0 / np.pi * (last - first) * weight @ slope
+
+
+def interpolate(panels: Panels, values: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the piecewise polynomial through `values`, shape (n,), at places in [0, 1), and zero beyond."""
+    result = np.zeros_like(places)
+    _interpolate(panels.edges, panels.nodes, panels.barycentric, panels.order, values, places, result)
+    return result
+
+
+def interpolate_weighted(panels: Panels, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
+    """Return the sum of shares[k] times the polynomial through rows[k] at all the nodes times stretch[k]."""
+    result, row, places = np.zeros((3, panels.nodes.size))
+    _weighted(panels.edges, panels.nodes, panels.barycentric, panels.order, rows, shares, stretch, places, row, result)
+    return result
+
+
+@njit(nogil=True, cache=True)
+def _weighted(edges, nodes, barycentric, order, rows, shares, stretch, places, row, result):  # type: ignore[no-untyped-def]
+    for k in range(shares.size):
+        for node in range(nodes.size):
+            places[node] = nodes[node] * stretch[k]
+            row[node] = 0.0
+        _interpolate(edges, nodes, barycentric, order, rows[k], places, row)
+        for node in range(nodes.size):
+            result[node] += shares[k] * row[node]
+
+
+@njit(nogil=True, cache=True)
+def _interpolate(
+    edges: FloatArray,
+    nodes: FloatArray,
+    barycentric: FloatArray,
+    order: int,
+    values: FloatArray,
+    places: FloatArray,
+    result: FloatArray,
+) -> None:
+    for number in range(places.size):
+        place = places[number]
+        if place >= 1.0:
+            continue
+        panel = min(max(np.searchsorted(edges, place, side="right") - 1, 0), edges.size - 2)
+        above, below = 0.0, 0.0
+        for member in range(0 if panel > 0 else 1, order + 1):
+            node = panel * order + member - 1
+            distance = place - nodes[node]
+            if distance == 0.0:
+                above, below = values[node], 1.0
+                break
+            share = barycentric[panel, member] / distance
+            above += share * values[node]
+            below += share
+        result[number] = above / below

@@ -1,0 +1,7 @@
+"""Steady sliding of a viscoelastic foundation over a line at a prescribed load.
+
+Read `steady` first: the problem, its result and the search for the depth. A Kelvin solid is solved by `kelvin` (exact
+on cubic cells) or, many cases at once, by `vectorised` (from node to node: `nodes`, `walk`) and `backward_euler` (the
+steps of the papers); any other solid by `viscoelastic` (`viscoelastic_newton`, `viscoelastic_sweep`). `laws` are the
+closed forms.
+"""

@@ -1,0 +1,320 @@
+"""The papers' method: the stationary state of a Kelvin foundation by backward Euler, many cases on a line at once.
+
+u_i = max(w_i, lambda u_(i-1)) with w = depth + height and lambda = 1 / (1 + dt / tau). Because a turn closes,
+F_N / (4 G dx) is the sum of u, and F_x / (4 G) that of (u_i - lambda u_(i-1)) / (1 - lambda) (w_i - w_(i-1)).
+Blocks of nodes that a case passes wholly in contact or wholly free are closed sums; over the others the inner loops run
+over cases, so that they are vector instructions. Each case does the same arithmetic whatever runs beside it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+
+ITERATIONS = 200
+COARSENING = 8
+COARSEST = 64  # nodes of the grid that the search for the depth starts on
+CONVERGED = 1e-9  # product of the last two relative steps, which bounds the error of a secant
+EXACT_STEP = 1e-13  # relative change of the depth that is rounding
+COARSE = 1e-3
+
+BLOCK = 256  # nodes
+LANES = 8  # cases that share a vector instruction
+
+# What a sweep writes for every case, in this order
+CARRIED, STIFFNESS, DRAG = range(3)
+SUMS = 3
+# What is known of a block of nodes, in this order: bounds of height and rise, the height before, and sums
+PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
+KNOWN = 8
+# What a sweep holds of a case, in this order; the last four while it goes from node to node
+U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
+ROOM = 7
+
+
+@njit(nogil=True, cache=True)
+def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
+    """Go on by one node: return u, its derivative by the depth, and the drag times 1 - lambda."""
+    free = decay * u
+    w = h + depth
+    touches = w > free
+    now = w if touches else free
+    return now, 1.0 if touches else decay * fade, (now - free) * t
+
+
+@njit(nogil=True, cache=True)
+def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
+    """Return what is known of every block, shape (n // BLOCK, KNOWN)."""
+    blocks = np.empty((height.size // BLOCK, KNOWN))
+    for j in range(blocks.shape[0]):
+        first = j * BLOCK
+        peak = lowest = height[first]
+        steepest = rise[first]
+        heights = rises = work = squares = 0.0
+        for i in range(first, first + BLOCK):
+            h, t = height[i], rise[i]
+            peak, lowest, steepest = max(peak, h), min(lowest, h), min(steepest, t)
+            heights += h
+            rises += t
+            work += h * t
+            squares += t * t
+        blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
+        # an element enters a line that does not close without contact
+        blocks[j, BEFORE] = height[first - 1] if j > 0 or periodic else -np.inf
+        blocks[j, HEIGHTS], blocks[j, RISES], blocks[j, WORK], blocks[j, SQUARES] = heights, rises, work, squares
+    return blocks
+
+
+@njit(nogil=True, cache=True)
+def _pass_block(
+    block: FloatArray,
+    last: float,
+    reaches: FloatArray,
+    decay: FloatArray,
+    depth: FloatArray,
+    room: FloatArray,
+    sums: FloatArray,
+    queue: NDArray[np.int64],
+) -> int:
+    """Take every case over a block by closed sums; queue those that touch or leave in it, and return their number."""
+    peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
+    heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
+    queued = 0
+    for k in range(depth.size):
+        d, u = depth[k], room[U, k]
+        if peak + d <= u * room[THROUGH, k]:
+            sums[CARRIED, k] += u * room[MEMORY, k]
+            sums[STIFFNESS, k] += room[FADE, k] * room[MEMORY, k]
+            room[U, k] = u * room[THROUGH, k]
+            room[FADE, k] *= room[THROUGH, k]
+        elif u == before + d and lowest + d + reaches[k] * steepest > 0:
+            sums[CARRIED, k] += heights + BLOCK * d
+            sums[STIFFNESS, k] += BLOCK
+            sums[DRAG, k] += (1 - decay[k]) * (work + d * rises) + decay[k] * squares
+            room[U, k] = last + d
+            room[FADE, k] = 1.0
+        else:
+            queue[queued] = k
+            queued += 1
+    return queued
+
+
+@njit(nogil=True, cache=True)
+def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, room: FloatArray) -> None:
+    """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
+    whole = height.size // 4 * 4
+    for i in range(0, whole, 4):
+        h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
+        t0, t1, t2, t3 = rise[i], rise[i + 1], rise[i + 2], rise[i + 3]
+        for k in range(depth.size):
+            u0, a0, x0 = _step(h0, t0, decay[k], depth[k], room[U, k], room[FADE, k])
+            u1, a1, x1 = _step(h1, t1, decay[k], depth[k], u0, a0)
+            u2, a2, x2 = _step(h2, t2, decay[k], depth[k], u1, a1)
+            u3, a3, x3 = _step(h3, t3, decay[k], depth[k], u2, a2)
+            room[U, k] = u3
+            room[FADE, k] = a3
+            room[LOAD, k] += (u0 + u1) + (u2 + u3)
+            room[RATE, k] += (a0 + a1) + (a2 + a3)
+            room[LOSS, k] += (x0 + x1) + (x2 + x3)
+    for i in range(whole, height.size):
+        for k in range(depth.size):
+            u0, a0, x0 = _step(height[i], rise[i], decay[k], depth[k], room[U, k], room[FADE, k])
+            room[U, k] = u0
+            room[FADE, k] = a0
+            room[LOAD, k] += u0
+            room[RATE, k] += a0
+            room[LOSS, k] += x0
+
+
+@njit(nogil=True, cache=True)
+def _walk_some(
+    height: FloatArray,
+    rise: FloatArray,
+    decay: FloatArray,
+    depth: FloatArray,
+    room: FloatArray,
+    sums: FloatArray,
+    queue: NDArray[np.int64],
+    near: FloatArray,
+) -> None:
+    """Take the cases of a queue from node to node, together in `near`, which has two rows more than `room`."""
+    for q in range(queue.size):
+        k = queue[q]
+        near[U, q], near[FADE, q] = room[U, k], room[FADE, k]
+        near[ROOM, q], near[ROOM + 1, q] = decay[k], depth[k]
+        near[LOAD, q] = near[RATE, q] = near[LOSS, q] = 0.0
+    # full vectors are quicker than the rest of one
+    full = -(-queue.size // LANES) * LANES
+    near[:, queue.size : full] = 0.0
+    _walk(height, rise, near[ROOM, :full], near[ROOM + 1, :full], near)
+    for q in range(queue.size):
+        k = queue[q]
+        room[U, k], room[FADE, k] = near[U, q], near[FADE, q]
+        sums[CARRIED, k] += near[LOAD, q]
+        sums[STIFFNESS, k] += near[RATE, q]
+        sums[DRAG, k] += near[LOSS, q]
+
+
+@njit(nogil=True, cache=True)
+def _sweep(
+    height: FloatArray,
+    rise: FloatArray,
+    blocks: FloatArray,
+    periodic: bool,
+    reaches: FloatArray,
+    decay: FloatArray,
+    depth: FloatArray,
+    room: FloatArray,
+    near: FloatArray,
+    queue: NDArray[np.int64],
+    sums: FloatArray,
+) -> None:
+    """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
+
+    Parameters
+    ----------
+    height : array, shape (n,)
+        Heights from the highest node.
+    rise : array, shape (n,)
+        Height less that of the node before.
+    blocks : array, shape (n // BLOCK, KNOWN)
+        From `_blocks`.
+    periodic : bool
+        Whether the line closes on itself; its highest node then comes last.
+    reaches, decay, depth : array, shape (cases,)
+        v tau in cells, lambda, and the penetration of the highest node.
+    room, near, queue : array, shape (ROOM, cases), (ROOM + 2, cases + LANES), (cases,)
+        Room; `U` and `FADE` of `room` end as u and its derivative at the end of the line.
+    sums : array, shape (SUMS, cases)
+        Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
+    """
+    for k in range(depth.size):
+        room[U, k] = depth[k] if periodic else 0.0
+        room[FADE, k] = 1.0 if periodic else 0.0
+        lost = -math.expm1(-BLOCK * math.log1p(1 / reaches[k]))
+        room[THROUGH, k], room[MEMORY, k] = 1 - lost, reaches[k] * lost
+        sums[CARRIED, k] = sums[STIFFNESS, k] = sums[DRAG, k] = 0.0
+    for j in range(blocks.shape[0]):
+        first, end = j * BLOCK, (j + 1) * BLOCK
+        queued = _pass_block(blocks[j], height[end - 1], reaches, decay, depth, room, sums, queue)
+        if queued:
+            _walk_some(height[first:end], rise[first:end], decay, depth, room, sums, queue[:queued], near)
+    first = blocks.shape[0] * BLOCK
+    for k in range(depth.size):
+        queue[k] = k
+    _walk_some(height[first:], rise[first:], decay, depth, room, sums, queue[: depth.size], near)
+
+
+@njit(nogil=True, cache=True)
+def _newton(
+    height: FloatArray,
+    rise: FloatArray,
+    periodic: bool,
+    reaches: FloatArray,
+    loads: FloatArray,
+    tolerance: float,
+    depths: FloatArray,
+    drags: FloatArray,
+    outside: NDArray[np.bool_],
+) -> None:
+    """Find the depth of every case; `depths` holds the guesses on entry, `drags` is NaN where none was found.
+
+    The load is convex, increasing and piecewise linear in the depth, so that Newton comes down from the right after its
+    first step. The last step is taken without another sweep: its load from the tangent, its drag from the secant.
+    """
+    cases = loads.size
+    active = np.arange(cases)
+    depth, load, reach = depths.copy(), loads.copy(), reaches.copy()
+    decay = reaches / (1 + reaches)
+    blocks = _blocks(height, rise, periodic)
+    room, near, sums = np.empty((ROOM, cases)), np.empty((ROOM + 2, cases + LANES)), np.empty((SUMS, cases))
+    queue, before = np.empty(cases, np.int64), np.full((2, cases), np.nan)
+    drags[:] = np.nan
+    ends = 0.0 if periodic else 1.0
+    count = cases
+    for _ in range(ITERATIONS):
+        _sweep(height, rise, blocks, periodic, reach[:count], decay[:count], depth[:count], room, near, queue, sums)
+        kept = 0
+        for k in range(count):
+            case = active[k]
+            # behind a line that does not close, u and its derivative fade away undisturbed
+            carried = sums[CARRIED, k] + ends * reach[k] * room[U, k]
+            step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * reach[k] * room[FADE, k])
+            drag = sums[DRAG, k] * (1 + reach[k])
+            earlier = before[0, k] - depth[k]
+            if abs(step) <= EXACT_STEP * depth[k] or abs(step * earlier) <= tolerance * depth[k] ** 2:
+                change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
+                depths[case] = depth[k] + step
+                drags[case] = drag + change
+                outside[case] = not periodic and (room[FADE, k] == 1 or height[0] + depth[k] > 0)
+                continue
+            active[kept], decay[kept], load[kept], reach[kept] = case, decay[k], load[k], reach[k]
+            before[0, kept], before[1, kept] = depth[k], drag
+            depth[kept] = max(depth[k] + step, 0.25 * depth[k])
+            kept += 1
+        count = kept
+        if count == 0:
+            return
+
+
+@njit(nogil=True, cache=True)
+def contact(
+    height: FloatArray,
+    periodic: bool,
+    reaches: FloatArray,
+    depths: FloatArray,
+    touched: FloatArray,
+    slope: FloatArray,
+) -> None:
+    """Write the number of nodes in contact and the rms rise over them, for line and cases as in :func:`solve`."""
+    for k in range(depths.size):
+        decay, count, square = reaches[k] / (1 + reaches[k]), 0, 0.0
+        u = depths[k] if periodic else 0.0
+        for i in range(height.size):
+            w = height[i] + depths[k]
+            if w > decay * u:
+                u = w
+                rise = height[i] - height[i - 1]
+                count += 1
+                square += rise * rise
+            else:
+                u *= decay
+        touched[k] = count
+        slope[k] = np.sqrt(square / max(count, 1))
+
+
+def solve(
+    height: FloatArray, periodic: bool, reaches: FloatArray, loads: FloatArray
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.
+
+    The first guess comes from every `COARSENING`-th node, and so on: it depends on the case alone, and so does
+    every bit of the result.
+
+    Parameters
+    ----------
+    height : array, shape (n,)
+        Heights from the highest node, which comes last if the line is periodic.
+    periodic : bool
+        Whether the line closes on itself; if not, elements enter undeformed at the first node.
+    reaches, loads : array, shape (cases,)
+        v tau in cells, and F_N / (4 G dx) in the unit of height; both positive and finite.
+    """
+    strides = [1]
+    while height.size > COARSEST * strides[-1]:
+        strides.append(strides[-1] * COARSENING)
+    mean = loads / height.size
+    depths = np.maximum(mean, mean ** (2 / 3))
+    drags, outside = np.empty(loads.size), np.zeros(loads.size, np.bool_)
+    top = int(np.argmax(height))
+    for stride in reversed(strides):
+        coarse = np.ascontiguousarray(height[top % stride :: stride])
+        rise = coarse - np.roll(coarse, 1)
+        tolerance = CONVERGED if stride == 1 else COARSE
+        _newton(coarse, rise, periodic, reaches / stride, loads / stride, tolerance, depths, drags, outside)
+    return depths, drags, outside

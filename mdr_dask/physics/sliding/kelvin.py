@@ -1,0 +1,296 @@
+"""One sweep along a profile of cubic cells: a Kelvin foundation in its stationary state at a given depth.
+
+Everything here is measured in cells: a cell has length 1, a slope is the rise over one cell, ``reach`` is v tau / dx.
+Heights point into the elastomer and are measured from the highest point of the profile, so that the penetration is
+w = depth + height with depth > 0. In contact u = w, free u decays as exp(-s / reach). By the envelope theorem
+du/d(depth) is 1 in contact and decays with u in free flight, whatever the touching and leaving points do.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.cubic_line import BLOCK, NONE, Cells, cubic, summit
+
+TINY = 1e-290
+CLOSE = 1e-8  # a Newton step after which the next one is below rounding
+ITERATIONS = 80
+
+# What a sweep returns, in this order
+DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
+SUMS = 7
+
+
+@njit(nogil=True, cache=True)
+def _barrier(
+    height: FloatArray,
+    enter: FloatArray,
+    leave: FloatArray,
+    reach: float,
+    block: int,
+    barriers: FloatArray,
+    block_barriers: FloatArray,
+) -> None:
+    """Write the depth that keeps each whole cell of a block pressed, w + reach w' > 0, and their maximum."""
+    every = -np.inf
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, barriers.size)):
+        h0, a, b, c = cubic(height, enter, leave, i)
+        first = -(h0 + reach * a)
+        last = -(height[i + 1] + reach * leave[i])
+        highest = first if first > last else last
+        # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
+        q, r = a + 2 * reach * b, b + 3 * reach * c
+        x = summit(-q, -r, -c)
+        if x < 1:
+            inside = first - x * (q + x * (r + x * c))
+            highest = inside if inside > highest else highest
+        barriers[i] = highest
+        every = highest if highest > every else every
+    block_barriers[block] = every
+
+
+@njit(nogil=True, cache=True)
+def _lost(x: float) -> float:
+    """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
+    if x > 1 / 32:
+        return -math.expm1(-x)
+    return x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))))
+
+
+@njit(nogil=True, cache=True)
+def _leaving(w0: float, a: float, b: float, c: float, reach: float, start: float) -> float:
+    """Return where w + reach w' falls through 0 first between start and 1, or `NONE`."""
+    # the force is a cubic itself, cut into its monotone pieces
+    p, q, r = w0 + reach * a, a + 2 * reach * b, b + 3 * reach * c
+    low, force = start, p + start * (q + start * (r + start * c))
+    discriminant = r * r - 3 * c * q
+    root = math.sqrt(discriminant) if discriminant > 0 else 0.0
+    lead = -(r + root) if r > 0 else root - r
+    one, other = (lead / (3 * c) if c != 0 else NONE), (q / lead if lead != 0 else NONE)
+    one, other = (one, other) if one < other else (other, one)
+    for piece in range(3):
+        high = 1.0 if piece == 2 else (one if piece == 0 else other)
+        if not low < high <= 1:
+            continue
+        end = p + high * (q + high * (r + high * c))
+        if force > 0 and end <= 0:
+            return _falling(p, q, r, c, low, high)
+        low, force = high, end
+    return NONE
+
+
+@njit(nogil=True, cache=True)
+def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
+    """Return the root of a cubic that falls monotonously from low to high."""
+    x = low + (high - low) * 0.5
+    for _ in range(ITERATIONS):
+        force = p + x * (q + x * (r + x * c))
+        if force > 0:
+            low = x
+        else:
+            high = x
+        slope = q + x * (2 * r + x * 3 * c)
+        step = x - force / slope if slope < 0 else high
+        if abs(step - x) < CLOSE:
+            return min(max(step, low), high)
+        x = step if low < step < high else 0.5 * (low + high)
+    return x
+
+
+@njit(nogil=True, cache=True)
+def _touching(
+    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, high: float
+) -> float:
+    """Return where w rises to u exp(-(x - start) / reach) between low and high, where it is known to be above."""
+    if w0 + low * (a + low * (b + low * c)) >= u - u * _lost((low - start) / reach):
+        return low
+    first, end, x = low, high, high
+    for _ in range(ITERATIONS):
+        free = u - u * _lost((x - start) / reach)
+        gap = w0 + x * (a + x * (b + x * c)) - free
+        if gap > 0:
+            high = x
+        else:
+            low = x
+        slope = a + x * (2 * b + x * 3 * c) + free / reach
+        step = x - gap / slope if slope > 0 else low
+        if abs(step - x) < CLOSE:
+            return min(max(step, first), end)
+        x = step if low < step < high else 0.5 * (low + high)
+    return x
+
+
+@njit(nogil=True, cache=True)
+def _touch(
+    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, stop: float
+) -> float:
+    """Return where from low to stop an element that is free from start on, with u there, touches first, or `NONE`.
+
+    The lead of the profile, (w - u_free) exp(x / reach), rises while the force w + reach w' is positive.
+    """
+    for _ in range(3):
+        force = w0 + low * (a + low * (b + low * c)) + reach * (a + low * (2 * b + low * 3 * c))
+        first = low if force > 0 else _leaving(-w0, -a, -b, -c, reach, low)
+        if first >= stop:
+            return NONE
+        high = min(_leaving(w0, a, b, c, reach, first), stop)
+        if w0 + high * (a + high * (b + high * c)) > u - u * _lost((high - start) / reach):
+            return _touching(w0, a, b, c, reach, u, start, first, high)
+        if high >= stop:
+            return NONE
+        low = high + CLOSE
+    return NONE
+
+
+@njit(nogil=True, cache=True)
+def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
+    """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
+    half, middle = 0.5 * (end - start), 0.5 * (end + start)
+    x, y = middle - half * 0.7745966692414834, middle + half * 0.7745966692414834
+    before, centre, after = (
+        a + x * (2 * b + x * 3 * c),
+        a + middle * (2 * b + middle * 3 * c),
+        a + y * (2 * b + y * 3 * c),
+    )
+    area = 5 * x * (a + x * (b + x * c)) + 8 * middle * (a + middle * (b + middle * c)) + 5 * y * (a + y * (b + y * c))
+    stretch = 5 * before * before + 8 * centre * centre + 5 * after * after
+    return half * (2 * w0 + area / 9), half * stretch / 9
+
+
+@njit(nogil=True, cache=True)
+def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, float, float, float]:
+    """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
+
+    Over a flight from u the integral of u is reach times what u loses, and the drag is half of what u^2 loses; the
+    derivative of the drag has a part from the point of touching, where the profile has that slope.
+    """
+    lost = _lost(flown / reach) if u > 0 else 1.0
+    memory = reach * lost
+    return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / reach + slope)
+
+
+@njit(nogil=True, cache=True, inline="always")
+def _flown_over(
+    peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
+) -> tuple[int, float]:
+    """Pass cells that a free element cannot touch; return the first other one, and the displacement there."""
+    n, blocks = peak.size - 1, block_peak.size
+    while i < n and peak[i] + depth <= free * decay:
+        if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_peak[i // BLOCK] + depth <= free * block_decay:
+            free *= block_decay
+            i += BLOCK
+        else:
+            free *= decay
+            i += 1
+        # numbers below the normal ones cost a hundred times as much
+        free = free if free > TINY else 0.0
+    return i, free
+
+
+@njit(nogil=True, cache=True)
+def sweep(
+    cells: Cells, barriers: FloatArray, block_barriers: FloatArray, reach: float, depth: float, sums: FloatArray
+) -> None:
+    """Follow an element once along the profile.
+
+    Parameters
+    ----------
+    cells : Cells
+        The profile.
+    barriers, block_barriers : array, shape (n,), (n // BLOCK + 1,)
+        Depths that keep cells and blocks pressed at this reach, as far as sweeps at it have needed them: those of
+        blocks that are NaN, all of them at first, are written here when an element in contact comes there.
+    reach : float
+        v tau in cells.
+    depth : float
+        Penetration of the highest point.
+    sums : array, shape (SUMS,)
+        Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
+        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a profile
+        that is not periodic.
+    """
+    # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
+    height, enter, leave, peak, mean, stretches = (
+        cells.height,
+        cells.enter,
+        cells.leave,
+        cells.peak,
+        cells.mean,
+        cells.stretch,
+    )
+    block_peak, block_mean, block_stretch = cells.block_peak, cells.block_mean, cells.block_stretch
+    n, blocks, start = mean.size - 1, block_peak.size, cells.start
+    decay, block_decay = np.exp(-1 / reach), np.exp(-BLOCK / reach)
+    area = rate = drag = drag_rate = length = stretch = 0.0
+    i, x, contact = 0, start, cells.periodic
+    # displacement where the contact was left and at the start of this cell; place of leaving
+    u = free = left = 0.0
+    # the turn ends in a part of a cell that repeats the first, at the highest point again
+    last = n if cells.periodic and start > 0 else n - 1
+    while i <= last:
+        if contact and x == 0:
+            while i < n:
+                if math.isnan(block_barriers[i // BLOCK]):
+                    _barrier(height, enter, leave, reach, i // BLOCK, barriers, block_barriers)
+                if not barriers[i] < depth:
+                    break
+                if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
+                    area += block_mean[i // BLOCK] + BLOCK * depth
+                    stretch += block_stretch[i // BLOCK]
+                    length += BLOCK
+                    i += BLOCK
+                else:
+                    area += mean[i] + depth
+                    stretch += stretches[i]
+                    length += 1
+                    i += 1
+        elif not contact:
+            i, free = _flown_over(peak, block_peak, depth, decay, block_decay, i, free)
+        if i > last:
+            break
+        stop = 1.0 if i < n else start
+        h0, c1, c2, c3 = cubic(height, enter, leave, i)
+        w0 = depth + h0
+        visits = 0
+        while True:
+            if contact:
+                pressed = w0 + x * (c1 + x * (c2 + x * c3)) + reach * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
+                place = _leaving(w0, c1, c2, c3, reach, x) if pressed else x
+                end = min(place, stop)
+                part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
+                area += part
+                stretch += part_stretch
+                length += end - x
+                visits += 1
+                if place >= stop:
+                    break
+                contact, left, x = False, i + place, place
+                free = u = w0 + place * (c1 + place * (c2 + place * c3))
+            # a force that is a cubic falls through 0 twice at most
+            low = x + CLOSE if visits > 0 else x
+            touch = _touch(w0, c1, c2, c3, reach, free, x, low, stop) if visits < 2 and low < stop else NONE
+            if touch > stop:
+                free -= free * _lost((stop - x) / reach)
+                break
+            flight = _landed(u, i + touch - left, reach, c1 + touch * (2 * c2 + touch * 3 * c3))
+            area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
+            contact, x = True, touch
+        x = 0.0
+        i += 1
+    # the last flight: to the highest point, or without end
+    if not contact:
+        flown = n + start - left if cells.periodic else np.inf
+        slope = enter[n] if cells.periodic and start == 0 else 0.0
+        flight = _landed(u, flown, reach, slope)
+        area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
+    sums[DISPLACEMENT] = area
+    sums[STIFFNESS] = rate + length
+    sums[DRAG] = drag + reach * stretch
+    sums[DRAG_RATE] = drag_rate
+    sums[LENGTH] = length
+    sums[STRETCH] = stretch
+    sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0

@@ -1,0 +1,337 @@
+"""Compiled sweep of a linear viscoelastic foundation along a profile of straight cells, exact inside every cell.
+
+Lengths are in cells, stresses in units of the static modulus. `penetration` w is how deep the profile would press each
+node; arm m stretches by e = u - a, with de/ds = du/ds - e / reach, reach = tau v / cell. Contact moves the
+stretches by closed forms; free flight is the sum of recovery modes. Contact begins and ends inside cells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import FloatArray
+
+CLOSED, OPEN_END = 0, 1
+SURFACE_LAYER = 1e-7
+"""Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
+    """Fill a matrix times a vector; the matrix is given by its columns, which the compiler can add as vectors."""
+    product[:] = 0.0
+    for k in range(vector.size):
+        factor = vector[k]
+        for m in range(product.size):
+            product[m] += columns[k, m] * factor
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def step_factors(
+    length: float, reach: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
+) -> None:  # pragma: no cover
+    """Fill the factors of a straight piece: e -> decay e + gain slope; its integral is gain e + area slope."""
+    for m in range(reach.size):
+        x = length / reach[m]
+        if x < 0.02:
+            loss = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6)))))
+            decay[m] = 1 - loss
+            gain[m] = reach[m] * loss
+            area[m] = length * length * (0.5 - x / 6 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7)))))
+        else:
+            decay[m] = np.exp(-x)
+            gain[m] = reach[m] * (1 - decay[m])
+            area[m] = reach[m] * (length - gain[m])
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _pressure_inside(
+    length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+) -> tuple[float, float]:  # pragma: no cover
+    """Return the stress and its derivative a `length` into a straight piece."""
+    pressure, rate = start + slope * length, slope
+    for m in range(moduli.size):
+        lost = -np.expm1(-length / reach[m])
+        pressure += moduli[m] * ((1 - lost) * stretch[m] + slope * reach[m] * lost)
+        rate += moduli[m] * (1 - lost) * (slope - stretch[m] / reach[m])
+    return pressure, rate
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def leaving_point(
+    end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+) -> float:  # pragma: no cover
+    """Return where the stress falls to zero in (0, end], by Newton kept inside a bracket."""
+    low, high = 0.0, end
+    point = SURFACE_LAYER if reach.size and reach[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
+    for _ in range(200):
+        pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, reach)
+        if pressure > 0:
+            low = point
+        else:
+            high = point
+        following = point - pressure / rate if rate < 0 else -1.0
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - point) <= 1e-15 * point or high - low <= 1e-15 * high:
+            return following
+        point = following
+    return point
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def touching_point(
+    low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
+) -> float:  # pragma: no cover
+    """Return where the recovering strain meets the line start + slope (t - low); monotone, since it is convex."""
+    point = low
+    for _ in range(60):
+        gap, rate = -(start + slope * (point - low)), -slope
+        for k in range(times.size):
+            term = modes[k] * np.exp(-point / times[k])
+            gap += term
+            rate -= term / times[k]
+        if gap <= 0 or rate >= 0:
+            return point
+        step = -gap / rate
+        point += step
+        if point >= high:
+            return high
+        if step <= 1e-15 * high:
+            return point
+    return point
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
+    strain, rate = 0.0, 0.0
+    for k in range(times.size):
+        term = modes[k] * np.exp(-distance / times[k])
+        strain += term
+        rate -= term / times[k]
+    return strain, rate
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _fly(
+    place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
+) -> float:  # pragma: no cover
+    """Return where the strain that recovers from `place` meets the profile again at `node` or later, or -1.
+
+    A convex strain that leaves a straight cell does not meet it again: `node` is the end of the next cell.
+
+    A sum of decaying exponentials is log-convex, so its tangent exponential is a lower bound: nodes below it are passed
+    without evaluating the sum.
+    """
+    strain, rate = _strain_of(0.0, modes, times)
+    bound = strain
+    ratio = np.exp(rate / strain) if strain > 0 else 1.0
+    bound *= ratio ** (node - place)
+    while node <= last:
+        if penetration[node] > bound:
+            strain, rate = _strain_of(node - place, modes, times)
+            if penetration[node] > strain:
+                before = max(node - 1.0 - place, 0.0)
+                slope = penetration[node] - penetration[node - 1]
+                start = penetration[node] - slope * (node - place - before)
+                return place + touching_point(before, node - place, start, slope, modes, times)
+            bound = strain
+            ratio = np.exp(rate / strain) if strain > 0 else 1.0
+        bound *= ratio
+        node += 1
+    return -1.0
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def sweep(
+    penetration: FloatArray,
+    start: FloatArray,
+    moduli: FloatArray,
+    reach: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    amplitude_of: FloatArray,
+    undeformed: bool,
+    lengths: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+    work: FloatArray,
+) -> tuple[int, int]:  # pragma: no cover
+    """Carry the arms once along the line and note what each contact and each flight contributes.
+
+    Parameters
+    ----------
+    penetration : array, shape (nodes,)
+        w at each node; the last node of a periodic line repeats the first.
+    start : array, shape (arms,)
+        e_m at the first node under the penetration there; ignored if `undeformed`.
+    moduli, reach : array, shape (arms,)
+        Arms, ascending in reach.
+    times : array, shape (arms,)
+        Of the recovery modes, in cells.
+    stretch_of, amplitude_of : array, shape (arms, arms)
+        Stretches of every mode (a row each), and what the stretch of every arm (a row each) adds to the modes.
+    undeformed : bool
+        Whether the elements enter free and at rest.
+    lengths : array, shape (>= 2 nodes + 2,), output
+        Lengths of flight, contact, flight, contact, ... in this order, the first flight possibly of length zero.
+    imbalance : array, shape (arms,), output
+        Integral of e_m over the line.
+    totals : array, shape (6,), output
+        Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
+        beyond the line.
+    work : array, shape (10, max(arms, 1)), scratch
+
+    Returns
+    -------
+    pieces, end : int
+        Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
+    """
+    arms, last = moduli.size, penetration.size - 1
+    e, modes = work[0], work[1]
+    step_factors(1.0, reach, work[3], work[4], work[5])
+    imbalance[:] = 0.0
+    totals[:] = 0.0
+    glass, push = 1.0, penetration[0]
+    for m in range(arms):
+        e[m] = 0.0 if undeformed else start[m]
+        glass += moduli[m]
+        push += moduli[m] * e[m]
+        modes[m] = 0.0
+    place, pieces, node = 0.0, 0, 1
+    flying, left = undeformed or push < 0, True
+    if flying and not undeformed:
+        _into_flight(penetration[0], push / glass, e, moduli, modes, amplitude_of)
+    while True:
+        landing = _fly(place, node, modes, times, penetration, last) if flying else place
+        goal = landing if landing >= 0 else float(last)
+        lengths[pieces] = goal - place
+        pieces += 1
+        if flying:
+            _add_flight(goal - place, modes, times, stretch_of, reach, e, imbalance, totals)
+        if landing < 0:
+            for k in range(arms):
+                totals[5] += modes[k] * times[k]
+            return pieces, CLOSED
+        if int(goal) >= last:
+            return pieces, OPEN_END
+        place, strain, pressure, left = _contact(goal, penetration, moduli, reach, imbalance, totals, work)
+        lengths[pieces] = place - goal
+        pieces += 1
+        if not left:
+            return pieces, OPEN_END
+        node = int(work[2, 0])
+        _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
+        flying = True
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _contact(
+    begin: float,
+    penetration: FloatArray,
+    moduli: FloatArray,
+    reach: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+    work: FloatArray,
+) -> tuple[float, float, float, bool]:  # pragma: no cover
+    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep` for the arrays.
+
+    Returns
+    -------
+    place, strain, pressure, left
+        Where it ends, with what strain and rest of stress, and whether it left the profile there; the stretches stay in
+        ``work[0]``, and ``work[2, 0]`` is the next node that a flight may meet.
+    """
+    arms, last = moduli.size, penetration.size - 1
+    e, following = work[0], work[9]
+    place, node = begin, int(begin) + 1
+    rise = penetration[node] - penetration[node - 1]
+    first = strain = penetration[node] - rise * (node - place)
+    pressure, left = 0.0, False
+    while node <= last and not left:
+        slope = penetration[node] - penetration[node - 1]
+        length = node - place
+        factors = work[3:6]
+        if length != 1.0:
+            factors = work[6:9]
+            step_factors(length, reach, factors[0], factors[1], factors[2])
+        pressure = _stretch(penetration[node], slope, e, following, moduli, factors)
+        if pressure < 0:
+            left = True
+            length = leaving_point(length, strain, slope, e, moduli, reach)
+            factors = work[6:9]
+            step_factors(length, reach, factors[0], factors[1], factors[2])
+            pressure = _stretch(strain + slope * length, slope, e, following, moduli, factors)
+        viscous = 0.0
+        for m in range(arms):
+            integral = factors[1, m] * e[m] + factors[2, m] * slope
+            imbalance[m] += integral
+            viscous += moduli[m] * integral
+            e[m] = following[m]
+        elastic = length * (strain + 0.5 * slope * length)
+        totals[0] += elastic
+        totals[1] += elastic + viscous
+        totals[2] += viscous * slope
+        totals[4] += slope * slope * length
+        strain = strain + slope * length if left else penetration[node]
+        place = place + length if left else float(node)
+        node += 1
+    totals[2] += 0.5 * (strain - first) * (strain + first)
+    totals[3] += place - begin
+    work[2, 0] = node
+    return place, strain, pressure, left
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _stretch(
+    strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
+) -> float:  # pragma: no cover
+    """Carry the stretches along a straight piece and return the stress at its end, where the strain is `strain`."""
+    pressure = strain
+    for m in range(moduli.size):
+        following[m] = factors[0, m] * e[m] + factors[1, m] * slope
+        pressure += moduli[m] * following[m]
+    return pressure
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _into_flight(
+    strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
+) -> None:  # pragma: no cover
+    """Turn stretches into modes, after the strain has given way by `excess`; the shortest arm makes the stress zero."""
+    stress = strain - excess
+    for m in range(e.size):
+        e[m] -= excess
+        if m > 0:
+            stress += moduli[m] * e[m]
+    if e.size:
+        e[0] = -stress / moduli[0]
+    if e.size:
+        multiply(amplitude_of, e, modes)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _add_flight(
+    length: float,
+    modes: FloatArray,
+    times: FloatArray,
+    stretch_of: FloatArray,
+    reach: FloatArray,
+    e: FloatArray,
+    imbalance: FloatArray,
+    totals: FloatArray,
+) -> None:  # pragma: no cover
+    """Let the modes decay over a flight, add its integrals of u and e, and leave the stretches at its end in `e`."""
+    for m in range(e.size):
+        e[m] = 0.0
+    for k in range(times.size):
+        lost = -np.expm1(-length / times[k])
+        integral = modes[k] * times[k] * lost
+        totals[0] += integral
+        modes[k] *= 1 - lost
+        after = modes[k]
+        for m in range(e.size):
+            imbalance[m] += stretch_of[k, m] * integral
+            e[m] += stretch_of[k, m] * after

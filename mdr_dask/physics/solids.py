@@ -1,0 +1,400 @@
+"""Linear viscoelastic solids as a spring, relaxing arms and a dashpot side by side; their moduli, fits and temperature.
+
+A solid follows a shear strain u by the stress ``G_inf u + sum G_m (u - a_m) + eta du/dt``, with
+``da_m/dt = (u - a_m) / tau_m``. No arms: Kelvin; one arm and no dashpot: standard solid; many arms: Prony series.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import nnls
+
+from mdr_dask.arrays import FloatArray
+
+GAS_CONSTANT = 8.31446261815324
+"""Molar gas constant, J / (mol K)."""
+
+
+@dataclass(frozen=True)
+class LinearSolid:
+    """A linear viscoelastic solid.
+
+    Parameters
+    ----------
+    static_modulus : float
+        Shear modulus G_inf at zero frequency, Pa.
+    moduli : array, shape (arms,)
+        Shear modulus G_m of each arm, Pa, not negative.
+    times : array, shape (arms,)
+        Relaxation time tau_m of each arm, s, ascending and distinct.
+    viscosity : float
+        Viscosity eta of the dashpot beside them, Pa s.
+    """
+
+    static_modulus: float
+    moduli: FloatArray
+    times: FloatArray
+    viscosity: float = 0.0
+
+    @property
+    def glass_modulus(self) -> float:
+        """Shear modulus at a sudden strain, the dashpot left out, Pa."""
+        return float(self.static_modulus + self.moduli.sum())
+
+
+def kelvin(shear_modulus: float, relaxation_time: float) -> LinearSolid:
+    """Return the Kelvin solid of modulus G, Pa, and relaxation time tau = eta / G, s."""
+    return prony(shear_modulus, [], [], shear_modulus * relaxation_time)
+
+
+def standard_solid(static_modulus: float, glass_modulus: float, relaxation_time: float) -> LinearSolid:
+    """Return the standard solid: modulus `static_modulus` slowly, `glass_modulus` suddenly (Pa), one arm of that
+    time (s).
+
+    Raises
+    ------
+    ValueError
+        If the glass modulus is below the static one.
+    """
+    if not glass_modulus >= static_modulus:
+        raise ValueError(f"the glass modulus must not be below the static one, got {glass_modulus!r}")
+    return prony(static_modulus, [glass_modulus - static_modulus], [relaxation_time])
+
+
+def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity: float = 0.0) -> LinearSolid:
+    """Return a solid of any number of arms: sorted by time, equal times merged, arms without stiffness left out.
+
+    Parameters
+    ----------
+    static_modulus : float
+        G_inf, Pa, positive: without it a periodic contact carries no load in the steady state.
+    moduli, times : array_like, shape (arms,)
+        G_m >= 0, Pa, and tau_m > 0, s.
+    viscosity : float
+        eta >= 0 of a dashpot beside the arms, Pa s.
+
+    Raises
+    ------
+    ValueError
+        If a number is not finite or has the wrong sign, or the two lists differ in length.
+    """
+    stiffness, time = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
+    if stiffness.shape != time.shape:
+        raise ValueError(f"each arm needs a modulus and a time, got {stiffness.size} moduli and {time.size} times")
+    if not (np.isfinite(static_modulus) and static_modulus > 0):
+        raise ValueError(f"the static modulus must be positive, got {static_modulus!r}")
+    if not (np.all(np.isfinite(stiffness)) and np.all(stiffness >= 0)):
+        raise ValueError(f"the moduli of the arms must not be negative, got {stiffness.tolist()!r}")
+    if not (np.all(np.isfinite(time)) and np.all(time > 0)):
+        raise ValueError(f"the relaxation times must be positive, got {time.tolist()!r}")
+    if not (np.isfinite(viscosity) and viscosity >= 0):
+        raise ValueError(f"the viscosity must not be negative, got {viscosity!r}")
+    distinct, place = np.unique(time[stiffness > 0], return_inverse=True)
+    merged = np.bincount(place, weights=stiffness[stiffness > 0], minlength=distinct.size)
+    return LinearSolid(float(static_modulus), merged.astype(np.float64), distinct, float(viscosity))
+
+
+def complex_modulus(solid: LinearSolid, angular_frequency: ArrayLike) -> NDArray[np.complex128]:
+    """Return G*(omega) = G' + i G'', Pa, for angular frequencies in rad/s, of their shape."""
+    omega = np.asarray(angular_frequency, dtype=np.float64)
+    product = omega[..., None] * solid.times
+    arms = solid.moduli * product / (product - 1j)
+    modulus = solid.static_modulus + 1j * omega * solid.viscosity + arms.sum(axis=-1)
+    return np.asarray(modulus, dtype=np.complex128)
+
+
+def relaxation_modulus(solid: LinearSolid, time: ArrayLike) -> FloatArray:
+    """Return G(t), Pa, the stress after a unit step of strain at t > 0, s; the dashpot's impulse at t = 0 is over."""
+    elapsed = np.asarray(time, dtype=np.float64)
+    arms = solid.moduli * np.exp(-elapsed[..., None] / solid.times)
+    return np.asarray(solid.static_modulus + arms.sum(axis=-1), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class SeriesFit:
+    """A Prony series fitted to moduli, and how well it holds.
+
+    Parameters
+    ----------
+    solid : LinearSolid
+        The series.
+    storage_error, loss_error : float
+        Root mean square of the relative error of G' and G''; NaN for one that was not given.
+    largest_error : float
+        Largest relative error of either.
+    worst_frequency : float
+        Angular frequency of the largest error, rad/s.
+    range : tuple of float
+        Lowest and highest angular frequency of the data, rad/s.
+    """
+
+    solid: LinearSolid
+    storage_error: float
+    loss_error: float
+    largest_error: float
+    worst_frequency: float
+    range: tuple[float, float]
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the relative errors of the moduli that were given."""
+        return _rms(np.array([error for error in (self.storage_error, self.loss_error) if np.isfinite(error)]))
+
+
+def power_law_series(
+    static_modulus: float,
+    loss_modulus: float,
+    frequency: float,
+    exponent: float,
+    lowest: float,
+    highest: float,
+    arms_per_decade: int = 2,
+) -> SeriesFit:
+    """Return a Prony series with G'' = loss_modulus (omega / frequency)^exponent (thesis eq. 3.45) over a range.
+
+    Parameters
+    ----------
+    static_modulus, loss_modulus : float
+        G_inf and G'' at `frequency`, Pa.
+    frequency : float
+        Angular frequency at which `loss_modulus` holds, rad/s.
+    exponent : float
+        beta, above 0 and below 1.
+    lowest, highest : float
+        Range of angular frequency in which the law is to hold, rad/s. Arms reach a decade beyond.
+    arms_per_decade : int
+        Two keep G'' within 1 % inside the range.
+
+    Raises
+    ------
+    ValueError
+        If the exponent is outside (0, 1) or the range is empty.
+    """
+    if not 0 < exponent < 1:
+        raise ValueError(f"the exponent of a power-law spectrum must lie between 0 and 1, got {exponent!r}")
+    if not 0 < lowest < highest:
+        raise ValueError(f"the range of frequency must be positive and not empty, got {(lowest, highest)!r}")
+    decades = np.log10(highest / lowest)
+    times = np.geomspace(0.1 / highest, 10 / lowest, round((decades + 2) * arms_per_decade) + 1)
+    omega = np.geomspace(lowest, highest, int(np.ceil(10 * decades * arms_per_decade)) + 1)
+    wanted = loss_modulus * (omega / frequency) ** exponent
+    moduli, _ = nnls(_loss_columns(omega, times) / wanted[:, None], np.ones_like(omega), maxiter=100 * times.size)
+    solid = prony(static_modulus, moduli, times)
+    error = complex_modulus(solid, omega).imag / wanted - 1
+    worst = int(np.abs(error).argmax())
+    return SeriesFit(solid, np.nan, _rms(error), abs(float(error[worst])), float(omega[worst]), (lowest, highest))
+
+
+def fit_series(
+    angular_frequency: ArrayLike,
+    storage: ArrayLike,
+    loss: ArrayLike,
+    arms_per_decade: float = 1.0,
+    dashpot: bool = False,
+) -> SeriesFit:
+    """Fit a Prony series to a table of measured moduli by non-negative least squares of the relative errors.
+
+    Parameters
+    ----------
+    angular_frequency : array_like, shape (points,)
+        omega, rad/s, at least one decade wide; order does not matter.
+    storage, loss : array_like, shape (points,)
+        G' and G'', Pa, positive. For moduli in tension divide by 2 (1 + Poisson's ratio) before.
+    arms_per_decade : float
+        Density of the relaxation times, which cover the range of 1 / omega and half a decade on each side.
+    dashpot : bool
+        Whether to allow a dashpot beside the arms.
+
+    Raises
+    ------
+    ValueError
+        If the three lists differ, a value is not positive, or the fit leaves no static modulus.
+    """
+    omega, stored, lost = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (angular_frequency, storage, loss))
+    if not omega.size == stored.size == lost.size >= 2:
+        raise ValueError(f"a frequency needs both moduli, got {omega.size}, {stored.size} and {lost.size} values")
+    if not all(np.all(np.isfinite(a) & (a > 0)) for a in (omega, stored, lost)):
+        raise ValueError("frequencies and moduli must be positive and finite")
+    times = _times_covering(omega, arms_per_decade)
+    design = _relative_design(omega, stored, lost, times, dashpot)
+    weights, _ = nnls(design, np.ones(2 * omega.size), maxiter=100 * design.shape[1])
+    static, moduli = weights[0], weights[1 : 1 + times.size]
+    if static <= 0:
+        raise ValueError("the moduli leave no static modulus: the table must reach the rubbery plateau")
+    solid = prony(static, moduli, times, weights[-1] if dashpot else 0.0)
+    modulus = complex_modulus(solid, omega)
+    errors = modulus.real / stored - 1, modulus.imag / lost - 1
+    larger = np.maximum(*np.abs(errors))
+    worst = int(larger.argmax())
+    covered = float(omega.min()), float(omega.max())
+    return SeriesFit(solid, _rms(errors[0]), _rms(errors[1]), float(larger[worst]), float(omega[worst]), covered)
+
+
+def _times_covering(omega: FloatArray, arms_per_decade: float) -> FloatArray:
+    slowest, fastest = 10**0.5 / omega.min(), 10**-0.5 / omega.max()
+    arms = max(2, round(np.log10(slowest / fastest) * arms_per_decade) + 1)
+    return np.geomspace(fastest, slowest, arms)
+
+
+def _loss_columns(omega: FloatArray, times: FloatArray) -> FloatArray:
+    product = np.multiply.outer(omega, times)
+    return np.asarray(1 / (product + 1 / product), dtype=np.float64)
+
+
+def _relative_design(
+    omega: FloatArray, storage: FloatArray, loss: FloatArray, times: FloatArray, dashpot: bool
+) -> FloatArray:
+    product = np.multiply.outer(omega, times)
+    stored = np.column_stack([np.ones_like(omega), product / (product + 1 / product)])
+    lost = np.column_stack([np.zeros_like(omega), _loss_columns(omega, times)])
+    if dashpot:
+        stored = np.column_stack([stored, np.zeros_like(omega)])
+        lost = np.column_stack([lost, omega])
+    return np.vstack([stored / storage[:, None], lost / loss[:, None]])
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -> FloatArray:
+    """Return a_T of Williams, Landel and Ferry: log10 a_T = -c1 (T - T_ref) / (c2 + T - T_ref).
+
+    Parameters
+    ----------
+    temperature : array_like
+        T, K.
+    reference : float
+        T_ref, K.
+    c1 : float
+        Dimensionless constant.
+    c2 : float
+        Constant, K; the law ends at T = T_ref - c2.
+
+    Raises
+    ------
+    ValueError
+        If a temperature lies at or below T_ref - c2.
+    """
+    difference = np.asarray(temperature, dtype=np.float64) - reference
+    if np.any(c2 + difference <= 0):
+        raise ValueError(f"the law of Williams, Landel and Ferry ends at {reference - c2:g} K, got {temperature!r}")
+    return np.asarray(10 ** (-c1 * difference / (c2 + difference)), dtype=np.float64)
+
+
+def arrhenius_factor(temperature: ArrayLike, reference: float, activation_energy: float) -> FloatArray:
+    """Return a_T = exp(E / R (1/T - 1/T_ref)) for temperatures in K and an activation energy in J/mol.
+
+    Raises
+    ------
+    ValueError
+        If a temperature is not positive.
+    """
+    absolute = np.asarray(temperature, dtype=np.float64)
+    if np.any(absolute <= 0) or reference <= 0:
+        raise ValueError(f"absolute temperatures must be positive, got {temperature!r}")
+    return np.asarray(np.exp(activation_energy / GAS_CONSTANT * (1 / absolute - 1 / reference)), dtype=np.float64)
+
+
+def at_temperature(solid: LinearSolid, factor: float) -> LinearSolid:
+    """Return the solid with every relaxation time, and the dashpot's viscosity, multiplied by a_T."""
+    return replace(solid, times=solid.times * factor, viscosity=solid.viscosity * factor)
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """Free recovery (zero stress) of a solid as a sum of decaying modes, all of the sign of the strain.
+
+    In mode k the strain is u = c_k exp(-t / lambda_k) and the stretch of arm m is u - a_m = stretch[m, k] u.
+
+    Parameters
+    ----------
+    times : array, shape (arms,)
+        lambda_k, s, ascending: each lies between the relaxation time of its arm and the next.
+    stretch : array, shape (arms, arms)
+        tau_m / (tau_m - lambda_k).
+    amplitude : array, shape (arms, arms)
+        Rows that give c_k = amplitude[k] @ (u - a) for a state of zero stress.
+    """
+
+    times: FloatArray
+    stretch: FloatArray
+    amplitude: FloatArray
+
+
+def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
+    """Return the modes of free recovery of arms beside a unit spring.
+
+    Parameters
+    ----------
+    moduli : array, shape (arms,)
+        G_m / G_inf, positive.
+    times : array, shape (arms,)
+        tau_m, ascending and distinct, in any unit of time.
+
+    Notes
+    -----
+    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its
+    distance from
+    the nearer pole, so that differences keep their relative precision over any number of decades; the modes are
+    orthogonal under the weights G_m / tau_m, which makes the inverse of `stretch` explicit.
+    """
+    zeros, distance = _zeros_between(moduli, times)
+    stretch = times[:, None] / distance
+    norm = np.sum((moduli * times)[:, None] / distance**2, axis=0)
+    amplitude = (moduli[:, None] / distance / norm).T.copy()
+    return Recovery(zeros, stretch, amplitude)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
+    """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
+    total, rate = 1.0, 0.0
+    for m in range(times.size):
+        inverse = 1 / ((times[m] - times[k]) - offset)
+        total += weight[m] * inverse
+        rate += weight[m] * inverse * inverse
+    return total, rate
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _zeros_between(moduli: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return lambda_k, and tau_m - lambda_k with full relative precision, shape (arms, arms)."""
+    arms = times.size
+    zeros, distance, weight = np.empty(arms), np.empty((arms, arms)), moduli * times
+    for k in range(arms):
+        last = k == arms - 1
+        gap = 2 * times[k] * moduli.sum() if last else times[k + 1] - times[k]
+        left = last or _imbalance(k, gap / 2, weight, times)[0] >= 0
+        pole, sign = (k, 1.0) if left else (k + 1, -1.0)
+        offset = sign * _distance_to_zero(pole, sign, gap, weight, times)
+        zeros[k] = times[pole] + offset
+        for m in range(arms):
+            distance[m, k] = (times[m] - times[pole]) - offset
+    return zeros, distance
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
+    """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
+    high = np.log(gap)
+    low = high - 80.0
+    place = 0.5 * (low + high)
+    for _ in range(80):
+        offset = np.exp(place)
+        total, rate = _imbalance(pole, sign * offset, weight, times)
+        if sign * total > 0:
+            high = place
+        else:
+            low = place
+        following = place - sign * total / (rate * offset)
+        if not low < following < high or high - low > 1.0:
+            following = 0.5 * (low + high)
+        if abs(following - place) <= 1e-15:
+            break
+        place = following
+    return float(np.exp(place))

@@ -1,0 +1,250 @@
+"""Profiles that an elastomer slides over, and how they are cut into the cells of a sweep."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces import shapes as indenter
+
+BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
+NONE = 2.0  # a position in a cell that is not there
+STEEPEST_RISE = 4 / 27  # of a cubic over its ends, of the slopes there
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A profile at equidistant nodes, n cells, unit of length free.
+
+    Parameters
+    ----------
+    height : array, shape (n,) if periodic, else (n + 1,)
+        Heights at the nodes, into the elastomer.
+    enter, leave : array, shape (n,)
+        Rise over one cell at the slope of its start and of its end.
+    periodic : bool
+        Whether the last cell ends at the first node.
+    smooth : bool
+        Whether the slopes of a periodic line are continuous, so that the integral of their square is summed by Euler
+        and Maclaurin: exact over the whole line if that is resolved.
+    """
+
+    height: FloatArray
+    enter: FloatArray
+    leave: FloatArray
+    periodic: bool
+    smooth: bool
+
+
+def periodic_line(height: FloatArray, slope: FloatArray | None) -> Profile:
+    """Return a periodic line of cubic cells, or of straight ones where there are no slopes.
+
+    Parameters
+    ----------
+    height : array, shape (n,)
+    slope : array, shape (n,), or None
+        Derivative of the height by position over the length of the line.
+    """
+    if slope is None:
+        rise = np.roll(height, -1) - height
+        return Profile(height, rise, rise, True, False)
+    rise = slope / height.size
+    return Profile(height, rise, np.roll(rise, -1), True, True)
+
+
+def indented_line(height: FloatArray, slope: FloatArray | None, coefficient: float, exponent: float) -> Profile:
+    """Return a rough indenter h(x) - c |x|^n of cubic cells, or of straight ones where there are no slopes.
+
+    Parameters
+    ----------
+    height : array, shape (n + 1,)
+        The roughness h at the nodes, both ends included.
+    slope : array, shape (n + 1,), or None
+        Derivative of the roughness by position over the length of the line.
+    coefficient, exponent : float
+        c and n >= 1; x is measured from node n // 2 in units of the length of the line.
+    """
+    n = height.size - 1
+    smooth, left, right = indenter.shape((np.arange(n + 1) - n // 2) / n, coefficient, exponent)
+    height = height + smooth
+    if slope is None:
+        rise = np.diff(height)
+        return Profile(height, rise, rise, False, False)
+    return Profile(height, (slope + right)[:-1] / n, (slope + left)[1:] / n, False, False)
+
+
+class Cells(NamedTuple):
+    """A profile cut into n cubic cells, with one more at the end that repeats the first.
+
+    Parameters
+    ----------
+    height : array, shape (n + 2,)
+        Heights at the nodes, below the highest point of the profile: never positive.
+    enter, leave : array, shape (n + 1,)
+        Slopes at the start and the end of each cell; they differ across a node where the profile has a kink.
+    peak : array, shape (n + 1,)
+        Highest point of each cell.
+    mean, stretch : array, shape (n + 1,)
+        Integrals of the height and of the slope squared over each cell.
+    block_peak, block_mean, block_stretch : array, shape (n // BLOCK,)
+        Their maximum and sums over `BLOCK` cells.
+    start : float
+        Where in cell 0 (and cell n) a turn of a periodic profile begins and ends: its highest point.
+    periodic : bool
+        Whether the profile closes on itself; if not, elements enter undeformed at cell 0.
+    """
+
+    height: FloatArray
+    enter: FloatArray
+    leave: FloatArray
+    peak: FloatArray
+    mean: FloatArray
+    stretch: FloatArray
+    block_peak: FloatArray
+    block_mean: FloatArray
+    block_stretch: FloatArray
+    start: float
+    periodic: bool
+
+
+@njit(nogil=True, cache=True, inline="always")
+def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
+    """Return the coefficients of the height in cell i, by rising power."""
+    first, last = enter[i], leave[i]
+    rise = height[i + 1] - height[i]
+    return height[i], first, 3 * rise - 2 * first - last, first + last - 2 * rise
+
+
+@njit(nogil=True, cache=True)
+def summit(a: float, b: float, c: float) -> float:
+    """Return where between 0 and 1 a cubic has its maximum, or `NONE`."""
+    discriminant = b * b - 3 * a * c
+    if not discriminant > 0:
+        return NONE
+    root = math.sqrt(discriminant)
+    place = a / (root - b) if b < 0 else -(b + root) / (3 * c) if c < 0 else NONE
+    return place if 0 < place < 1 else NONE
+
+
+@njit(nogil=True, cache=True)
+def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
+    """Return the highest point of every cell, and the cell and place of the highest of all."""
+    peaks = np.empty(enter.size)
+    best, place = 0, 0.0
+    for i in range(enter.size):
+        rise = height[i + 1] - height[i]
+        b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
+        x = 0.0 if height[i] >= height[i + 1] else 1.0
+        peaks[i] = max(height[i], height[i + 1])
+        inside = summit(enter[i], b, c)
+        top = height[i] + inside * (enter[i] + inside * (b + inside * c))
+        if inside < 1 and top > peaks[i]:
+            x, peaks[i] = inside, top
+        if i == 0 or peaks[i] > peaks[best]:
+            best, place = i, x
+    return peaks, best, place
+
+
+def cut(profile: Profile) -> tuple[Cells, float]:
+    """Cut a profile into the cells of a sweep, and return the height of its highest point beside them."""
+    enter, leave, n = profile.enter, profile.leave, profile.enter.size
+    nodes = np.append(profile.height, profile.height[0]) if profile.periodic else profile.height
+    peaks, best, place = _peaks(nodes, enter, leave)
+    top = float(peaks[best])
+    mean, stretch = _integrals(nodes, enter, leave, top)
+    if profile.smooth:
+        stretch = _resummed(stretch, enter, best)
+    first = best if profile.periodic else 0
+    height, enter, leave, peaks, mean, stretch = (
+        _closed(array, first) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
+    )
+    after = height[:2] if profile.periodic else np.full(2, nodes[-1] - top)
+    blocks = n // BLOCK
+    whole = blocks * BLOCK
+    return Cells(
+        np.append(height[:n], after),
+        enter,
+        leave,
+        peaks,
+        mean,
+        stretch,
+        peaks[:whole].reshape(blocks, BLOCK).max(axis=1),
+        mean[:whole].reshape(blocks, BLOCK).sum(axis=1),
+        stretch[:whole].reshape(blocks, BLOCK).sum(axis=1),
+        place if profile.periodic else 0.0,
+        profile.periodic,
+    ), top
+
+
+@njit(nogil=True, cache=True)
+def _closed(array: FloatArray, first: int) -> FloatArray:
+    """Return an array turned to begin at a place, with that place once more at the end."""
+    n = array.size
+    turned = np.empty(n + 1)
+    turned[: n - first] = array[first:]
+    turned[n - first : n] = array[:first]
+    turned[n] = turned[0]
+    return turned
+
+
+@njit(nogil=True, cache=True)
+def _integrals(nodes: FloatArray, enter: FloatArray, leave: FloatArray, top: float) -> tuple[FloatArray, FloatArray]:
+    """Return the integrals over every cell of the height, from the top, and of the slope squared."""
+    mean, stretch = np.empty(enter.size), np.empty(enter.size)
+    for i in range(enter.size):
+        rise, e, f = nodes[i + 1] - nodes[i], enter[i], leave[i]
+        mean[i] = 0.5 * (nodes[i + 1] + nodes[i]) + (e - f) / 12 - top
+        stretch[i] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
+    return mean, stretch
+
+
+@njit(nogil=True, cache=True)
+def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
+    """Return the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
+
+    The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
+    """
+    n = slope.size
+    square = slope * slope
+    correction = np.empty(n)
+    for i in range(n):
+        correction[i] = (square[(i + 1) % n] - square[i - 1]) / 24
+    summed = np.empty(n)
+    for i in range(n):
+        after = (i + 1) % n
+        summed[i] = 0.5 * (square[i] + square[after]) + correction[i] - correction[after]
+    summed += (summed[first] - stretch[first]) / max(n - 1, 1)
+    summed[first] = stretch[first]
+    return summed
+
+
+@njit(nogil=True, cache=True)
+def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
+    """Return the cell of the highest point of a periodic line of cubic cells, the place in it, 0..1, and the height.
+
+    Parameters
+    ----------
+    height, slope : array, shape (n,)
+        Heights and derivatives by position over the length of the line.
+    """
+    n = height.size
+    best, best_place, highest = 0, 0.0, -np.inf
+    for i in range(n):
+        following = i + 1 if i + 1 < n else 0
+        after, enter, leave = height[following], slope[i] / n, slope[following] / n
+        place = 0.0
+        if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
+            b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
+            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            b, c = b * place * place, c * place**3
+        else:
+            b, c = 0.0, 0.0
+        peak = height[i] + place * enter + b + c
+        if peak > highest:
+            best, best_place, highest = i, place, peak
+    return best, best_place, highest

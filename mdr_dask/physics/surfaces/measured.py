@@ -1,0 +1,168 @@
+"""Measured lines: from positions and heights as recorded to a periodic line on a regular grid, and its statistics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+
+Detrend = Literal["none", "mean", "line", "parabola"]
+
+ORDERS: dict[str, int] = {"mean": 0, "line": 1, "parabola": 2}
+UNEVEN = 1e-3
+"""Spacings that differ by less than this part count as uniform: instruments print positions with few digits."""
+
+LEAST_POINTS = 8
+
+
+@dataclass(frozen=True)
+class MeasuredLine:
+    """A periodic line at equidistant points.
+
+    Parameters
+    ----------
+    height : array, shape (points,)
+        Heights, m, positive into the elastomer where the body is high.
+    length : float
+        Period L = points * spacing, m.
+    """
+
+    height: FloatArray
+    length: float
+
+    @property
+    def spacing(self) -> float:
+        """Distance of points, m."""
+        return self.length / self.height.size
+
+
+def measured_line(
+    position: ArrayLike,
+    height: ArrayLike,
+    detrend: Detrend = "mean",
+    taper: float = 0.0,
+    shortest: float = 0.0,
+    longest: float = 0.0,
+) -> MeasuredLine:
+    """Turn a recorded line into one period of a regular one.
+
+    Parameters
+    ----------
+    position, height : array_like, shape (points,)
+        x and z, m; x ascending or descending, not necessarily uniform. The samples are one period: L = points *
+        spacing.
+    detrend : {"none", "mean", "line", "parabola"}
+        Polynomial subtracted, fitted by least squares.
+    taper : float
+        Part of the line, at both ends together, over which the heights are brought to their mean by a cosine, so
+        that the
+        line closes without a step; 0 to 1.
+    shortest, longest : float
+        Wavelengths, m, outside of which the spectrum is cut off; 0 keeps that end.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than eight points, a number is not finite, or positions are not monotonic.
+    """
+    x, z = _ordered(position, height)
+    steps = np.diff(x)
+    length = float(x[-1] - x[0]) * x.size / (x.size - 1)
+    if np.ptp(steps) > UNEVEN * steps.mean():
+        z = np.interp(np.linspace(x[0], x[-1], x.size), x, z)
+    z = detrended(z, detrend)
+    if taper > 0:
+        z = z.mean() + (z - z.mean()) * _window(z.size, taper)
+    if shortest > 0 or longest > 0:
+        z = band_limited(z, length, shortest, longest)
+    return MeasuredLine(z, length)
+
+
+def _ordered(position: ArrayLike, height: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    x, z = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (position, height))
+    if x.size != z.size or x.size < LEAST_POINTS:
+        raise DataError(f"a measured line needs {LEAST_POINTS} or more pairs x, z, got {x.size} and {z.size}")
+    if not np.all(np.isfinite(x) & np.isfinite(z)):
+        raise DataError("a measured line must be finite: fill the points that the instrument left out")
+    if x[0] > x[-1]:
+        x, z = x[::-1], z[::-1]
+    if np.any(np.diff(x) <= 0):
+        raise DataError("the positions of a measured line must ascend or descend: sort and merge equal ones")
+    return x, z
+
+
+def _window(points: int, taper: float) -> FloatArray:
+    edge = min(taper, 1.0) / 2
+    place = (np.arange(points) + 0.5) / points
+    inner = np.clip(np.minimum(place, 1 - place) / edge, 0, 1)
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * inner), dtype=np.float64)
+
+
+def detrended(height: FloatArray, order: Detrend) -> FloatArray:
+    """Return heights without their best polynomial of order 0 to 2, as `measured_line` names them."""
+    if order == "none":
+        return height.copy()
+    place = np.linspace(-1, 1, height.size)
+    trend = np.polynomial.Polynomial.fit(place, height, ORDERS[order])
+    return np.asarray(height - trend(place), dtype=np.float64)
+
+
+def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longest: float = 0.0) -> FloatArray:
+    """Return a periodic line without waves shorter or longer than two wavelengths; 0 keeps that end, the mean stays."""
+    waves = np.fft.rfft(height)
+    number = np.arange(waves.size)
+    if shortest > 0:
+        waves[number > length / shortest * (1 + 1e-12)] = 0
+    if longest > 0:
+        waves[(number > 0) & (number < length / longest * (1 - 1e-12))] = 0
+    return np.asarray(np.fft.irfft(waves, height.size), dtype=np.float64)
+
+
+def resampled(height: FloatArray, points: int) -> FloatArray:
+    """Return a periodic line at another number of points by its Fourier series, from the same first point.
+
+    Waves beyond the Nyquist wavelength of fewer points are left out.
+    """
+    waves = np.fft.rfft(height)
+    kept = min(waves.size, points // 2 + 1)
+    new = np.zeros(points // 2 + 1, dtype=np.complex128)
+    new[:kept] = waves[:kept]
+    if height.size % 2 == 0 and points > height.size:
+        new[height.size // 2] *= 0.5
+    return np.asarray(np.fft.irfft(new, points) * (points / height.size), dtype=np.float64)
+
+
+def spectral_derivative(height: FloatArray, length: float) -> FloatArray:
+    """Return the slope dz/dx of a periodic line at its points, exact for its Fourier series."""
+    waves = np.fft.rfft(height)
+    q = 2j * np.pi * np.arange(waves.size) / length
+    if height.size % 2 == 0:
+        q[-1] = 0
+    return np.asarray(np.fft.irfft(q * waves, height.size), dtype=np.float64)
+
+
+def rms_height(height: FloatArray) -> float:
+    """Return the rms height about the mean, m."""
+    return float(np.std(height))
+
+
+def rms_slope(height: FloatArray, length: float) -> float:
+    """Return the spectral rms slope of a periodic line."""
+    return float(np.sqrt(np.mean(spectral_derivative(height, length) ** 2)))
+
+
+def power_spectrum(height: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+    """Return wavenumbers q, rad/m, and the one-dimensional spectral density C(q), m^3, of a periodic line.
+
+    C(q) = L |h_q|^2 for q > 0 with h_q the complex Fourier amplitude, so that rms^2 = sum over positive and negative
+    q of
+    C / L. The mean is left out.
+    """
+    waves = np.fft.rfft(height) / height.size
+    q = np.asarray(2 * np.pi * np.arange(1, waves.size) / length, dtype=np.float64)
+    return q, np.asarray(length * np.abs(waves[1:]) ** 2, dtype=np.float64)

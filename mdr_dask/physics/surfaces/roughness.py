@@ -1,0 +1,148 @@
+"""Self-affine rough lines: spectra with an exact rms height, phases from a counter-based stream, lines by FFT."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import fft
+
+from mdr_dask.arrays import FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+# Taylor coefficients by falling power of x^2, below rounding for |x| <= pi / 4
+SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in reversed(range(8)))
+COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in reversed(range(9)))
+
+
+def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 0.0) -> FloatArray:
+    """Return the amplitudes of a self-affine line of unit rms height.
+
+    Parameters
+    ----------
+    modes : int
+        Number M of harmonics: the cut-off wavelength is length / M.
+    hurst : float
+        Hurst exponent H, 0..1: A_k ~ k^(-H - 1/2), that is C_1D ~ q^(-2H - 1).
+    rolloff : float
+        Harmonic number length / wavelength below which the spectrum is constant; 0 for none.
+    longest : float
+        Harmonic number length / wavelength below which there is no roughness; 0 for none.
+
+    Returns
+    -------
+    array, shape (modes,)
+        A_k for k = 1..M with sum A_k^2 / 2 = 1 (thesis 2.3).
+
+    Raises
+    ------
+    ValueError
+        If no harmonic is left between the long and the short cut-off.
+    """
+    k = np.arange(1, modes + 1, dtype=np.float64)
+    amplitude = np.maximum(k, rolloff) ** (-hurst - 0.5)
+    amplitude[k < longest * (1 - 1e-12)] = 0.0
+    power = np.sum(amplitude**2) / 2
+    if not power > 0:
+        raise ValueError(f"expected the longest wavelength above the cut-off wavelength, got no harmonic of {modes}")
+    unit: FloatArray = amplitude / np.sqrt(power)
+    return unit
+
+
+def spectral_slope(amplitude: FloatArray) -> float:
+    """Return the rms slope of a line of unit length, sqrt(sum (A_k q_k)^2 / 2) with q_k = 2 pi k.
+
+    Parameters
+    ----------
+    amplitude : array, shape (modes,)
+        Amplitudes of the harmonics, in any unit of height.
+    """
+    q = 2 * np.pi * np.arange(1, amplitude.size + 1)
+    return float(np.sqrt(np.sum((amplitude * q) ** 2) / 2))
+
+
+def phases(seed: int, realisation: int, modes: int) -> FloatArray:
+    """Return the phases of a realisation in [0, 2 pi), shape (modes,).
+
+    They depend on the seed and the index of the realisation only; a longer spectrum begins with the same phases, so
+    that lines of any Hurst exponent, rms height or cut-off are common random numbers (thesis Fig. 2.6).
+    """
+    phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)
+    return phase
+
+
+def _generator(seed: int, realisation: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
+
+
+def turns(seed: int, realisation: int, modes: int) -> ComplexArray:
+    """Return exp(i phi_k) of the phases of a realisation, shape (modes,), kept for the next line of it."""
+    # rounded up, so that lines of many cut-offs share them
+    return _turns(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
+
+
+@lru_cache(maxsize=4)
+def _turns(seed: int, realisation: int, modes: int) -> ComplexArray:
+    turned = np.empty((modes, 2))
+    _turn(_generator(seed, realisation).random(modes), turned)
+    turned.flags.writeable = False
+    pairs: ComplexArray = turned.view(np.complex128)[:, 0]
+    return pairs
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _turn(share: FloatArray, turned: FloatArray) -> None:
+    """Write cosine and sine of shares 0..1 of a turn, to rounding: series about the nearest quarter, vectorised."""
+    for k in range(share.size):
+        quarter = np.floor(4 * share[k] + 0.5)
+        x = 2 * np.pi * (share[k] - 0.25 * quarter)
+        y = x * x
+        sine, cosine = 0.0, 0.0
+        for term in SINE:
+            sine = sine * y + term
+        for term in COSINE:
+            cosine = cosine * y + term
+        sine *= x
+        swapped = quarter == 1 or quarter == 3
+        one, other = (sine, cosine) if swapped else (cosine, sine)
+        turned[k, 0] = -one if quarter == 1 or quarter == 2 else one
+        turned[k, 1] = -other if quarter == 2 or quarter == 3 else other
+
+
+def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
+    """Return h(x) = sum A_k cos(2 pi k x + phi_k) or a derivative of it at x = 0, 1/nodes, ..., by FFT.
+
+    Parameters
+    ----------
+    amplitude, phase : array, shape (modes,)
+        The harmonics k = 1..modes.
+    nodes : int
+        Number of nodes, at least twice the number of modes.
+    derivative : int
+        Order of the derivative with respect to x, where the line has unit length; exact at the nodes.
+
+    Raises
+    ------
+    ValueError
+        If the grid does not resolve the shortest wavelength.
+    """
+    return turned_line(amplitude, np.exp(1j * phase), nodes, derivative)
+
+
+def turned_line(amplitude: FloatArray, turned: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
+    """Return the line of :func:`line` from exp(i phi_k), as :func:`turns` gives them."""
+    modes = int(amplitude.size)
+    if nodes < 2 * modes:
+        raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
+    spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
+    np.multiply(0.5 * amplitude, turned, out=spectrum[1 : modes + 1])
+    if derivative:
+        spectrum[1 : modes + 1] *= (2j * np.pi * np.arange(1, modes + 1)) ** derivative
+    if nodes == 2 * modes:
+        spectrum[-1] = 2 * spectrum[-1].real
+    heights: FloatArray = fft.irfft(spectrum, nodes, norm="forward", overwrite_x=True)
+    return heights

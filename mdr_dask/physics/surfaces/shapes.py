@@ -1,0 +1,114 @@
+"""Indenters of power-law shape: the MDR rule, and smooth ones sliding over a Kelvin foundation in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import FloatArray
+
+ITERATIONS = 200
+
+# What `smooth` writes for every case, in this order
+DEPTH, DRAG, LEADING, TRAILING, STRETCH = range(5)
+COLUMNS = 5
+
+
+def mapped(exponent: float) -> float:
+    """Return kappa_n of the MDR rule: a body c r^n acts like the line kappa_n c |x|^n (cone: pi/2, parabola: 2).
+
+    Parameters
+    ----------
+    exponent : float
+        n > 0.
+    """
+    return 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
+
+
+def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:
+    """Return the static half-width a of the contact of a smooth line c |x|^n.
+
+    Parameters
+    ----------
+    load : array
+        F_N / (4 G), so that ``load = 2 n c a^(n+1) / (n + 1)`` (thesis 3.3.2).
+    coefficient, exponent : float
+        c_n > 0 and n of the line, already mapped.
+    """
+    width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
+    return width
+
+
+def shape(x: FloatArray, coefficient: float, exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
+    distance = np.abs(x)
+    steepness = coefficient * exponent * distance ** (exponent - 1)
+    left = np.where(x > 0, -steepness, steepness)
+    right = np.where(x < 0, steepness, -steepness)
+    return -coefficient * distance**exponent, left, right
+
+
+@njit(nogil=True, cache=True)
+def _trailing(drop: float, reach: float, exponent: float) -> float:
+    """Return b >= 0 with b^n + n reach b^(n-1) = drop, or 0 where there is none (n = 1)."""
+    if exponent == 1:
+        return max(drop - reach, 0.0)
+    # in y = log b the logarithm of the left side is convex and rising: Newton from the right
+    y = math.log(drop) / exponent
+    for _ in range(ITERATIONS):
+        b = math.exp(y)
+        step = ((exponent - 1) * y + math.log(b + exponent * reach) - math.log(drop)) / (
+            exponent - 1 + b / (b + exponent * reach)
+        )
+        y -= step
+        if abs(step) < 1e-15 * max(1.0, abs(y)):
+            break
+    return math.exp(y)
+
+
+@njit(nogil=True, cache=True)
+def _carried(depth: float, reach: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
+    """Return F_N / (4 G) at a depth, and the leading and trailing edges."""
+    drop = depth / coefficient
+    a = drop ** (1 / exponent)
+    b = _trailing(drop, reach, exponent)
+    load = depth * (a + b) - coefficient * (a ** (exponent + 1) + b ** (exponent + 1)) / (exponent + 1)
+    return load + reach * (depth - coefficient * b**exponent), a, b
+
+
+@njit(nogil=True, cache=True)
+def smooth(
+    loads: FloatArray, reaches: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
+) -> None:
+    """Slide smooth lines c |x|^n towards -x at prescribed loads.
+
+    The contact lies between -a with c a^n = d and b with d = c (b^n + n v tau b^(n-1)), or the apex; the load is
+    convex in d, with slope a + b + v tau, so that Newton from the static depth comes down to the root.
+
+    Parameters
+    ----------
+    loads, reaches : array, shape (cases,)
+        F_N / (4 G) and v tau, positive and finite.
+    coefficients, exponents : array, shape (cases,)
+        c_n > 0 and n >= 1 of the lines, already mapped.
+    results : array, shape (cases, COLUMNS)
+        Written: the depth, F_x / (4 G), a, b, and the integral of the slope squared over the contact; NaN where no
+        depth is found.
+    """
+    results[:] = np.nan
+    for k in range(loads.size):
+        load, reach, c, n = loads[k], reaches[k], coefficients[k], exponents[k]
+        depth = c * ((n + 1) * load / (2 * n * c)) ** (n / (n + 1))
+        for _ in range(ITERATIONS):
+            carried, a, b = _carried(depth, reach, c, n)
+            step = (load - carried) / (a + b + reach)
+            depth = max(depth + step, 0.25 * depth)
+            if abs(step) <= 1e-14 * depth:
+                carried, a, b = _carried(depth, reach, c, n)
+                stretch = (c * n) ** 2 * (a ** (2 * n - 1) + b ** (2 * n - 1)) / (2 * n - 1)
+                results[k, DEPTH] = depth
+                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + reach * stretch
+                results[k, LEADING], results[k, TRAILING], results[k, STRETCH] = a, b, stretch
+                break

@@ -1,0 +1,281 @@
+"""Breakthrough of a boundary layer: exact cases, brute force, statistics of Gaussian lines, the thesis's rig."""
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from mdr_dask.physics.lubrication import breakthrough as bt
+from mdr_dask.physics.lubrication import film_formulas as film
+from mdr_dask.physics.lubrication import oil
+
+E_STAR = float(film.reduced_modulus(210e9, 0.3, 210e9, 0.3))
+STRENGTH = float(bt.layer_strength(1e6, E_STAR, 5e-9))
+PERIMETER = 2 * np.pi * 0.05
+
+
+def rough_line(points, lowest, highest, hurst, seed, rms=1.0):
+    """A Gaussian-phase line with harmonics lowest..highest, independent of the package's generator."""
+    generator = np.random.default_rng(seed)
+    k = np.arange(lowest, highest + 1)
+    amplitude = k ** (-hurst - 0.5)
+    amplitude = amplitude * rms / np.sqrt(np.sum(amplitude**2) / 2)
+    spectrum = np.zeros(points // 2 + 1, complex)
+    spectrum[lowest : highest + 1] = amplitude * np.exp(2j * np.pi * generator.random(k.size)) * points / 2
+    return np.fft.irfft(spectrum, points), amplitude, k
+
+
+def clusters_of(line, level, spacing=1.0, strength=1e-3):
+    return bt.find_clusters(bt.excursions(line, level), level, spacing, strength)
+
+
+def test_clusters_of_a_line_written_by_hand():
+    line = np.array([2.0, 0.0, 1.5, 3.0, 0.0, 0.0, 1.25, 1.0])
+    found = clusters_of(line, 1.0)
+    # points 2-3, 6, and 0; point 7 does not exceed the level
+    assert found.start.tolist() == [0, 2, 6]
+    assert found.length.tolist() == [1, 2, 1]
+    assert found.total.tolist() == [1.0, 2.5, 0.25]
+
+
+def test_a_cluster_across_the_seam_is_one():
+    found = clusters_of(np.array([2.0, 0.0, 0.0, 0.0, 1.5, 3.0]), 1.0)
+    assert (found.start.tolist(), found.length.tolist(), found.total.tolist()) == ([4], [3], [3.5])
+
+
+def test_a_line_wholly_in_contact_is_one_cluster():
+    found = clusters_of(np.full(8, 2.0), 1.0, strength=1e-9)
+    assert found.length.tolist() == [8]
+    for rule in ("part", "clip"):
+        assert bt.contact_points(found, 3, rule).tolist() == [3] * 8
+
+
+def test_no_contact_gives_an_empty_trace():
+    assert not bt.contact_points(clusters_of(np.zeros(8), 1.0), 3).any()
+
+
+def test_a_parabolic_asperity_breaks_if_its_curvature_exceeds_twelve_strengths():
+    """pi tau0/(E* h_c) is the critical curvature whatever the indentation; a grid of 200 points knows it to 1e-3."""
+    spacing = 1e-8
+    x = spacing * (np.arange(2001) - 1000)
+    for width_points in (201, 801):
+        for factor, broken in ((0.995, False), (1.005, True)):
+            curvature = 12 * STRENGTH * factor
+            depth = curvature / 2 * (width_points / 2 * spacing) ** 2
+            found = clusters_of(depth - curvature * x**2 / 2, 0.0, spacing, STRENGTH)
+            assert found.length.tolist() == [width_points]
+            assert found.broken.tolist() == [broken]
+
+
+def test_only_the_ratio_of_strength_stiffness_and_thickness_matters():
+    assert bt.layer_strength(1e6, E_STAR, 5e-9) == pytest.approx(bt.layer_strength(3e6, E_STAR / 2, 30e-9), rel=1e-14)
+
+
+@pytest.mark.parametrize("factor", [2.0**-20, 2.0**10])
+def test_results_do_not_depend_on_the_unit_of_length(factor):
+    """Scaling all lengths by a power of two changes no bit of the trace."""
+    line, _, _ = rough_line(4096, 8, 400, 0.7, 1, rms=1e-6)
+    trace = bt.contact_points(clusters_of(line, 1e-6, 1e-6, 1e4), 50)
+    scaled = bt.contact_points(clusters_of(line * factor, 1e-6 * factor, 1e-6 * factor, 1e4 / factor), 50)
+    assert trace.any()
+    np.testing.assert_array_equal(trace, scaled)
+
+
+@pytest.mark.parametrize("rule", bt.EDGE_RULES)
+def test_sliding_equals_judging_every_window(rule):
+    """More than a thousand random windows a rule: random lines, films, windows, shorter and longer than clusters."""
+    generator = np.random.default_rng(5)
+    contacts = 0
+    for seed in range(8):
+        points = int(generator.integers(200, 400))
+        line, _, _ = rough_line(points, 1, points // 4, 0.5, seed)
+        level, window = generator.uniform(-0.5, 1.5), int(generator.integers(1, points // 3))
+        strength = 10 ** generator.uniform(-3, -1)
+        fast = bt.contact_points(clusters_of(line, level, 1.0, strength), window, rule)
+        every = np.arange(points)
+        slow = bt.judge_windows(line, np.zeros(points), level, 1.0, strength, window, (every, every), rule)
+        np.testing.assert_array_equal(fast, slow.contact_points)
+        contacts += int((fast > 0).sum())
+    assert contacts > 300
+
+
+def test_mean_overlap_equals_the_mean_of_all_windows():
+    line, _, _ = rough_line(500, 1, 100, 0.5, 3)
+    found = clusters_of(line, 0.4)
+    every = np.arange(500)
+    slow = bt.judge_windows(line, np.zeros(500), 0.4, 1.0, 1e-3, 37, (every, every))
+    # two orders of summation of 500 terms
+    assert bt.mean_overlap(found, 37) == pytest.approx(slow.overlap.mean(), rel=1e-12)
+
+
+def test_clipped_contact_length_is_the_share_of_broken_points():
+    line, _, _ = rough_line(5000, 5, 1000, 0.7, 4)
+    found = clusters_of(line, 0.8)
+    trace = bt.contact_points(found, 123, "clip")
+    assert trace.mean() == pytest.approx(found.length[found.broken].sum() * 123 / 5000, rel=1e-12)
+
+
+def test_geometric_length_of_a_gaussian_line():
+    """With a layer of no strength every overlap counts: E[L] = 2 a Q(Lambda)."""
+    window, values = 500, []
+    for seed in range(24):
+        line, _, _ = rough_line(100_000, 40, 5000, 0.7, seed)
+        values.append(bt.contact_points(clusters_of(line, 1.5, 1.0, 0.0), window, "clip").mean() / window)
+    mean, error = np.mean(values), np.std(values, ddof=1) / np.sqrt(24)
+    assert error < 0.02 * mean
+    assert abs(mean - ndtr(-1.5)) < 4 * error
+
+
+def test_number_of_clusters_by_rice():
+    """Upcrossings per turn: (1/2 pi) sqrt(m2/m0) exp(-h^2/2 m0) L; 20 points a wave miss less than one in a hundred."""
+    points, counts = 100_000, []
+    for seed in range(24):
+        line, amplitude, k = rough_line(points, 40, 5000, 0.7, seed)
+        counts.append(clusters_of(line, 1.5).start.size)
+    second = np.sum((amplitude * 2 * np.pi * k) ** 2) / 2
+    expected = np.sqrt(second) / (2 * np.pi) * np.exp(-(1.5**2) / 2)
+    error = np.std(counts, ddof=1) / np.sqrt(24)
+    assert abs(np.mean(counts) - expected) < 4 * error + 0.01 * expected
+
+
+def test_every_second_point_makes_the_coarser_line():
+    line, _, _ = rough_line(1000, 3, 100, 0.7, 8)
+    fine = bt.excursions(line, 0.5).every_second()
+    coarse = bt.excursions(line[::2], 0.5)
+    np.testing.assert_array_equal(fine.place, coarse.place)
+    np.testing.assert_array_equal(fine.height, coarse.height)
+    assert fine.points == coarse.points == 500
+
+
+def test_window_wider_than_the_line_is_refused():
+    assert bt.window_points(0.25, 0.1, 100) == 5
+    with pytest.raises(ValueError, match=r"wider than the line: expected 2a of at most 1 m, got 2 m"):
+        bt.window_points(1.0, 0.1, 10)
+
+
+def test_resistance_is_inverse_to_the_length_and_infinite_without_contact():
+    assert bt.contact_resistance(2e-7, [1e-6, 0.0]).tolist() == [0.2, np.inf]
+
+
+def rig_case(force, rpm, celsius):
+    """Film thickness and half width of the thesis's rig."""
+    data, temperature = oil.OILS["mobilgear_shc_xmp_320"], celsius + 273.15
+    velocity = 2 * np.pi * rpm / 60 * 0.05
+    groups = film.dimensionless_groups(
+        force / 0.01, data.dynamic(temperature), velocity, data.alpha(temperature), E_STAR, 0.025
+    )
+    half_width = float(film.hertz_line(force / 0.01, E_STAR, 0.025).half_width)
+    return float(film.PAN_HAMROCK_CENTRAL(*groups)) * 0.025, half_width
+
+
+def rig_line(points, seed, cut=100_000):
+    """Two rollers of 0.2 um rms in one line; the longest wavelength is 2a at 1600 N."""
+    _, longest = rig_case(1600, 100, 60)
+    lowest = int(np.ceil(PERIMETER / (2 * longest)))
+    return rough_line(points, lowest, cut, 0.7, seed, rms=0.2e-6 * np.sqrt(2))[0]
+
+
+def rig_probability(line, case, spacing_factor=1, rule="part"):
+    h0, half_width = rig_case(*case)
+    spacing = PERIMETER / line.size
+    window = bt.window_points(half_width, spacing, line.size)
+    return float((bt.contact_points(clusters_of(line, h0, spacing, STRENGTH), window, rule) > 0).mean())
+
+
+CHECKED = {
+    (100, 100, 60): 2.87,
+    (200, 100, 60): 7.43,
+    (400, 100, 60): 17.0,
+    (800, 100, 60): 33.5,
+    (1600, 100, 60): 54.9,
+    (800, 100, 40): 0.30,
+    (800, 100, 50): 8.71,
+    (800, 100, 80): 71.7,
+}
+
+
+def test_probabilities_of_the_rig():
+    """The checked table has 16 realisations, this test 6: the difference of the two means has both errors."""
+    values = 100 * np.array(
+        [[rig_probability(line, case) for case in CHECKED] for line in map(rig_line, [10**6] * 6, range(6))]
+    )
+    spread = values.std(axis=0, ddof=1)
+    error = spread * np.sqrt(1 / 6 + 1 / 16)
+    assert np.all(np.abs(values.mean(axis=0) - list(CHECKED.values())) < 4 * error)
+    assert np.all(error < 1.0)
+
+
+def test_number_of_points_does_not_matter_at_a_fixed_cut_off():
+    """N = 1, 2 and 4 million: the same wave sampled more finely moves P by less than 0.25 points."""
+    fine = rig_line(4_000_000, 0)
+    values = [100 * rig_probability(fine[::step], (800, 100, 60)) for step in (4, 2, 1)]
+    assert np.ptp(values) < 0.25
+
+
+def test_trends_of_figure_5_9():
+    line = rig_line(10**6, 1)
+
+    def probabilities(cases):
+        return [rig_probability(line, case) for case in cases]
+
+    assert np.all(np.diff(probabilities([(800, 100, t) for t in (40, 50, 60, 70, 80)])) > 0)
+    assert np.all(np.diff(probabilities([(f, 100, 60) for f in (100, 200, 400, 800, 1600)])) > 0)
+    assert np.all(np.diff(probabilities([(800, n, 60) for n in (86, 100, 130, 160, 200)])) < 0)
+
+
+def test_edge_rules_differ_by_a_few_points_and_in_this_order():
+    line = rig_line(10**6, 2)
+    part, clip, inside = (100 * rig_probability(line, (800, 100, 80), rule=r) for r in ("part", "clip", "inside"))
+    assert inside < clip < part < inside + 6
+
+
+def test_creep_leaves_the_expected_probability():
+    """Windows a window's eighth apart over one turn; with creep every turn sees other pairings."""
+    points, level, window, strength = 40_000, 1.2, 120, 1e-3
+    values = {slip: [] for slip in (0.0, 0.05, 1.0)}
+    for seed in range(16):
+        line_1, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed, rms=np.sqrt(0.5))
+        line_2, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed + 1, rms=np.sqrt(0.5))
+        for slip, found in values.items():
+            positions = bt.creep_positions(np.arange(0, points, window // 8), points, slip)
+            found.append(
+                (bt.judge_windows(line_1, line_2, level, 1.0, strength, window, positions).contact_points > 0).mean()
+            )
+    means = {slip: np.mean(v) for slip, v in values.items()}
+    errors = {slip: np.std(v, ddof=1) / 4 for slip, v in values.items()}
+    assert 0.1 < means[0.0] < 0.9
+    for slip in (0.05, 1.0):
+        assert abs(means[slip] - means[0.0]) < 4 * np.hypot(errors[slip], errors[0.0])
+
+
+def test_sparse_windows_have_the_mean_of_all():
+    line, _, _ = rough_line(100_000, 100, 10_000, 0.7, 3)
+    found = clusters_of(line, 1.0, 1.0, 1e-3)
+    every = bt.contact_points(found, 200) > 0
+    positions = bt.creep_positions(np.arange(0, 100_000, 25), 100_000, 0.0)
+    sparse = bt.judge_windows(line, np.zeros(100_000), 1.0, 1.0, 1e-3, 200, positions).contact_points > 0
+    # the trace changes state a few times a window at most: a grid of eighths misses part of an eighth each time
+    assert sparse.mean() == pytest.approx(every.mean(), abs=0.01)
+
+
+def test_creep_moves_the_lines_apart_by_the_slide_roll_ratio():
+    first, second = bt.creep_positions(np.arange(0, 1000, 10), 1000, 0.2)
+    assert first.size == 100
+    assert (first[1] - first[0], second[1] - second[0]) == (11, 9)
+
+
+def test_interval_of_a_turn_covers_the_truth():
+    """Independent turns: about 95 % of the intervals hold the mean of all; 60 turns scatter by 3 points."""
+    truth, intervals = [], []
+    for seed in range(60):
+        line, _, _ = rough_line(40_000, 80, 4000, 0.7, seed)
+        trace = bt.contact_points(clusters_of(line, 1.2, 1.0, 1e-3), 120) > 0
+        truth.append(trace.mean())
+        intervals.append(bt.probability_interval(trace, 120))
+    held = sum(i.low <= np.mean(truth) <= i.high for i in intervals) / 60
+    assert held > 0.95 - 4 * 0.03
+
+
+def test_a_short_trace_has_a_mean_but_no_interval():
+    mean, *rest = bt.probability_interval(np.arange(100) < 25, 20)
+    assert mean == 0.25
+    assert np.isnan(rest).all()

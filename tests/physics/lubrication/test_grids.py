@@ -1,0 +1,55 @@
+"""Graded grids: spacing inverse to the density, both ends kept, nesting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics.lubrication.grids import (
+    adapted_density,
+    first_grid,
+    inlet_position,
+    outlet_position,
+    sample,
+    second_derivative,
+)
+
+
+def test_uniform_density_gives_a_uniform_grid() -> None:
+    nodes = sample(np.array([-2.0, 0.5, 3.0]), np.full(3, 7.0), 11)
+    np.testing.assert_allclose(nodes, np.linspace(-2, 3, 11), atol=1e-14)
+
+
+def test_spacing_is_inverse_to_a_linear_density() -> None:
+    nodes = sample(np.array([0.0, 1.0]), np.array([1.0, 3.0]), 5)
+    counts = nodes + nodes**2  # integral of 1 + 2 x
+    np.testing.assert_allclose(np.diff(counts), 0.5, rtol=1e-13)
+
+
+def test_halved_grids_nest() -> None:
+    positions = np.linspace(-3, 2, 40)
+    density = 1 + np.exp(-(positions**2) * 8)
+    np.testing.assert_allclose(sample(positions, density, 81)[::2], sample(positions, density, 41), atol=1e-13)
+
+
+@pytest.mark.parametrize("central", [1e-6, 1e-3, 0.3, 2.0, 500.0])
+def test_first_grid_spans_inlet_to_outlet(central: float) -> None:
+    nodes = first_grid(central, inlet_position(central), 121)
+    assert nodes.size == 121
+    assert np.all(np.diff(nodes) > 0)
+    assert nodes[0] == inlet_position(central)
+    assert nodes[-1] == outlet_position(central)
+
+
+def test_second_derivative_of_a_square_on_any_grid() -> None:
+    nodes = np.sort(np.random.default_rng(1).uniform(-1, 1, 20))
+    np.testing.assert_allclose(second_derivative(nodes, 3 * nodes**2), 6.0, rtol=1e-6)
+
+
+def test_nodes_gather_where_the_film_bends() -> None:
+    nodes = np.linspace(-3, 2, 201)
+    film = 0.1 + np.where(nodes < -1, (nodes + 1) ** 2, 0.0)
+    pressure = np.sqrt(np.maximum(1 - nodes**2, 0))
+    density = adapted_density(nodes, pressure, film, 0.1)
+    assert density.min() > 0
+    assert density[np.argmin(abs(nodes + 1.1))] > 2 * density[np.argmin(abs(nodes))]

@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mdr_dask.physics.mdr import power_law_contact as contact
+
+
+def test_hertz():
+    R, E, a = 3e-3, 2e9, 1e-4
+    A = 1 / (2 * R)
+    d = contact.depth(a, A, 2.0)
+    assert d == pytest.approx(a**2 / R, rel=1e-12)
+    assert contact.normal_force(a, A, 2.0, E) == pytest.approx(4 / 3 * E * np.sqrt(R) * d**1.5, rel=1e-12)
+    r = np.array([0.0, 0.5e-4, 0.99e-4])
+    peak = 2 * E * a / (np.pi * R)
+    np.testing.assert_allclose(contact.stress(r, a, A, 2.0, E), peak * np.sqrt(1 - (r / a) ** 2), rtol=1e-12)
+
+
+def test_cone():
+    slope, E, a = 0.2, 1e9, 2e-3
+    d = contact.depth(a, slope, 1.0)
+    assert d == pytest.approx(np.pi / 2 * slope * a, rel=1e-12)
+    assert contact.normal_force(a, slope, 1.0, E) == pytest.approx(np.pi / 2 * a**2 * E * slope, rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0, 3.7, 10.0])
+def test_identities_of_every_power(exponent):
+    a = contact.contact_radius(0.3, 1.7, exponent)
+    assert contact.depth(a, 1.7, exponent) == pytest.approx(0.3, rel=1e-12)
+    force = contact.normal_force(a, 1.7, exponent, 5.0)
+    assert contact.radius_from_force(force, 1.7, exponent, 5.0) == pytest.approx(a, rel=1e-12)
+    h = 1e-6
+    radius = contact.contact_radius(np.array([0.3 - h, 0.3 + h]), 1.7, exponent)
+    slope = np.diff(contact.normal_force(radius, 1.7, exponent, 5.0))[0] / (2 * h)
+    assert slope == pytest.approx(float(contact.stiffness(a, 5.0)), rel=1e-6)  # central difference
+    total = quad(
+        lambda t: (
+            2 * np.pi * a * np.sin(t) * contact.stress(a * np.sin(t), float(a), 1.7, exponent, 5.0) * a * np.cos(t)
+        ),
+        0,
+        np.pi / 2,
+        limit=200,
+    )[0]
+    assert total == pytest.approx(float(force), rel=1e-7)  # the integrable peak at the axis limits quad
+
+
+def test_punch_carries_its_force():
+    total = quad(
+        lambda t: 2 * np.pi * np.sin(t) * np.cos(t) * contact.punch_stress(np.sin(t), 1.0, 0.4, 2.0), 0, 1.5707963
+    )[0]
+    assert total == pytest.approx(2 * 2.0 * 0.4, rel=1e-6)  # F = 2 E a d; the last 3e-8 rad are cut
+
+
+def test_cattaneo_mindlin_of_sphere_and_cone():
+    c = np.array([0.0, 0.3, 1.0])
+    np.testing.assert_allclose(contact.tangential_force(c, 2.0), 1 - c**3, rtol=1e-15)
+    np.testing.assert_allclose(contact.tangential_force(c, 1.0), 1 - c**2, rtol=1e-15)
+    np.testing.assert_allclose(contact.tangential_displacement(c, 2.0), 1 - c**2)
+    assert contact.stick_radius(0.75, 2.0) == pytest.approx(0.5)
+    assert np.isnan(contact.stick_radius(1.2, 2.0))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 3.3])
+def test_area_of_the_loop_is_the_dissipation(exponent):
+    eta = 0.7
+    u, force = contact.hysteresis_loop(eta, exponent, 20001)
+    area = abs(np.trapezoid(force, u))
+    # energies: mu F_N mu E d / G with F_N = 2 E d a n/(n+1)
+    c = (1 - eta) ** (1 / exponent)
+    assert area * 2 * exponent / (exponent + 1) == pytest.approx(float(contact.dissipation(c, exponent)), rel=1e-7)
+    assert force[0] == pytest.approx(float(contact.tangential_force(c, exponent)))
+
+
+def test_dissipation_of_a_parabola():
+    c = np.linspace(0, 1, 7)
+    np.testing.assert_allclose(contact.dissipation(c, 2.0), 16 / 15 * (1 - 5 * c**2 + 5 * c**3 - c**5), atol=1e-14)

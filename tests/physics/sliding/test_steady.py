@@ -1,0 +1,183 @@
+"""Identities of the steady state, and an independent march in time."""
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.surfaces import cubic_line as profile
+from mdr_dask.physics.surfaces import roughness
+
+SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
+EXACT = SCHEMES[:2]
+
+
+def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
+    amplitude = roughness.amplitudes(modes, hurst)
+    phase = roughness.phases(seed, realisation, modes)
+    nodes = 2 * modes * oversampling
+    height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
+    return height, slope, roughness.spectral_slope(amplitude)
+
+
+def friction(height, slope, reach, load, scheme):
+    reaches, loads = np.broadcast_arrays(np.atleast_1d(reach).astype(float), np.atleast_1d(load).astype(float))
+    steady = sliding.steady_sliding(height, slope, reaches, loads, scheme)
+    assert np.all(steady.status == sliding.CONVERGED)
+    return steady.drag / loads
+
+
+def march(height, reach, depth, turns=3):
+    """Step elements through the line in time by backward Euler, without any trick of the solver."""
+    n, decay = height.size, reach * height.size / (1 + reach * height.size)
+    u = 0.0
+    for _ in range(turns):
+        normal = drag = 0.0
+        for i in range(n):
+            w, free = height[i] + depth, decay * u
+            force = w + reach * n * (w - u) if w > free else 0.0
+            normal += force / n
+            drag += force * (height[i] - height[i - 1])
+            u = max(w, free)
+    return normal, drag
+
+
+@pytest.mark.parametrize("hurst", [0, 0.7, 1])
+@pytest.mark.parametrize("reach", [1e-5, 1e-3, 1e-1])
+@pytest.mark.parametrize("load", [0.01, 0.3, 5.0])
+def test_backward_euler_agrees_with_time_stepping(hurst, reach, load):
+    height, _, _ = rough(50, hurst, 1)
+    steady = sliding.steady_sliding(height, None, np.array([reach]), np.array([load]), "backward_euler")
+    normal, drag = march(height, reach, steady.depth[0], turns=3 + int(20 * reach))
+    # both do the same arithmetic in another order
+    assert normal == pytest.approx(load, rel=1e-10)
+    assert drag == pytest.approx(steady.drag[0], rel=1e-9)
+
+
+@pytest.mark.parametrize("reach", [1e-3, 1e-1])
+@pytest.mark.parametrize("load", [0.1, 2.0])
+def test_exact_sweep_agrees_with_fine_time_steps(reach, load):
+    height, slope, _ = rough(20, 0.7, 32)
+    best = friction(height, slope, reach, load, "hermite")[0]
+    fine, _, _ = rough(20, 0.7, 2048)
+    coarse, finer = (friction(line, None, reach, load, "backward_euler")[0] for line in (fine[::2], fine))
+    # first order: one Richardson step removes the error of the time steps but for terms of second order
+    assert best == pytest.approx(2 * finer - coarse, rel=2e-3)
+
+
+@pytest.mark.parametrize("hurst", [0, 0.5, 1])
+def test_full_contact_is_exact(hurst):
+    height, slope, gradient = rough(500, hurst, 2)
+    reach = np.geomspace(1e-9, 1e-2, 8)
+    load = 2 * np.max(np.abs(height)) + 2 * reach * np.max(np.abs(slope))
+    # thesis eq. 3.14: F_x / (4 G) = v tau grad^2 for a line of unit length
+    expected = reach * gradient**2 / load
+    assert friction(height, slope, reach, load, "hermite") == pytest.approx(expected, rel=1e-10)
+
+
+@pytest.mark.parametrize("scheme", EXACT)
+@pytest.mark.parametrize("load", [1e-3, 0.1, 2.0])
+def test_friction_has_no_floor_at_low_velocity(scheme, load):
+    height, slope, _ = rough(200, 0.3)
+    reach = np.geomspace(1e-14, 1e-6, 9)
+    mu = friction(height, slope, reach, load, scheme)
+    # v -> 0: mu / v tends to a constant; the slowest are 1e8 times slower than the fastest
+    assert mu[:-1] / reach[:-1] == pytest.approx(mu[0] / reach[0], rel=1e-3)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_load_is_met_by_the_displacement_marched_at_the_depth_found(scheme):
+    height, slope, _ = rough(100, 0.5, 8)
+    steady = sliding.steady_sliding(height, slope, np.array([1e-2]), np.array([0.5]), scheme)
+    normal, _ = march(height, 1e-2, steady.depth[0])
+    # another discretisation of the same state: first order in the cell
+    assert normal == pytest.approx(0.5, rel=2e-2)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_heights_scale_out(scheme):
+    height, slope, _ = rough(100, 0.7)
+    reach, load = np.geomspace(1e-5, 1e1, 7), 0.4
+    one = friction(height, slope, reach, load, scheme)
+    scaled = friction(height * 1e-6, slope * 1e-6, reach, load * 1e-6, scheme) * 1e6
+    assert scaled == pytest.approx(one, rel=1e-7)
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 0.8), ("piecewise_linear", 1.8), ("hermite", 2.5)])
+def test_order_of_convergence(scheme, order):
+    lines = {factor: rough(50, 0.7, factor)[:2] for factor in (4, 16, 64)}
+    reach, load = np.geomspace(1e-4, 1e-1, 7), 0.5
+    mu = {factor: friction(*line, reach, load, scheme) for factor, line in lines.items()}
+    reference = friction(*lines[64], reach, load, "hermite")
+    errors = [np.sqrt(np.mean((mu[factor] / reference - 1) ** 2)) for factor in (4, 16)]
+    assert np.log(errors[0] / errors[1]) / np.log(4) > order
+
+
+def test_bad_numbers_are_a_status():
+    height, slope, _ = rough()
+    bad = np.array([np.nan, np.inf, 0.0, -1.0])
+    steady = sliding.steady_sliding(height, slope, np.append(bad, np.ones(4)), np.append(np.ones(4), bad))
+    assert np.all(steady.status == sliding.INVALID)
+    assert np.all(np.isnan(steady.drag))
+    height[3] = np.nan
+    assert sliding.steady_sliding(height, slope, np.ones(1), np.ones(1)).status[0] == sliding.INVALID
+
+
+def test_hermite_needs_slopes():
+    with pytest.raises(ValueError, match="expected slopes at the nodes"):
+        sliding.steady_sliding(np.zeros(32), None, np.ones(1), np.ones(1))
+
+
+@pytest.mark.parametrize("load", [0.05, 2.0])
+@pytest.mark.parametrize("reach", [1e-3, 1e-1, 10.0])
+def test_friction_is_the_energy_lost(load, reach):
+    """F_x = 4 G v tau times the integral of u'^2, with u marched finely as the running maximum of w exp(s / v tau)."""
+    height, slope, _ = rough(30, 0.7, 400)
+    steady = sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]))
+    n, w = height.size, height + steady.depth[0]
+    decay, u = np.exp(-1 / (reach * n)), np.empty(2 * n)
+    u[0] = max(w[0], 0.0)
+    for i in range(1, 2 * n):
+        u[i] = max(w[i % n], decay * u[i - 1])
+    lost = reach * np.sum(np.diff(u[n - 1 :]) ** 2) * n
+    # the running maximum at the nodes is first order where u turns: 12000 nodes
+    assert steady.drag[0] == pytest.approx(lost, rel=5e-3)
+    assert np.mean(u[n:]) == pytest.approx(load, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
+    # such a line is not band-limited: its cells are integrated one by one
+    monkeypatch.setattr(profile, "_resummed", lambda stretch, slope, first: stretch)
+    # cubic cells with a will of their own, against straight cells 4000 times as fine
+    generator = np.random.default_rng(seed)
+    n, fine = 8, 4000
+    height, rise = generator.normal(size=n), 8 * generator.normal(size=n)
+    x = (np.arange(n * fine) % fine) / fine
+    h0, t0 = np.repeat(height, fine), np.repeat(rise, fine)
+    h1, t1 = np.repeat(np.roll(height, -1), fine), np.repeat(np.roll(rise, -1), fine)
+    dense = h0 * (1 + 2 * x) * (1 - x) ** 2 + h1 * x**2 * (3 - 2 * x) + t0 * x * (1 - x) ** 2 - t1 * x**2 * (1 - x)
+    reaches, loads = (grid.ravel() for grid in np.meshgrid(10.0 ** np.arange(-3, 2), [0.05, 0.5, 2.0, 5.0]))
+    ours = sliding.steady_sliding(height, rise * n, reaches, loads)
+    reference = sliding.steady_sliding(dense, None, reaches, loads, "piecewise_linear")
+    assert np.all(ours.status == 0)
+    # second order of the reference, and its shorter contacts at light loads
+    assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
+    assert ours.contact_fraction == pytest.approx(reference.contact_fraction, abs=1e-3)
+    assert ours.drag == pytest.approx(reference.drag, rel=1e-4)
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.8])
+def test_time_steps_by_blocks_are_those_node_by_node(hurst):
+    n = 1100  # four blocks and a rest
+    height = roughness.line(roughness.amplitudes(n // 2, hurst), roughness.phases(3, 0, n // 2), n)
+    reaches, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
+    found = sliding.steady_sliding(height, None, reaches, loads, "backward_euler")
+    assert np.all(found.status == 0)
+    line = np.roll(height, -1 - int(np.argmax(height)))
+    decay = reaches * n / (1 + reaches * n)
+    u, total, drag = line[-1] + found.depth, 0.0, 0.0
+    for before, here in zip(np.roll(line, 1), line, strict=True):
+        now = np.maximum(here + found.depth, decay * u)
+        total, drag, u = total + now, drag + (now - decay * u) * (here - before) / (1 - decay), now
+    assert total / n == pytest.approx(loads, rel=1e-8)  # the last step is taken from the tangent
+    assert found.drag == pytest.approx(drag, rel=1e-6)  # and the secant

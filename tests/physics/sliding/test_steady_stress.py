@@ -1,0 +1,110 @@
+"""Sliding over 15 decades of everything: an answer that obeys its identities, or a status."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.surfaces import roughness
+
+SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
+exponents = st.floats(-15, 15)
+
+
+def solve(height, slope, reach, load, scheme):
+    return sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]), scheme)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    hurst=st.floats(0, 1),
+    points=st.sampled_from([16, 50, 300]),
+    oversampling=st.sampled_from([1, 2, 5]),
+    reach=exponents,
+    load=exponents,
+    height=st.floats(-9, 6),
+    scheme=st.sampled_from(SCHEMES),
+    realisation=st.integers(0, 1000),
+)
+def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, scheme, realisation):
+    amplitude = roughness.amplitudes(points // 2, hurst)
+    phase = roughness.phases(0, realisation, points // 2)
+    h, slope = (10**height * roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
+    carried = 10 ** (load + height)
+    steady = solve(h, slope, 10**reach, carried, scheme)
+    assert steady.status[0] == sliding.CONVERGED
+    # the highest point, which lies above the nodes by part of the range, is pressed in; at most all of the line is
+    slack = 1e-9 * (np.ptp(h) + carried)
+    assert -np.max(h) - np.ptp(h) <= steady.depth[0] <= carried + np.ptp(h) + slack
+    assert steady.drag[0] >= 0
+    # F_x / F_N lies below the steepest slope in contact, that of the cubic between the nodes included
+    steepest = 1.5 * max(np.max(np.abs(slope)), np.max(np.abs(np.diff(h))) * h.size)
+    assert steady.drag[0] / carried <= steepest * (1 + 1e-9)
+    assert 0 <= steady.contact_fraction[0] <= 1 + 1e-9
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    exponent=st.floats(1, 6),
+    coefficient=st.floats(-3, 3),
+    roughness_height=st.floats(-12, -1),
+    reach=exponents,
+    load=exponents,
+    scheme=st.sampled_from(SCHEMES),
+)
+def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, reach, load, scheme):
+    amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
+    lines = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
+    height, slope = (np.append(line, line[0]) for line in lines)
+    numbers = (10**coefficient, exponent, np.array([10**reach]), np.array([10**load]), scheme)
+    steady = sliding.steady_indenter(height, slope, *numbers)
+    assert steady.status[0] in (sliding.CONVERGED, sliding.OUTSIDE_LINE)
+    assert np.isfinite(steady.drag[0]) == (steady.status[0] == sliding.CONVERGED)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_flat_line_has_no_friction(scheme):
+    flat = np.zeros(64)
+    steady = sliding.steady_sliding(flat, flat, np.geomspace(1e-15, 1e15, 7), np.geomspace(1e-15, 1e15, 7), scheme)
+    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.drag == 0)
+    assert steady.depth == pytest.approx(np.geomspace(1e-15, 1e15, 7), rel=1e-12)
+    # by time steps the fastest one loses less than rounding in a step, and cannot tell contact from flight
+    assert steady.contact_fraction[:6] == pytest.approx(np.ones(6))
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_spikes_and_steps_are_solved(scheme):
+    height = np.where(np.arange(200) > 120, 1.0, 0.0)
+    height[40] = 1e6
+    reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
+    steady = sliding.steady_sliding(height, np.zeros(200), reach, load, scheme)
+    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.drag >= 0)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("points", [16, 1000])
+def test_neighbours_and_order_do_not_change_a_bit(scheme, points):
+    amplitude, phase = roughness.amplitudes(points // 2, 0.3), roughness.phases(0, 0, points // 2)
+    h, slope = (roughness.line(amplitude, phase, 2 * points, order) for order in (0, 1))
+    reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
+    together = sliding.steady_sliding(h, slope, reach, load, scheme)
+    shuffle = np.random.default_rng(0).permutation(reach.size)
+    shuffled = sliding.steady_sliding(h, slope, reach[shuffle], load[shuffle], scheme)
+    for name, column in vars(together).items():
+        assert np.array_equal(column[shuffle], vars(shuffled)[name])
+        for k in (0, 77, 179):
+            alone = solve(h, slope, reach[k], load[k], scheme)
+            assert vars(alone)[name][0] == column[k]
+
+
+def test_a_guess_does_not_change_a_bit():
+    amplitude, phase = roughness.amplitudes(200, 0.7), roughness.phases(0, 3, 200)
+    h, slope = (roughness.line(amplitude, phase, 800, order) for order in (0, 1))
+    reach, load = np.geomspace(1e-5, 1e1, 20), np.geomspace(1e-3, 1e2, 20)
+    cold = sliding.steady_sliding(h, slope, reach, load)
+    for factor in (1e-3, 0.999, 1.5, 1e3):
+        warm = sliding.steady_sliding(h, slope, reach, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
+        assert np.array_equal(cold.drag, warm.drag)

@@ -1,0 +1,285 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import brentq
+
+from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
+from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
+from mdr_dask.physics.surfaces import roughness
+
+LENGTH, POINTS, RMS = 0.02, 400, 5e-7
+
+
+def line(oversampling=8, hurst=0.7, realisation=0):
+    amplitude = RMS * roughness.amplitudes(POINTS // 2, hurst)
+    phase = roughness.phases(1, realisation, POINTS // 2)
+    nodes = POINTS * oversampling
+    return roughness.line(amplitude, phase, nodes), LENGTH / nodes, amplitude
+
+
+def marched(height, spacing, solid, velocity, depth, periods):
+    """Friction and load at a depth by implicit time steps of one point, one arm, until the state repeats: slow."""
+    (modulus,), (time,), static = solid.moduli, solid.times, solid.static_modulus
+    ratio = spacing / velocity / time
+    arm, force, drag = 0.0, 0.0, 0.0
+    slope = (np.roll(height, -1) - np.roll(height, 1)) / (2 * spacing)
+    for _ in range(periods):
+        force = drag = 0.0
+        for h, s in zip(height, slope, strict=True):
+            # midpoint-free backward Euler: a = (a + ratio u) / (1 + ratio), f = static u + modulus (u - a)
+            free = modulus * arm / (1 + ratio) / (static + modulus / (1 + ratio))
+            u = max(depth + h, free)
+            arm = (arm + ratio * u) / (1 + ratio)
+            f = static * u + modulus * (u - arm)
+            force += f
+            drag += f * s
+    return drag / force, 4 * spacing * force
+
+
+def test_standard_solid_agrees_with_slow_time_stepping():
+    solid, velocity = standard_solid(1e7, 5e7, 1e-2), 0.05
+    height, spacing, _ = line(128)
+    direct = steady_viscoelastic_sliding(height, spacing, solid, velocity, 0.2)
+    assert direct.status == sliding.CONVERGED
+    assert 0.05 < direct.contact_fraction < 0.5
+    fine = marched(height, spacing, solid, velocity, direct.depth, 3)
+    assert fine[0] == pytest.approx(direct.friction_coefficient, rel=0.01)  # first order: measured 0.3 %
+    assert fine[1] == pytest.approx(0.2, rel=0.01)
+
+
+@pytest.mark.parametrize("velocity", [1e-4, 0.05, 5.0])
+@pytest.mark.parametrize("force", [0.01, 1.0, 100.0])
+def test_kelvin_limit_is_the_kelvin_solver(velocity, force):
+    height, spacing, amplitude = line(16)
+    ours = steady_viscoelastic_sliding(height, spacing, kelvin(1e7, 1e-3), velocity, force)
+    reach, load = np.array([velocity * 1e-3 / LENGTH]), np.array([force / (4e7 * LENGTH)])
+    slope = roughness.line(amplitude, roughness.phases(1, 0, POINTS // 2), height.size, 1)
+    kelvin_state = sliding.steady_sliding(height, slope, reach, load)
+    wanted = kelvin_state.drag[0] / (load[0] * LENGTH)
+    assert ours.friction_coefficient == pytest.approx(wanted, rel=max(3 * ours.error, 2.5e-3))  # a few points touch
+    assert ours.depth == pytest.approx(kelvin_state.depth[0], abs=2e-3 * RMS)
+    assert ours.contact_fraction == pytest.approx(kelvin_state.contact_fraction[0], abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    "solid",
+    [
+        kelvin(1e7, 1e-3),
+        standard_solid(1e7, 1e9, 1e-3),
+        power_law_series(1e7, 1e7, 1e3, 0.3, 1e-2, 1e8).solid,
+        prony(1e7, np.full(50, 1e6), np.geomspace(1e-12, 1e8, 50), 10.0),
+    ],
+    ids=["kelvin", "standard", "power", "fifty"],
+)
+def test_full_contact_is_the_sum_over_waves(solid):
+    """F_x = 2 L sum A_k^2 q_k G''(q_k v), exact: thesis eq. 3.14 for any rheology."""
+    velocity, force = 0.03, 1e3
+    height, spacing, amplitude = line(16)
+    q = 2 * np.pi * np.arange(1, amplitude.size + 1) / LENGTH
+    drag = 2 * LENGTH * np.sum(amplitude**2 * q * complex_modulus(solid, q * velocity).imag)
+    state = steady_viscoelastic_sliding(height, spacing, solid, velocity, force)
+    assert state.contact_fraction == 1
+    assert state.friction_coefficient == pytest.approx(drag / force, rel=state.error + 1e-7)
+    assert state.error < 0.01
+    assert state.depth == pytest.approx(force / (4 * solid.static_modulus * LENGTH), rel=1e-8)
+
+
+def test_friction_falls_with_velocity_without_a_floor():
+    height, spacing, _ = line()
+    solid = prony(1e7, [1e7, 3e7], [1e-3, 1e-2])
+    low = [steady_viscoelastic_sliding(height, spacing, solid, v, 0.1).friction_coefficient / v for v in (1e-8, 1e-12)]
+    assert low[0] == pytest.approx(low[1], rel=1e-5)  # next order: v tau / correlation length
+    dashpot = kelvin(1e7, (1e7 * 1e-3 + 3e7 * 1e-2) / 1e7)  # fast arms are a dashpot of sum G tau
+    assert steady_viscoelastic_sliding(height, spacing, dashpot, 1e-8, 0.1).friction_coefficient == pytest.approx(
+        low[0] * 1e-8, rel=1e-5
+    )
+
+
+def test_energy_lost_is_the_work_of_friction():
+    """Drag = sum G / (tau v) int (u - a)^2 over the period, contact and flight.
+
+    Here on the straight line between points with e = u - a exact in every cell, its square by Simpson's rule;
+    only the cells in which contact begins or ends are left to second order.
+    """
+    solid, velocity = standard_solid(1e7, 4e7, 1e-2), 0.05
+    height, spacing, _ = line(64)
+    state = steady_viscoelastic_sliding(height, spacing, solid, velocity, 0.3)
+    (modulus,), (time,), static, parts = solid.moduli, solid.times, solid.static_modulus, 8
+    fine = np.interp(np.arange(height.size * parts) / parts, np.arange(height.size + 1), np.append(height, height[0]))
+    step = spacing / parts
+    ratio = step / (velocity * time)
+    half, recovery = np.exp(-ratio / 2), np.exp(-ratio * static / solid.glass_modulus)
+    lost = u = e = 0.0
+    for _ in range(2):  # the second turn starts from the periodic state
+        lost = 0.0
+        for w in state.depth + fine:
+            rate = (w - u) / ratio
+            middle, end = rate + (e - rate) * half, rate + (e - rate) * half**2
+            after = w
+            if static * w + modulus * end < 0:
+                e = -static * u / modulus
+                middle, end, after = e * np.sqrt(recovery), e * recovery, u * recovery
+            lost += step * (e**2 + 4 * middle**2 + end**2) / 6
+            u, e = after, end
+    drag = 4 * modulus / time / velocity * lost
+    assert drag / 0.3 == pytest.approx(state.friction_coefficient, rel=1e-3)
+
+
+@pytest.mark.parametrize("velocity", [1e-9, 1e-3, 1e3])
+@pytest.mark.parametrize("force", [1e-4, 1.0, 1e4])
+@pytest.mark.parametrize("viscosity", [0.0, 100.0])
+def test_fifty_arms_over_twenty_decades(velocity, force, viscosity):
+    moduli = 10 ** np.random.default_rng(2).uniform(4, 9, 50)
+    height, spacing, _ = line(16)
+    solid = prony(1e6, moduli, np.geomspace(1e-12, 1e8, 50), viscosity)
+    state = steady_viscoelastic_sliding(height, spacing, solid, velocity, force)
+    assert state.status == sliding.CONVERGED
+    assert state.sweeps <= 12
+    finer = steady_viscoelastic_sliding(*line(64)[:2], solid, velocity, force)
+    assert state.friction_coefficient == pytest.approx(finer.friction_coefficient, rel=2 * state.error)
+
+
+def test_arms_slower_than_anything_share_one_limit():
+    height, spacing, _ = line()
+    slow = [
+        steady_viscoelastic_sliding(height, spacing, prony(1e7, [1e7, 5e7], [1e-3, time]), 0.1, 0.1)
+        for time in (1e9, 1e14)
+    ]
+    assert slow[0].friction_coefficient == pytest.approx(slow[1].friction_coefficient, rel=1e-6)
+    assert slow[0].depth == pytest.approx(slow[1].depth, rel=1e-8)
+
+
+def test_error_estimate_covers_the_true_error():
+    """200 random cases on coarse grids, none that it was tuned on: 95 % within, not 10 times too large.
+
+    The standard error of the part is 1.5 %, hence 92 %; 96.3 % were measured of 4293.
+    """
+    random, within, excess, failed = np.random.default_rng(5), [], [], 0
+    for realisation in range(200):
+        arms = random.integers(0, 5)
+        solid = prony(
+            1e7, 10 ** random.uniform(5, 9, arms), 10 ** random.uniform(-6, 3, arms), 1e7 * 10 ** random.uniform(-6, 0)
+        )
+        velocity, force, hurst = 10 ** random.uniform(-5, 2), 10 ** random.uniform(-2, 2), random.uniform(0, 1)
+        grid = int(2 ** random.integers(2, 5))
+        coarse = steady_viscoelastic_sliding(*line(grid, hurst, realisation)[:2], solid, velocity, force)
+        fine = steady_viscoelastic_sliding(*line(64, hurst, realisation)[:2], solid, velocity, force)
+        assert fine.status == sliding.CONVERGED
+        if coarse.status != sliding.CONVERGED:  # a contact of a few nodes: `auto` goes on to finer grids
+            failed += 1
+            continue
+        miss = abs(coarse.friction_coefficient / fine.friction_coefficient - 1)
+        within.append(miss <= coarse.error)
+        excess.append(coarse.error / max(miss, 1e-12))
+    assert failed <= 4
+    assert np.mean(within) >= 0.92
+    assert np.median(excess) <= 10
+
+
+def parabola(velocity, radius, modulus, time, force):
+    """Closed form: contact from -sqrt(d R) to the zero of w + v tau w' (physics of the smooth Kelvin parabola)."""
+    reach = velocity * time
+
+    def forces(depth):
+        lead, trail = -np.sqrt(depth * radius), -reach + np.sqrt(reach**2 + depth * radius)
+        stress = np.polynomial.Polynomial([depth, -2 * reach / radius, -1 / radius])
+        both = [stress.integ(), (stress * np.polynomial.Polynomial([0, -2 / radius])).integ()]
+        return [4 * modulus * (p(trail) - p(lead)) for p in both]
+
+    depth = brentq(lambda d: forces(d)[0] - force, 1e-12, 1e-1, xtol=1e-18, rtol=1e-14)
+    return forces(depth)[1] / force, depth
+
+
+@pytest.mark.parametrize("velocity", [1e-3, 0.1, 1.0, 10.0])
+def test_smooth_parabola_is_its_closed_form(velocity):
+    x = np.linspace(-0.008, 0.008, 4001)
+    state = steady_viscoelastic_sliding(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), velocity, 1.0, periodic=False)
+    friction, depth = parabola(velocity, 0.01, 1e6, 1e-3, 1.0)
+    assert state.status == sliding.CONVERGED
+    assert state.friction_coefficient == pytest.approx(friction, rel=state.error + 1e-5)
+    assert state.depth == pytest.approx(depth, rel=3e-4)
+    assert state.error < 0.01
+
+
+def test_rough_indenters_are_solved_in_a_few_sweeps():
+    """The derivative by the depth is exact, and arms that recover far beyond the line do not hide the load."""
+    random = np.random.default_rng(4)
+    for realisation in range(40):
+        arms = random.integers(1, 6)
+        solid = prony(1.0, 10 ** random.uniform(-2, 2, arms), 10 ** random.uniform(-6, 3, arms))
+        height, spacing, _ = line(8, random.uniform(0, 1), realisation)
+        place = (np.arange(height.size + 1) - height.size // 2) * spacing
+        body = np.append(height, height[0]) - 50 * RMS * np.abs(2 * place / LENGTH) ** random.uniform(1, 4)
+        force = 4 * LENGTH * 50 * RMS * 10 ** random.uniform(-4, -1.5)
+        state = steady_viscoelastic_sliding(body, spacing, solid, 10 ** random.uniform(-5, 2), force, periodic=False)
+        assert state.status == sliding.CONVERGED
+        assert state.sweeps <= 16
+
+
+def test_contact_that_leaves_the_line_is_said_so():
+    x = np.linspace(-1e-3, 1e-3, 401)
+    state = steady_viscoelastic_sliding(-(x**2) / 0.01, x[1] - x[0], kelvin(1e6, 1e-3), 0.1, 10.0, periodic=False)
+    assert state.status == sliding.OUTSIDE_LINE
+    assert np.isnan(state.friction_coefficient)
+
+
+def test_flat_line_carries_load_without_friction():
+    state = steady_viscoelastic_sliding(np.zeros(64), 1e-4, standard_solid(1e6, 1e7, 1e-3), 1.0, 1.0)
+    assert state.status == sliding.CONVERGED
+    assert state.friction_coefficient == pytest.approx(0, abs=1e-12)
+    assert state.depth == pytest.approx(1.0 / (4e6 * 64e-4), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"height": np.full(64, np.nan)}, "one row of finite numbers"),
+        ({"height": np.zeros(63)}, "a multiple of four points and at least eight cells, got 63 points"),
+        ({"spacing": 0.0}, "the spacing must be positive and finite, got 0.0"),
+        ({"velocity": np.inf}, "the velocity must be positive and finite, got inf"),
+        ({"normal_force": -1.0}, "the normal force must be positive and finite, got -1.0"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    good = {"height": np.zeros(64), "spacing": 1e-4, "solid": kelvin(1e6, 1e-3), "velocity": 1.0, "normal_force": 1.0}
+    with pytest.raises(ValueError, match=message):
+        steady_viscoelastic_sliding(**(good | change))
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    kind=st.sampled_from(["rough", "spikes", "steps", "one point"]),
+    scale=st.floats(-9, 3),
+    velocity=st.floats(-9, 6),
+    load=st.floats(-6, 4),
+    arms=st.integers(0, 20),
+    viscosity=st.floats(-12, 3),
+)
+def test_any_line_and_any_solid_end_in_a_state_or_a_status(seed, kind, scale, velocity, load, arms, viscosity):
+    """Fifteen decades of everything: the load is carried, friction resists, no more sweeps than a few."""
+    random = np.random.default_rng(seed)
+    height = {
+        "rough": np.cumsum(random.standard_normal(256)),
+        "spikes": np.where(random.uniform(size=256) < 0.02, random.exponential(100, 256), 0.0),
+        "steps": np.repeat(random.standard_normal(16), 16),
+        "one point": np.where(np.arange(256) == seed % 256, 1.0, 0.0),
+    }[kind] * 10**scale
+    moduli = 10 ** random.uniform(-3, 4, arms)
+    solid = prony(1.0, moduli, 10 ** random.uniform(-10, 10, arms), 10**viscosity)
+    force = 4 * 256 * 10**scale * 10**load
+    state = steady_viscoelastic_sliding(height, 1.0, solid, 10**velocity, force)
+    assert state.sweeps <= 30
+    if state.status == sliding.NOT_CONVERGED:
+        # the dashpot alone holds the load on a part of a cell whose depth is lost in the rounding of the heights
+        assert load - velocity - viscosity < -11
+        return
+    assert state.status == sliding.CONVERGED
+    assert 0 < state.contact_fraction <= 1
+    # friction is dissipation: rounding of the elastic part apart, it cannot be negative
+    assert state.friction_coefficient >= -1e-9 * 10**scale * 100
+    # scaling: heights and load by the same number leave the contact and multiply the friction by it
+    twice = steady_viscoelastic_sliding(2 * height, 1.0, solid, 10**velocity, 2 * force)
+    assert twice.contact_fraction == pytest.approx(state.contact_fraction, rel=1e-3)

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from mdr_dask.errors import DataError
+from mdr_dask.physics.surfaces import measured, roughness
+
+LENGTH, POINTS = 1e-3, 512
+
+
+def self_affine(points=POINTS, waves=100):
+    amplitude = 1e-6 * roughness.amplitudes(waves, 0.7)
+    height = roughness.line(amplitude, roughness.phases(1, 0, waves), points)
+    return height, amplitude
+
+
+def test_period_is_points_times_spacing():
+    x = np.arange(POINTS) * 2e-6
+    line = measured.measured_line(x, self_affine()[0])
+    assert line.length == pytest.approx(POINTS * 2e-6, rel=1e-12)
+    assert line.spacing == pytest.approx(2e-6, rel=1e-12)
+
+
+def test_uneven_positions_are_resampled_and_descending_ones_turned():
+    random = np.random.default_rng(0)
+    x = np.sort(random.uniform(0, LENGTH, 4000))
+    wave = np.sin(6 * np.pi * x / LENGTH)
+    line = measured.measured_line(x, wave, detrend="none")
+    even = np.linspace(x[0], x[-1], 4000)
+    np.testing.assert_allclose(line.height, np.sin(6 * np.pi * even / LENGTH), atol=1e-3)  # linear between points
+    turned = measured.measured_line(x[::-1], wave[::-1], detrend="none")
+    assert np.array_equal(turned.height, line.height)
+
+
+@pytest.mark.parametrize(("order", "trend"), [("mean", [3.0]), ("line", [3.0, 2.0]), ("parabola", [3.0, 2.0, 1.0])])
+def test_detrending_removes_a_polynomial_and_keeps_what_is_orthogonal(order, trend):
+    place = np.linspace(-1, 1, POINTS)
+    assert np.abs(measured.detrended(np.polynomial.Polynomial(trend)(place), order)).max() < 1e-12
+    rough = measured.detrended(self_affine()[0], order)
+    again = measured.detrended(rough + np.polynomial.Polynomial(trend)(place), order)
+    np.testing.assert_allclose(again, rough, atol=1e-12)
+
+
+def test_taper_closes_the_line():
+    x = np.arange(POINTS) * 2e-6
+    ramp = np.linspace(0, 1e-6, POINTS)
+    line = measured.measured_line(x, ramp, taper=0.2)
+    assert abs(line.height[0] - line.height[-1]) < 1e-3 * 1e-6
+    middle = slice(POINTS // 5, -POINTS // 5)
+    np.testing.assert_allclose(line.height[middle], (ramp - ramp.mean())[middle], atol=1e-18)
+
+
+def test_band_limits_keep_the_waves_between_them():
+    height, amplitude = self_affine()
+    kept = measured.band_limited(height, LENGTH, LENGTH / 50, LENGTH / 10)
+    assert measured.rms_height(kept) ** 2 == pytest.approx(np.sum(amplitude[9:50] ** 2) / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("points", [1024, 777, 513])
+def test_resampling_a_band_limited_line_is_exact(points):
+    height, _ = self_affine()
+    np.testing.assert_allclose(measured.resampled(height, points), self_affine(points)[0], atol=1e-18)
+
+
+def test_even_nyquist_wave_survives_refinement():
+    saw = np.tile([1.0, -1.0], 8)
+    np.testing.assert_allclose(measured.resampled(saw, 32)[::2], saw, atol=1e-12)
+
+
+def test_statistics_are_those_of_the_spectrum():
+    height, amplitude = self_affine()
+    q = 2 * np.pi * np.arange(1, amplitude.size + 1) / LENGTH
+    assert measured.rms_height(height) == pytest.approx(np.sqrt(np.sum(amplitude**2) / 2), rel=1e-12)
+    assert measured.rms_slope(height, LENGTH) == pytest.approx(np.sqrt(np.sum((amplitude * q) ** 2) / 2), rel=1e-12)
+    wavenumber, density = measured.power_spectrum(height, LENGTH)
+    np.testing.assert_allclose(density[: q.size], LENGTH * amplitude**2 / 4, rtol=1e-9)
+    np.testing.assert_allclose(wavenumber[: q.size], q)
+    assert 2 * density.sum() / LENGTH == pytest.approx(measured.rms_height(height) ** 2, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("x", "z", "message"),
+    [
+        ([0, 1], [0, 1], "8 or more pairs x, z, got 2 and 2"),
+        (range(9), [np.nan] * 9, "must be finite"),
+        ([0, 1, 1, 2, 3, 4, 5, 6], [0] * 8, "must ascend or descend"),
+    ],
+)
+def test_lines_that_cannot_be_used_are_refused(x, z, message):
+    with pytest.raises(DataError, match=message):
+        measured.measured_line(list(x), list(z))
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning:SurfaceTopography")  # its own names
+def test_figures_agree_with_surface_topography():
+    topography = pytest.importorskip("SurfaceTopography")
+    height, _ = self_affine()
+    scan = topography.UniformLineScan(height, LENGTH, periodic=True)
+    assert measured.rms_height(height) == pytest.approx(scan.rms_height_from_profile(), rel=1e-9)
+    finest = measured.resampled(height, 64 * POINTS)  # its slope is that of the chord, of second order
+    chords = topography.UniformLineScan(finest, LENGTH, periodic=True)
+    assert measured.rms_slope(height, LENGTH) == pytest.approx(chords.rms_slope_from_profile(), rel=1e-3)
+    wavenumber, density = scan.power_spectrum_from_profile(window=None, resampling_method=None)
+    ours = measured.power_spectrum(height, LENGTH)
+    np.testing.assert_allclose(wavenumber[1:100], ours[0][:99], rtol=1e-9)
+    np.testing.assert_allclose(density[1:100], ours[1][:99], rtol=1e-6)

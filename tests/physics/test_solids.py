@@ -1,0 +1,136 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdr_dask.physics.solids import (
+    arrhenius_factor,
+    at_temperature,
+    complex_modulus,
+    fit_series,
+    kelvin,
+    power_law_series,
+    prony,
+    recovery,
+    relaxation_modulus,
+    standard_solid,
+    wlf_factor,
+)
+
+ROUNDING = 1e-12
+
+
+def test_kelvin_and_standard_solid_are_their_closed_forms():
+    omega = np.geomspace(1e-3, 1e6, 20)
+    np.testing.assert_allclose(complex_modulus(kelvin(2e6, 1e-3), omega), 2e6 * (1 + 1j * omega * 1e-3), rtol=ROUNDING)
+    wanted = 1e6 + 9e6 * 1j * omega * 0.1 / (1 + 1j * omega * 0.1)
+    np.testing.assert_allclose(complex_modulus(standard_solid(1e6, 1e7, 0.1), omega), wanted, rtol=ROUNDING)
+
+
+def test_relaxation_modulus_goes_from_glass_to_static():
+    solid = prony(1.0, [2.0, 3.0], [1e-3, 10.0])
+    np.testing.assert_allclose(relaxation_modulus(solid, [0.0, 1e6]), [6.0, 1.0], rtol=ROUNDING)
+    assert solid.glass_modulus == 6.0
+    assert relaxation_modulus(solid, 1.0) == pytest.approx(1 + 3 * np.exp(-0.1), rel=ROUNDING)
+
+
+def test_equal_times_merge_and_empty_arms_vanish():
+    solid = prony(1.0, [1.0, 2.0, 0.0, 4.0], [5.0, 5.0, 1.0, 0.5])
+    assert solid.times.tolist() == [0.5, 5.0]
+    assert solid.moduli.tolist() == [4.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.0, [], []), "static modulus must be positive, got 0.0"),
+        ((np.nan, [], []), "static modulus must be positive, got nan"),
+        ((1.0, [1.0], []), "got 1 moduli and 0 times"),
+        ((1.0, [-1.0], [1.0]), "must not be negative, got \\[-1.0\\]"),
+        ((1.0, [1.0], [0.0]), "relaxation times must be positive, got \\[0.0\\]"),
+        ((1.0, [1.0], [np.inf]), "relaxation times must be positive, got \\[inf\\]"),
+        ((1.0, [], [], -1.0), "viscosity must not be negative, got -1.0"),
+    ],
+)
+def test_impossible_solids_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        prony(*arguments)
+    with pytest.raises(ValueError, match="glass modulus must not be below"):
+        standard_solid(2.0, 1.0, 1.0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(-10, 10), st.floats(-6, 6)), min_size=1, max_size=50, unique_by=lambda arm: round(arm[0], 1)
+    )
+)
+def test_recovery_modes_interlace_and_invert(arms):
+    decades, stiffness = np.array(sorted(arms)).T
+    times, moduli = 10**decades, 10**stiffness
+    modes = recovery(moduli, times)
+    assert np.all(modes.times >= times)
+    assert np.all(modes.times[:-1] <= times[1:])
+    # every mode is free of stress: 1 + sum G stretch = 0, to rounding of the largest term
+    largest = 1 + np.max(np.abs(moduli[:, None] * modes.stretch), axis=0)
+    assert np.all(np.abs(1 + moduli @ modes.stretch) <= 1e-9 * largest)
+    # rounding of sums over twenty decades
+    identity = modes.amplitude @ modes.stretch
+    magnitude = np.abs(modes.amplitude) @ np.abs(modes.stretch) + 1
+    assert np.max(np.abs(identity - np.eye(times.size)) / magnitude) < 1e-9
+
+
+def test_recovery_of_a_standard_solid_is_its_retardation_time():
+    modes = recovery(np.array([9.0]), np.array([0.1]))
+    assert modes.times[0] == pytest.approx(0.1 * 10, rel=ROUNDING)  # tau G_glass / G_inf
+
+
+@pytest.mark.parametrize("exponent", [0.05, 0.1, 0.3, 0.5, 0.9])
+def test_power_law_series_keeps_its_promise(exponent):
+    fit = power_law_series(1e6, 2e5, 1e3, exponent, 1e-2, 1e7)
+    omega = np.geomspace(1e-2, 1e7, 777)
+    error = complex_modulus(fit.solid, omega).imag / (2e5 * (omega / 1e3) ** exponent) - 1
+    assert np.abs(error).max() < 0.01  # promised for two arms a decade
+    assert fit.largest_error == pytest.approx(np.abs(error).max(), rel=0.2)
+
+
+def test_power_law_series_refuses_what_is_no_power_law():
+    with pytest.raises(ValueError, match=r"between 0 and 1, got 1.0"):
+        power_law_series(1.0, 1.0, 1.0, 1.0, 1.0, 10.0)
+    with pytest.raises(ValueError, match="positive and not empty, got"):
+        power_law_series(1.0, 1.0, 1.0, 0.5, 10.0, 1.0)
+
+
+def test_fitted_series_recovers_moduli_it_was_made_from():
+    made = power_law_series(1e6, 1e6, 1.0, 0.4, 1e-4, 1e7, 3).solid
+    omega = np.geomspace(1e-2, 1e5, 60)
+    modulus = complex_modulus(made, omega)
+    fit = fit_series(omega, modulus.real, modulus.imag, 2)
+    assert fit.largest_error < 0.02  # two arms a decade and half a decade beyond the table
+    assert max(fit.storage_error, fit.loss_error) <= fit.largest_error
+    assert fit.range == pytest.approx((1e-2, 1e5))
+    with_dashpot = fit_series(omega, modulus.real, modulus.imag + 1e5 * omega, 2, dashpot=True)
+    assert with_dashpot.solid.viscosity == pytest.approx(1e5, rel=0.02)
+
+
+def test_tables_that_cannot_be_fitted_are_refused():
+    with pytest.raises(ValueError, match="got 2, 1 and 2 values"):
+        fit_series([1, 2], [1], [1, 2])
+    with pytest.raises(ValueError, match="must be positive and finite"):
+        fit_series([1, 2], [1, -1], [1, 2])
+
+
+def test_temperature_laws_agree_with_their_definitions():
+    assert wlf_factor(300.0, 300.0, 17.4, 51.6) == 1
+    assert np.log10(wlf_factor(310.0, 300.0, 17.4, 51.6)) == pytest.approx(-17.4 * 10 / 61.6, rel=ROUNDING)
+    assert np.log(arrhenius_factor(350.0, 300.0, 8.31446261815324e4)) == pytest.approx(1e4 * (1 / 350 - 1 / 300))
+    with pytest.raises(ValueError, match=r"ends at 248.4 K"):
+        wlf_factor(248.0, 300.0, 17.4, 51.6)
+    with pytest.raises(ValueError, match="absolute temperatures must be positive"):
+        arrhenius_factor(0.0, 300.0, 1e4)
+
+
+def test_shifted_solid_has_the_moduli_of_the_shifted_frequency():
+    solid, omega = prony(1.0, [2.0, 3.0], [0.1, 1.0], 0.5), np.geomspace(1e-3, 1e3, 9)
+    shifted = complex_modulus(at_temperature(solid, 7.0), omega)
+    np.testing.assert_allclose(shifted, complex_modulus(solid, 7.0 * omega), rtol=ROUNDING)

@@ -1,0 +1,164 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics.mdr.half_integrals import graded_panels
+from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
+from mdr_dask.physics.wear import evolution as wear_evolution
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.exact import _describe, exact, gross
+
+PARABOLA = PowerProfile(2.0)
+RADII = np.array([0.5, 0.7, 0.9, 1.0, 1.1])
+
+
+@pytest.fixture(scope="module")
+def checked():
+    return exact(PARABOLA, 0.455, [2.0, 8.0, 18.0], tolerance=1e-5)
+
+
+def test_checked_figures(checked):
+    """Figures on which independent solvers agree: 5e-6 in f, 1e-6 in a, 4e-6 in V."""
+    first, second, last = checked
+    np.testing.assert_allclose(first.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=2e-6)
+    assert first.contact_radius == pytest.approx(
+        1.133353, abs=1e-5
+    )  # the tolerance; test_the_edge_converges_to_the_checked_figure goes on
+    assert first.wear_volume == pytest.approx(0.310754, abs=4e-6)
+    assert second.contact_radius == pytest.approx(1.240150, abs=2e-6)
+    assert second.wear_volume == pytest.approx(0.872404, abs=4e-6)
+    limit = wear.limit(PARABOLA, 0.455)
+    assert np.max(np.abs(last.height(RADII) - limit.height(RADII))) < 1.5e-4
+
+
+def test_the_edge_converges_to_the_checked_figure():
+    """The edge is the least determined quantity: shorter steps on panels graded deep into the edge, a table with -s."""
+    edges = []
+    for step_error in (4e-5, 4e-6, 4e-7):
+        problem = wear_evolution.partial_slip(PARABOLA, 0.455, graded_panels(6, 14, 5), 1.4)
+        moments = wear_evolution.march(problem, 2.0, step_error)
+        edges.append(float(wear_evolution.unknowns_at(moments, 2.0)[-1]))
+        print(f"{step_error:g} {len(moments)} {edges[-1]:.7f}")
+    gaps = np.abs(np.array(edges) - 1.133353)
+    assert np.all(gaps[1:] < 0.5 * gaps[:-1])
+    assert gaps[-1] < 2e-6  # 1e-6 of the checked figure, 1e-6 of the steps
+
+
+def test_the_evolution_converges_with_the_panels():
+    """Largest error of f at N = 2 against panels halved towards both ends, four nodes each; a table with -s."""
+    r = np.linspace(0.46, 1.13, 200)
+    profiles = []
+    for levels in (1, 2, 4, 8, 10):
+        panels = graded_panels(levels + 1, levels, 4)
+        problem = wear_evolution.partial_slip(PARABOLA, 0.455, panels, 1.4)
+        moments = wear_evolution.march(problem, 2.0, 4e-6)
+        worn = _describe(problem, wear_evolution.unknowns_at(moments, 2.0), 2.0)
+        profiles.append(worn.height(r))
+        print(levels, panels.nodes.size, len(moments), f"{worn.contact_radius:.7f} {worn.wear_volume:.7f}")
+    errors = [np.max(np.abs(f - profiles[-1])) for f in profiles[:-1]]
+    assert errors == sorted(errors, reverse=True)
+    assert errors[0] > 50 * errors[-1]
+    assert errors[-1] < 5e-6
+
+
+def test_energy_is_volume_and_force_falls(checked):
+    for worn in checked:
+        assert worn.energy_volume == pytest.approx(worn.wear_volume, abs=2e-5)
+    forces = [worn.normal_force for worn in checked]
+    assert forces == sorted(forces, reverse=True)
+    assert checked[2].normal_force == pytest.approx(wear.limit(PARABOLA, 0.455).normal_force, abs=1e-3)
+
+
+def test_error_estimate_covers_the_error(checked):
+    coarse = exact(PARABOLA, 0.455, [2.0, 8.0], tolerance=1e-3)
+    for rough, fine in zip(coarse, checked, strict=False):
+        everywhere = np.linspace(0.3, 1.3, 300)
+        assert np.max(np.abs(rough.height(everywhere) - fine.height(everywhere))) < rough.error
+        assert rough.error < 1e-3
+
+
+def test_every_step_conserves_energy():
+    """The identity holds step by step, to the error of the step."""
+    problem = wear_evolution.partial_slip(PARABOLA, 0.455, graded_panels(8, 8, 6), 1.4)
+    moments = wear_evolution.march(problem, 4.0, 1e-5)
+    energy = wear_evolution.integral_along(moments, [problem.wear_rate(m.unknowns) for m in moments])
+    volumes = []
+    for m in moments:
+        y, _, length = problem.split(m.unknowns)
+        r, a = problem.radii(m.edge), m.edge
+        change = problem.eta * y - PARABOLA.rise(r, 0.455)
+        volumes.append(2 * problem.panels.weights @ (change * np.sqrt(a * a - r * r) * length / r))
+    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=2e-5)
+    np.testing.assert_allclose(volumes, energy, atol=2e-5)
+
+
+def test_stick_border_does_not_move_and_its_node_is_exact(checked):
+    for worn in checked:
+        r = np.array([0.1, 0.3, 0.455])
+        np.testing.assert_array_equal(worn.height(r), PARABOLA.height(r))
+        just = worn.height(np.array([0.455 * (1 + 1e-9)]))[0]
+        assert abs(just - PARABOLA.height(np.array(0.455))) < 1e-4  # f is continuous, like sqrt(r - c)
+
+
+def test_pressure_carries_the_force(checked):
+    worn = checked[0]
+    a = worn.contact_radius
+    edges = np.array([0, 0.455, a])
+    total = 0.0
+    x, w = np.polynomial.legendre.leggauss(60)
+    for low, high in pairwise(edges):
+        # both ends may be singular like a root or a power
+        s = 0.5 * (1 + x)
+        r = low + (high - low) * s**2 * (3 - 2 * s)
+        total += np.sum(0.5 * w * 6 * s * (1 - s) * (high - low) * 2 * np.pi * r * worn.pressure(r))
+    assert total == pytest.approx(worn.normal_force, rel=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("exponent", "c"),
+    [(1.0, 0.05), (1.0, 0.21), (0.5, 0.3), (3.0, 0.1), (2.0, 0.98), (8.0, 0.5), (0.3, 0.01), (2.0, 0.999)],
+)
+def test_extremes_reach_the_limit(exponent, c):
+    profile = PowerProfile(exponent)
+    worn = exact(profile, c, [60.0], tolerance=1e-3)[0]
+    limit = wear.limit(profile, c)
+    assert worn.contact_radius == pytest.approx(limit.contact_radius, abs=1e-3)
+    assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
+    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1e-2)
+
+
+def test_table_of_a_parabola():
+    r = np.linspace(0, 3, 301)
+    measured = exact(from_table(r, r**2 / 2, 1.0), 0.455, [2.0], tolerance=1e-4)[0]
+    np.testing.assert_allclose(measured.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=5e-5)
+
+
+def test_zero_cycles_and_order_of_request():
+    worn = exact(PARABOLA, 0.5, [2.0, 0.0, 1.0], tolerance=1e-3)
+    assert [w.wear_volume == 0.0 for w in worn] == [False, True, False]
+    assert worn[0].wear_volume > worn[2].wear_volume
+    assert worn[1].normal_force == pytest.approx(4 / 3, rel=1e-3)
+
+
+def test_a_result_does_not_depend_on_what_else_was_asked_for():
+    alone = exact(PARABOLA, 0.5, [1.3], tolerance=1e-3)[0]
+    among = exact(PARABOLA, 0.5, [9.0, 1.3, 0.2], tolerance=1e-3)[1]
+    assert alone.wear_volume == among.wear_volume
+    assert alone.error == among.error
+    np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
+
+
+@pytest.mark.parametrize(("exponent", "radius", "volume"), [(2.0, np.sqrt(2), np.pi), (1.0, np.pi / 2, np.pi**3 / 12)])
+def test_gross_slip_at_constant_depth_ends_in_the_free_body(exponent, radius, volume):
+    early, late = gross(PowerProfile(exponent), [1.0, 30.0])
+    assert late.contact_radius == pytest.approx(radius, abs=1e-4)
+    assert late.wear_volume == pytest.approx(volume, abs=1e-4)
+    assert early.wear_volume == pytest.approx(early.force_path, abs=1e-4)
+
+
+def test_gross_slip_at_constant_force_wears_force_times_path():
+    slid = gross(PARABOLA, [3.0], constant_force=True, tolerance=1e-3)[0]
+    assert slid.normal_force == pytest.approx(4 / 3, rel=1e-6)
+    assert slid.wear_volume == pytest.approx(4.0, rel=1e-3)
+    assert slid.depth > 1.0

@@ -1,0 +1,201 @@
+"""Fretting under constant force: the exact evolution, its end, the fast rule, and the literal simulation of it."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics.mdr.half_integrals import graded_panels
+from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear import evolution
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.forced import exact_forced, limit_forced
+from mdr_dask.physics.wear.forced_fast import fast_forced
+from mdr_dask.physics.wear.forced_slip import forced_slip, plateau_rise
+from mdr_dask.physics.wear.literal import literal
+
+PARABOLA = PowerProfile(2.0)
+RADII = np.linspace(0.0, 1.6, 300)
+#: d, c and V at N = 8 by tolerance 1e-5 (half a minute).
+CONVERGED = np.array([1.2772430, 0.5038731, 1.2728999])
+
+
+@pytest.fixture(scope="module")
+def worn():
+    return exact_forced(PARABOLA, 0.455, [0.0, 0.5, 2.0, 8.0, 60.0], tolerance=1e-4)
+
+
+def test_force_stays_and_volume_is_energy(worn):
+    for contact in worn:
+        assert contact.normal_force == pytest.approx(4.0 / 3.0, rel=1e-5)
+        assert contact.wear_volume == pytest.approx(contact.energy_volume, rel=1e-4, abs=1e-6)
+
+
+def test_depth_border_and_contact_only_grow(worn):
+    for name in ("depth", "stick_border", "contact_radius", "wear_volume"):
+        values = [getattr(contact, name) for contact in worn]
+        assert values == sorted(values)
+    assert worn[3].stick_border == worn[4].stick_border  # the image jumps there
+
+
+def test_image_at_the_border_is_the_depth_less_eta(worn):
+    """While the border moves g is continuous there; afterwards it is frozen within and jumps."""
+    eta = 1.0 - 0.455**2
+    for contact in worn[1:3]:
+        c = contact.stick_border
+        inside, outside = contact.image(np.array([c * (1 - 1e-9), c * (1 + 1e-9)]))
+        assert inside == pytest.approx(contact.depth - eta, abs=1e-6)
+        assert outside == pytest.approx(inside, abs=1e-4)
+    c = worn[3].stick_border
+    inside, outside = worn[3].image(np.array([c * (1 - 1e-9), c * (1 + 1e-9)]))
+    assert outside - inside > 0.7
+    frozen = worn[4].image(np.linspace(0.0, c * (1 - 1e-9), 50))
+    np.testing.assert_allclose(worn[3].image(np.linspace(0.0, c * (1 - 1e-9), 50)), frozen, atol=1e-12)
+
+
+def test_pressure_carries_the_force(worn):
+    contact = worn[3]
+    cuts, total = [0.0, contact.stick_border, contact.contact_radius], 0.0
+    x, w = np.polynomial.legendre.leggauss(80)
+    for low, high in pairwise(cuts):
+        s = 0.5 * (1 + x)  # both ends may be singular like a root or a power
+        r = low + (high - low) * s**2 * (3 - 2 * s)
+        total += np.sum(0.5 * w * 6 * s * (1 - s) * (high - low) * 2 * np.pi * r * contact.pressure(r))
+    assert total == pytest.approx(4.0 / 3.0, rel=1e-3)
+
+
+def test_every_step_conserves_energy_while_the_border_moves():
+    """Volume from the worn depths of slip zone and annulus, against int 2 (d - g) y dx."""
+    problem = forced_slip(PARABOLA, 0.455, graded_panels(12, 8, 4), 3.0)
+    moving, start = problem.move(evolution.settled(problem))
+    moments = evolution.march(moving, 2.0, 2e-5, start)
+    energy = evolution.integral_along(moments, [moving.wear_rate(m.unknowns) for m in moments])
+    volumes = []
+    abscissa, weight = gauss(40)
+    for moment in moments:
+        slipping = np.pi * moving.length(moment.unknowns) * (moving.panels.weights @ moment.gathered)
+        r = 0.455 + (moment.border - 0.455) * abscissa
+        depth = np.interp(r, *moment.path)
+        before = [moment.path[:, moment.path[0] < place] for place in r]
+        paths = [np.append(path, [[place], [d]], axis=1) for path, place, d in zip(before, r, depth, strict=True)]
+        rise = np.array([plateau_rise(path, r[k : k + 1])[0] for k, path in enumerate(paths)])
+        stuck = (moment.border - 0.455) * float(weight @ (2 * np.pi * r * (rise - moving.virgin_slip(r))))
+        volumes.append(slipping + stuck)
+    np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
+    np.testing.assert_allclose(volumes, energy, atol=1e-5)  # gathered over them
+
+
+def test_convergence_with_the_tolerance():
+    """Depth, border and volume at N = 8; a table with -s."""
+    gaps = []
+    for tolerance in (1e-3, 4e-4, 1e-4):
+        contact = exact_forced(PARABOLA, 0.455, [8.0], tolerance)[0]
+        found = np.array([contact.depth, contact.stick_border, contact.wear_volume])
+        gaps.append(np.abs(found - CONVERGED))
+        print(f"{tolerance:g} {found} {gaps[-1]} {contact.error:.1e}")
+    assert np.all(gaps[0] > gaps[2])
+    assert np.all(gaps[2] < [5e-6, 3e-6, 2e-5])
+
+
+def test_error_estimate_covers_the_error(worn):
+    rough = exact_forced(PARABOLA, 0.455, [0.5, 2.0, 8.0], tolerance=1e-3)
+    for contact, fine in zip(rough, worn[1:4], strict=True):
+        assert np.max(np.abs(contact.height(RADII) - fine.height(RADII))) < contact.error
+
+
+@pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (1.0, 0.368), (2.0, 0.9), (0.5, 0.3)])
+def test_the_end_is_the_limit(exponent, c):
+    profile = PowerProfile(exponent)
+    last, limit = exact_forced(profile, c, [1000.0], 1e-3)[0], limit_forced(profile, c, 1e-3)
+    assert last.depth == pytest.approx(limit.depth, rel=2e-4)
+    assert last.contact_radius == pytest.approx(limit.contact_radius, rel=3e-4)
+    assert last.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
+    inside = np.linspace(0.0, limit.contact_radius, 200)[1:-1]
+    assert np.max(np.abs(last.height(inside) - limit.height(inside))) < 2e-3
+
+
+def test_the_limit_has_no_pressure_outside_its_stick_zone():
+    limit = limit_forced(PARABOLA, 0.455)
+    outside = np.linspace(limit.stick_border * 1.001, limit.contact_radius * 0.999, 20)
+    np.testing.assert_allclose(limit.pressure(outside), 0.0, atol=1e-9)
+    np.testing.assert_allclose(limit.image(outside), limit.depth, atol=1e-12)
+    abscissa, weight = gauss(64)
+    c0, c = 0.455, limit.stick_border
+    load = [
+        (high - low) * weight @ (limit.depth - limit.image(low + (high - low) * abscissa))
+        for low, high in ((0, c0), (c0, c))
+    ]
+    assert 2.0 * sum(load) == pytest.approx(4.0 / 3.0, rel=1e-4)
+
+
+def test_the_literal_simulation_tends_to_the_exact_evolution():
+    exact = exact_forced(PARABOLA, 0.455, [2.0], tolerance=1e-4)[0]
+    errors = []
+    for cells in (50, 100, 200):
+        simulated = literal(PARABOLA, 0.455, 2.0, cells=cells, substeps=16, constant_force=True)
+        errors.append(np.max(np.abs(simulated.height(RADII) - exact.height(RADII))))
+    assert errors[0] > errors[1] > errors[2]
+    assert errors[2] < 2e-3
+    assert simulated.depth == pytest.approx(exact.depth, abs=1e-3)
+    assert simulated.normal_force == pytest.approx(4.0 / 3.0, rel=1e-3)
+
+
+def test_fast_rule_keeps_the_force_and_its_error_is_as_documented(worn):
+    """The rule itself: docs/wear.md."""
+    abscissa, weight = gauss(64)
+    for contact, exact in zip((fast_forced(PARABOLA, 0.455, n) for n in (0.0, 0.5, 2.0, 8.0)), worn, strict=False):
+        pieces = [
+            0.0,
+            0.455,
+            contact.stick_border,
+            *(contact.stick_border + (1 - contact.stick_border) * 0.3**k for k in (6, 4, 2, 1, 0)),
+        ]
+        load = sum(
+            (high - low) * weight @ (contact.depth - contact.image(low + (high - low) * abscissa))
+            for low, high in pairwise(pieces)
+        )
+        assert 2.0 * load == pytest.approx(4.0 / 3.0, rel=1e-3)
+        assert contact.depth == pytest.approx(exact.depth, abs=0.01)
+        assert contact.wear_volume == pytest.approx(exact.wear_volume, rel=0.06, abs=1e-9)
+
+
+def test_fast_rule_reaches_a_plateau_like_the_limit():
+    early, late = fast_forced(PARABOLA, 0.455, 200.0), fast_forced(PARABOLA, 0.455, 400.0)
+    assert early.wear_volume == pytest.approx(late.wear_volume, rel=1e-4)
+    force = 2.0 * (late.depth * late.stick_border - 0.455**3 / 3)
+    assert force > 4.0 / 3.0  # less what the annulus has frozen
+
+
+def test_table_of_a_parabola(worn):
+    r = np.linspace(0, 3, 301)
+    table = exact_forced(from_table(r, r**2 / 2, 1.0), 0.455, [2.0], tolerance=1e-3)[0]
+    assert table.wear_volume == pytest.approx(worn[2].wear_volume, rel=1e-3)
+    assert table.stick_border == pytest.approx(worn[2].stick_border, abs=1e-4)
+
+
+def test_a_table_that_ends_before_the_last_contact_is_refused():
+    r = np.linspace(0, 1.35, 136)
+    body = from_table(r, r**2 / 2, 0.9)
+    with pytest.raises(ValueError, match="the contact reaches beyond the table"):
+        exact_forced(body, 0.455, [0.1], tolerance=1e-3)
+    with pytest.raises(ValueError, match="the contact reaches beyond the table"):
+        limit_forced(body, 0.455, 1e-3)
+
+
+def test_gross_slip_is_refused():
+    with pytest.raises(ValueError, match="the stick radius must lie between 0 and 1"):
+        exact_forced(PARABOLA, 0.0, [1.0])
+
+
+def test_a_result_does_not_depend_on_what_else_was_asked_for():
+    alone = exact_forced(PARABOLA, 0.5, [1.3], tolerance=1e-3)[0]
+    among = exact_forced(PARABOLA, 0.5, [9.0, 1.3, 0.2], tolerance=1e-3)[1]
+    assert (alone.wear_volume, alone.error, alone.depth) == (among.wear_volume, among.error, among.depth)
+    np.testing.assert_array_equal(alone.height(RADII), among.height(RADII))
+
+
+def test_virgin_contact_is_unworn():
+    contact = exact_forced(PARABOLA, 0.455, [0.0], tolerance=1e-3)[0]
+    assert (contact.wear_volume, contact.stick_border) == (0.0, 0.455)
+    assert wear.limit(PARABOLA, 0.455).wear_volume < limit_forced(PARABOLA, 0.455, 1e-3).wear_volume

@@ -1,0 +1,122 @@
+"""Fretting wear over the whole range of its parameters: the limits, the fast rule, the exact evolution, and tables."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
+from mdr_dask.physics.wear import rules as wear_cases
+from mdr_dask.physics.wear import worn as wear
+from mdr_dask.physics.wear.exact import exact, gross
+from mdr_dask.physics.wear.forced import exact_forced, limit_forced
+from mdr_dask.physics.wear.forced_fast import fast_forced
+
+EXPONENTS = st.floats(0.3, 20.0)
+STICKS = st.floats(0.001, 0.999)
+#: N from a ten-thousandth of a cycle number that matters to far beyond the last.
+CYCLES = st.floats(-4.0, 4.0).map(lambda power: 10.0**power)
+
+
+@settings(max_examples=300, deadline=None)
+@given(EXPONENTS, STICKS, CYCLES, st.floats(0.3, 1.5))
+@example(20.0, 0.999, 1e4, 0.8)
+@example(0.3, 0.001, 1e-4, 0.8)
+def test_closed_forms(exponent, c, cycles, xi):
+    """Limit and fast rule are finite and ordered: 0 < V_fast <= V_limit, 1 <= scar <= a(c), force falls."""
+    radius, volume, force = (float(part) for part in wear_cases.limit_cases(exponent, c))
+    scar, worn, carried = (float(part) for part in wear_cases.fast_cases(exponent, c, cycles, xi, radius))
+    assert radius > 1.0
+    assert 1.0 <= scar <= radius * (1.0 + 1e-12)
+    assert -1e-12 <= worn <= volume * (1.0 + 1e-5) + 1e-12
+    assert force * (1.0 - 1e-5) - 3e-6 <= carried <= 2.0
+    assert volume <= np.pi * radius**2 * (1.0 - c**exponent)  # nowhere more than eta is worn off
+
+
+@settings(max_examples=12, deadline=None)
+@given(EXPONENTS, STICKS, CYCLES)
+@example(20.0, 0.999, 1e4)
+@example(0.3, 0.001, 1e4)
+@example(20.0, 0.001, 3.0)
+@example(0.3, 0.999, 3.0)
+@example(2.0, 0.001, 1e4)
+@example(1.0, 0.999, 1e-4)
+def test_exact_evolution(exponent, c, cycles):
+    """Volume and energy agree to the tolerance, f stays between the virgin body and the limit, a below a(c)."""
+    profile = PowerProfile(exponent)
+    worn = exact(profile, c, [cycles], tolerance=1e-3)[0]
+    limit = wear.limit(profile, c)
+    share = 0.03 * worn.energy_volume + 3e-3 * limit.wear_volume  # steps of 1e-3 eta, gathered
+    assert abs(worn.wear_volume - worn.energy_volume) <= share
+    assert 1.0 - 1e-9 <= worn.contact_radius <= limit.contact_radius * (1.0 + 2e-3)
+    assert worn.wear_volume <= limit.wear_volume * 1.003
+    assert limit.normal_force * (1.0 - 1e-3) - 1e-6 <= worn.normal_force <= 2.0
+    assert worn.error < 0.03
+    r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
+    assert np.all(worn.height(r) >= profile.height(r) - 1e-12)
+    if cycles > 100.0:
+        assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=3e-3)
+
+
+@settings(max_examples=3, deadline=None)
+@given(st.floats(0.7, 6.0), st.floats(0.05, 0.95), st.floats(0.1, 30.0))
+def test_tables_wear_as_their_formula(exponent, c, cycles):
+    """A table of 150 rows gives the power law back to the interpolation's error."""
+    r = 3.0 * np.linspace(0.0, 1.0, 151) ** 1.5
+    profile = PowerProfile(exponent)
+    table = from_table(r, profile.height(r), 1.0)
+    for method in (wear.limit, lambda body, stick: wear.fast(body, stick, cycles)):
+        formula, measured = method(profile, c), method(table, table.inside(c**exponent))
+        assert measured.wear_volume == pytest.approx(formula.wear_volume, rel=2e-3, abs=1e-6)
+        assert measured.contact_radius == pytest.approx(formula.contact_radius, abs=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [0.7, 1.0, 2.0, 5.0, 10.0])
+@pytest.mark.parametrize("constant_force", [False, True])
+def test_sliding(exponent, constant_force):
+    """The worn volume is the force times the path."""
+    for slid in gross(PowerProfile(exponent), [1e-3, 1.0, 30.0], constant_force=constant_force, tolerance=1e-3):
+        assert slid.wear_volume == pytest.approx(slid.force_path, rel=3e-3, abs=3e-3)
+        assert slid.contact_radius >= 1.0
+        assert np.all(np.isfinite(slid.pressure))
+
+
+@pytest.mark.parametrize(
+    ("exponent", "c"),
+    [
+        (0.3, 0.98),
+        (0.5, 0.1),
+        (1.0, 0.05),
+        (2.0, 0.05),
+        (2.0, 0.99),
+        (3.0, 0.2),
+        (5.0, 0.4),
+        (8.0, 0.5),
+        (20.0, 0.99),
+    ],
+)
+def test_constant_force(exponent, c):
+    """Force and energy are kept, f rises only, depth and border stay below those of the end; c^n >= 0.0025."""
+    profile, eta = PowerProfile(exponent), 1.0 - c**exponent
+    limit = limit_forced(profile, c, 1e-3)
+    for worn in exact_forced(profile, c, [1e-3, 3.0, 100.0], 1e-3):
+        assert worn.normal_force == pytest.approx(limit.normal_force, rel=2e-4)
+        assert worn.wear_volume == pytest.approx(worn.energy_volume, rel=0.01, abs=1e-3 * eta)
+        assert 1.0 - 1e-6 <= worn.depth <= limit.depth * (1.0 + 1e-3)
+        assert c <= worn.stick_border <= limit.stick_border * 1.0002
+        assert worn.wear_volume <= limit.wear_volume * 1.003
+        r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
+        assert np.all(worn.height(r) >= profile.height(r) - 1e-3 * eta)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.floats(0.3, 20.0), st.floats(0.01, 0.999), CYCLES, st.floats(0.3, 1.5))
+@example(20.0, 0.1, 1e4, 0.8)
+@example(0.3, 0.01, 1e4, 0.8)
+def test_fast_rule_under_constant_force(exponent, c, cycles, xi):
+    """Finite and ordered everywhere: the border moves outwards, the depth grows, the body loses material."""
+    worn = fast_forced(PowerProfile(exponent), c, cycles, xi)
+    assert np.isfinite(worn.wear_volume)
+    assert worn.wear_volume >= -1e-12
+    assert worn.depth >= 1.0
+    assert c <= worn.stick_border <= 1.0 <= worn.contact_radius
