@@ -1,7 +1,7 @@
 """Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own.
 
-An output may have a companion with its discretisation errors. Both errors of a mean are kept apart, as ``standard_error``
-(scatter of the realisations) and ``grid_error``, and joined in its interval.
+An output may have a companion with its discretisation errors. Both errors of a mean are kept apart, as
+``standard_error`` (scatter of the realisations) and ``grid_error``, and joined in its interval.
 """
 
 from __future__ import annotations
