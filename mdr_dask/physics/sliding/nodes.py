@@ -48,11 +48,10 @@ def _close(turn: FloatArray) -> None:
 
 
 @njit(nogil=True, cache=True, inline="always")
-def slope_square(s: FloatArray, i: int) -> float:
-    """Return the integral of the slope squared over a cell by Euler and Maclaurin, exact over a whole line."""
-    before, first, last, after = s[i - 1] * s[i - 1], s[i] * s[i], s[i + 1] * s[i + 1], s[i + 2] * s[i + 2]
-    square: float = 0.5 * (first + last) + (first + last - before - after) / 24
-    return square
+def bend(h: FloatArray, s: FloatArray, i: int) -> float:
+    """Return the second derivative at a node from heights and slopes around it, to fourth order."""
+    second: float = 2 * ((h[i + 1] - h[i]) - (h[i] - h[i - 1])) - 0.5 * (s[i + 1] - s[i - 1])
+    return second
 
 
 @njit(nogil=True, cache=True)
@@ -84,12 +83,15 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     for j in range(blocks.shape[0]):
         last = BEFORE + (j + 1) * BLOCK
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
+        b_before = bend(h, s, last - BLOCK)
         for i in range(last - BLOCK, last):
-            bend = s[i] - s[i + 1]
-            above = max(h[i], h[i + 1]) + 0.125 * max(bend, 0.0)
+            fall = s[i] - s[i + 1]
+            above = max(h[i], h[i + 1]) + 0.15 * max(fall, 0.0)
             peak, lowest, steepest = max(peak, above), min(lowest, h[i]), min(steepest, s[i])
-            heights += 0.5 * (h[i] + h[i + 1]) + bend / 12
-            squares += slope_square(s, i)
+            heights += 0.5 * (h[i] + h[i + 1]) + fall / 12
+            b = bend(h, s, i + 1)
+            squares += 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + (s[i] * b_before - s[i + 1] * b) / 6
+            b_before = b
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
     return Nodes(h, s, blocks, top)

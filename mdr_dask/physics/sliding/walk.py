@@ -12,6 +12,9 @@ from __future__ import annotations
 
 import math
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -27,8 +30,8 @@ from mdr_dask.physics.sliding.nodes import (
     SQUARES,
     STEEPEST,
     Nodes,
+    bend,
     refine,
-    slope_square,
 )
 
 LANES = 64  # cases that go along the line together
@@ -39,8 +42,156 @@ CLOSED = 1e-9  # relative difference of the displacement before and after a turn
 # What a sweep holds of a case, in this order: its state, sums, and what does not change
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(8)
 DEPTH, REACH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
-ROOM = 14
-STATES = DEPTH
+CALM, LEAVES, CREST, GAP, HELD, LEFT, TOUCHES, WAITED = range(14, 22)
+ROOM = 22
+STATES, MOVED = DEPTH, CALM
+ABOVE = 4 / 27
+
+_inlined = njit(nogil=True, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+
+
+@njit(nogil=True, cache=True, inline="always")
+def _fading(time: float) -> float:
+    """Return exp(-time), to 1e-4 up to 1 and small where it is small."""
+    y = time * 0.125
+    y = y if y < 1.0 else 1.0
+    e = 1.0 + y * (-1.0 + y * (0.5 - y * (1 / 6)))
+    e *= e
+    e *= e
+    return e * e
+
+
+class Cell(NamedTuple):
+    """The line in a cell: h + s x + a x^2 + b x^3, its end, its mean height, and the integral of its slope squared."""
+
+    h: float
+    s: float
+    a: float
+    b: float
+    h_end: float
+    s_end: float
+    mean: float
+    square: float
+
+
+@_inlined
+def _pass_cell(cell: Cell, above: float, room: FloatArray, count: int) -> tuple[int, int]:
+    """Take the cases over a cell that are in contact or in flight all along; return how many leave, and how many touch."""
+    leaving, touching = 0, 0
+    for k in range(count):
+        d, r, decay = room[DEPTH * LANES + k], room[REACH * LANES + k], room[DECAY * LANES + k]
+        u, fade, was = room[U * LANES + k], room[FADE * LANES + k], room[CONTACT * LANES + k] > 0
+        w, kept, lost = d + cell.h_end, decay * u, 1 - decay
+        stays = was & (w + r * cell.s_end > 0)
+        flies = (not was) & (d + above <= kept)
+        calm = stays | flies
+        leaving += 0 if calm | (not was) else 1
+        touching += 0 if calm | was else 1
+        load = r * lost * u if flies else 0.0
+        loss = 0.5 * lost * (1 + decay) * u * u if flies else 0.0
+        rate = r * lost * fade if flies else 0.0
+        room[LOAD * LANES + k] += cell.mean + d if stays else load
+        room[LOSS * LANES + k] += r * cell.square if stays else loss
+        room[RATE * LANES + k] += 1.0 if stays else rate
+        room[LENGTH * LANES + k] += 1.0 if stays else 0.0
+        room[STRETCH * LANES + k] += cell.square if stays else 0.0
+        then = kept if flies else u
+        room[U * LANES + k] = w if stays else then
+        faded = decay * fade if flies else fade
+        room[FADE * LANES + k] = 1.0 if stays else faded
+        room[CALM * LANES + k] = 1.0 if calm else 0.0
+    return leaving, touching
+
+
+@_inlined
+def _leave(cell: Cell, room: FloatArray, count: int) -> None:
+    """Write where cases leave whose force falls to 0 in a cell, or would if they touched before."""
+    s2, s3 = 2 * cell.a, 3 * cell.b
+    for k in range(count):
+        d, r, inverse = room[DEPTH * LANES + k], room[REACH * LANES + k], room[INVERSE * LANES + k]
+        u, was = room[U * LANES + k], room[CONTACT * LANES + k] > 0
+        w0 = d + cell.h
+        f0, f1 = w0 + r * cell.s, d + cell.h_end + r * cell.s_end
+        peaked, fall = (f0 > 0) & (f1 <= 0), 1 / (f0 - f1)
+        x = f0 * fall if peaked else 1.0
+        w, s = w0 + x * (cell.s + x * (cell.a + x * cell.b)), cell.s + x * (s2 + x * s3)
+        x += (w + r * s) * fall if peaked else 0.0
+        x = x if x > 0 else 0.0
+        x = x if x < 1 else 1.0
+        peak = w0 + x * (cell.s + x * (cell.a + x * cell.b))
+        gap = u * _fading(x * inverse) - peak
+        room[LEAVES * LANES + k], room[CREST * LANES + k], room[GAP * LANES + k] = x, peak, gap
+        room[HELD * LANES + k] = _fading((1 - x) * inverse)
+        room[LEFT * LANES + k] = 1.0 if peaked & (was | (gap < 0)) else 0.0
+
+
+@_inlined
+def _touch(cell: Cell, room: FloatArray, count: int) -> None:
+    """Write where cases in flight touch in a cell: a parabola through the gap at its ends, and one step of Newton."""
+    for k in range(count):
+        d, decay, inverse = room[DEPTH * LANES + k], room[DECAY * LANES + k], room[INVERSE * LANES + k]
+        u, left = room[U * LANES + k], room[LEFT * LANES + k] > 0
+        w0 = d + cell.h
+        last = room[LEAVES * LANES + k] if left else 1.0
+        gap, closing = u - w0, cell.s + u * inverse
+        closed = room[GAP * LANES + k] if left else decay * u - (d + cell.h_end)
+        bow = (gap - closing * last - closed) / (last * last + SMALL)
+        steep = math.sqrt(abs(closing * closing + 4 * gap * bow)) + SMALL
+        root = 2 * gap / (closing + steep)
+        root = root if root > 0 else 0.0
+        root = root if root < last else last
+        w, waited = w0 + root * (cell.s + root * (cell.a + root * cell.b)), _fading(root * inverse)
+        step = (u * waited - w) / steep
+        low, high = -0.5 * root, 0.5 * (last - root)
+        step = step if step > low else low
+        step = step if step < high else high
+        room[TOUCHES * LANES + k] = root + step
+        room[WAITED * LANES + k] = waited * max(1 - step * inverse, 0.0)
+
+
+@_inlined
+def _add(cell: Cell, room: FloatArray, count: int) -> None:
+    """Add what a cell gives to the cases that touch or leave in it."""
+    s2, s3 = 2 * cell.a, 3 * cell.b
+    for k in range(count):
+        d, r, decay = room[DEPTH * LANES + k], room[REACH * LANES + k], room[DECAY * LANES + k]
+        u, fade, was = room[U * LANES + k], room[FADE * LANES + k], room[CONTACT * LANES + k] > 0
+        calm = room[CALM * LANES + k] > 0
+        w0, w1, kept = d + cell.h, d + cell.h_end, decay * u
+        now = (w1 + r * cell.s_end > 0) & (was | (w1 >= kept))
+        left = (room[LEFT * LANES + k] > 0) & (not now)
+        touching = (not was) & (now | left)
+        contact = was | touching
+        start = room[TOUCHES * LANES + k] if touching else 0.0
+        leaves = room[LEAVES * LANES + k] if left else 0.0
+        stop = 1.0 if now else leaves
+        part, x = stop - start, 0.5 * (start + stop)
+        w_start = w0 + start * (cell.s + start * (cell.a + start * cell.b))
+        w_middle = w0 + x * (cell.s + x * (cell.a + x * cell.b))
+        w_stop = w1 if now else room[CREST * LANES + k]
+        s_start, s_middle = cell.s + start * (s2 + start * s3), cell.s + x * (s2 + x * s3)
+        s_stop = cell.s + stop * (s2 + stop * s3)
+        force = part / 6 * (w_start + 4 * w_middle + w_stop)
+        square = part / 6 * (s_start * s_start + 4 * s_middle * s_middle + s_stop * s_stop)
+        # in flight: what it forgets before it touches, and after it left
+        keeps = room[WAITED * LANES + k] if touching else 1.0
+        keeps = keeps if contact else decay
+        held = room[HELD * LANES + k] if left else 1.0
+        forgets, loses = 1 - keeps, 1 - held
+        load = force + r * (u * forgets + w_stop * loses)
+        loss = r * square + 0.5 * (u * u * forgets * (1 + keeps) + w_stop * w_stop * loses * (1 + held))
+        rate = part + r * (fade * forgets + loses)
+        room[LOAD * LANES + k] += 0.0 if calm else load
+        room[LOSS * LANES + k] += 0.0 if calm else loss
+        room[RATE * LANES + k] += 0.0 if calm else rate
+        room[LENGTH * LANES + k] += 0.0 if calm else part
+        room[STRETCH * LANES + k] += 0.0 if calm else square
+        then, faded = w_stop * held if contact else kept, held if contact else decay * fade
+        then, faded = w1 if now else then, 1.0 if now else faded
+        room[U * LANES + k] = u if calm else then
+        room[FADE * LANES + k] = fade if calm else faded
+        landed = 1.0 if now else 0.0
+        room[CONTACT * LANES + k] = room[CONTACT * LANES + k] if calm else landed
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -48,63 +199,17 @@ def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, room: Flo
     """Take cases from node to node; `room` holds row after row of `LANES`."""
     for i in range(first, end):
         h0, h1, s0, s1 = height[i], height[i + 1], slope[i], slope[i + 1]
-        bend = s1 - s0
-        mean, square = 0.5 * (h0 + h1) - bend / 12, slope_square(slope, i)
-        for k in range(count):
-            d, r, decay, inverse = (
-                room[DEPTH * LANES + k],
-                room[REACH * LANES + k],
-                room[DECAY * LANES + k],
-                room[INVERSE * LANES + k],
-            )
-            u, fade, was = room[U * LANES + k], room[FADE * LANES + k], room[CONTACT * LANES + k] > 0
-            w0, w1 = d + h0, d + h1
-            f0, f1 = w0 + r * s0, w1 + r * s1
-            # it leaves where the force falls to 0
-            falls = f1 < 0
-            peaked = (f0 > 0) & falls
-            leaves = f0 / (f0 - f1)
-            lead = w0 + (0.5 * leaves * f0 * inverse if peaked else 0.0)
-            higher = lead - u
-            top = lead if higher > 0 else u
-            free = decay * top
-            now = (w1 >= free) & (f1 > 0)
-            whole, lifted = was & now, (higher > 0) & (not was)
-            then = w1 if w1 > free else free
-            # it touches where the gap, a parabola, does, with the slope `steep`
-            below, q = u - w0, s0 + u * inverse
-            curve = 0.5 * bend if falls else w1 - decay * u + below - q
-            steep = math.sqrt(abs(q * q + 4 * below * curve))
-            touches = 2 * below / (q + steep + SMALL)
-            touches = touches if touches > 0 else 0.0
-            touches = touches if touches < 1 else 1.0
-            start = touches if now & (not was) else 0.0
-            stays = leaves if peaked else 1.0
-            stays = stays if was & (f0 > 0) else 0.0
-            stop = 1.0 if now else stays
-            lost = 1 - decay
-            s_start, s_stop = s0 + start * bend, s0 + stop * bend
-            f_start = f0 if was else u * (1 - start * lost) + r * s_start
-            f_stop = f1 if now else 0.0
-            part = stop - start
-            force = 0.5 * part * (f_start + f_stop)
-            work = part * (f_start * (2 * s_start + s_stop) + f_stop * (s_start + 2 * s_stop)) / 6
-            load = force + r * (u - then)
-            loss = work + 0.5 * (u - then) * (u + then)
-            load = r * lost * (u + 0.5 * higher) if lifted else load
-            loss = 0.5 * lost * (1 + decay) * u * u + r * higher * steep * (2 / 3) if lifted else loss
-            room[LOAD * LANES + k] += mean + d if whole else load
-            room[LOSS * LANES + k] += r * square if whole else loss
-            remembered = r * lost * ((1 - stop) if was else start * fade)
-            remembered = remembered if was | now else r * lost * fade
-            room[RATE * LANES + k] += 1.0 if whole else part + remembered
-            room[LENGTH * LANES + k] += part
-            squared = part * (s_start * s_start + s_start * s_stop + s_stop * s_stop) / 3
-            room[STRETCH * LANES + k] += square if whole else squared
-            after = decay if was | lifted else decay * fade
-            room[FADE * LANES + k] = 1.0 if now else after
-            room[U * LANES + k] = then
-            room[CONTACT * LANES + k] = 1.0 if now else 0.0
+        rise, fall = h1 - h0, s0 - s1
+        mean = 0.5 * (h0 + h1) + fall / 12
+        square = 0.5 * (s0 * s0 + s1 * s1) + (s0 * bend(height, slope, i) - s1 * bend(height, slope, i + 1)) / 6
+        cell = Cell(h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, h1, s1, mean, square)
+        leaving, touching = _pass_cell(cell, max(h0, h1) + ABOVE * (max(s0, 0.0) + max(-s1, 0.0)), room, count)
+        if leaving + touching == 0:
+            continue
+        _leave(cell, room, count)
+        if touching > 0:
+            _touch(cell, room, count)
+        _add(cell, room, count)
 
 
 @njit(nogil=True, cache=True)
@@ -148,7 +253,7 @@ def _pass_block(
 @njit(nogil=True, cache=True)
 def _move(source: FloatArray, target: FloatArray, queue: NDArray[np.int64], queued: int) -> None:
     """Bring the cases of a queue together."""
-    for row in range(ROOM):
+    for row in range(MOVED):
         for q in range(queued):
             target[row * LANES + q] = source[row * LANES + queue[q]]
 
@@ -181,10 +286,11 @@ def sweep(
     # the summit, where every case touches, lies in the cell before the first one
     refine(line, BEFORE - 1, 1, weights, local[0], local[1])
     for k in range(count):
-        room[U * LANES + k] = max(room[DEPTH * LANES + k] + line.height[BEFORE - 1], 0.0)
-        room[FADE * LANES + k] = room[CONTACT * LANES + k] = 1.0
+        w = room[DEPTH * LANES + k] + line.height[BEFORE - 1]
+        room[U * LANES + k], room[FADE * LANES + k] = max(w, 0.0), 1.0
+        room[CONTACT * LANES + k] = 1.0 if w > 0 and w + room[REACH * LANES + k] / refinement * line.slope[BEFORE - 1] > 0 else 0.0
     _walk(local[0], local[1], 1, 1 + refinement, room, full)
-    room[BEGAN * LANES : ROOM * LANES] = room[U * LANES : FADE * LANES]
+    room[BEGAN * LANES : MOVED * LANES] = room[U * LANES : FADE * LANES]
     room[LOAD * LANES : STATES * LANES] = 0.0
     for j in range(blocks.shape[0]):
         first, end = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
