@@ -107,14 +107,17 @@ class Task:
     ) -> Steady:
         """Solve the cases on a grid, beginning near a solution on another one."""
         from mdr_dask.physics.sliding import steady as sliding
+        from mdr_dask.physics.surfaces.cubic_line import indented_line, periodic_line
+        from mdr_dask.physics.surfaces.shapes import PowerLaw
 
         height, slope = nodes
+        slopes = slope if scheme == "hermite" else None
+        body = PowerLaw(self.line.coefficient, self.line.exponent)
+        line = indented_line(height, slopes, body) if self.line.coefficient else periodic_line(height, slopes)
+        if scheme == "backward_euler":
+            return sliding.stepped_sliding(line, self.reaches, self.loads, self.contact)
         guesses = None if near is None else near.depth
-        cases = (self.reaches, self.loads, scheme, self.contact, guesses, close)
-        coefficient, exponent = self.line.coefficient, self.line.exponent
-        if coefficient == 0:
-            return sliding.steady_sliding(height, slope, *cases)
-        return sliding.steady_indenter(height, slope, coefficient, exponent, *cases)
+        return sliding.steady_sliding(line, self.reaches, self.loads, guesses, close)
 
     def on_grid(self, oversampling: int) -> Steady:
         """Solve the cases on one grid, without an estimate of the error."""
