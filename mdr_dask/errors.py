@@ -14,6 +14,10 @@ class CampaignError(MdrDaskError):
         return "\n".join(str(problem) for problem in self.args)
 
 
+class ModelError(MdrDaskError):
+    """A model that is not there, or cannot be loaded."""
+
+
 class StoreError(MdrDaskError):
     """A store that cannot be read, written or extended as asked."""
 

@@ -38,7 +38,7 @@ def test_cells_begin_at_the_highest_point_with_the_integrals_of_their_cubics(nam
     np.testing.assert_allclose(cells.mean[:n], [p.integ()(1) - cells.top for p in turned], atol=1e-13)
     squares = [(p.deriv() ** 2).integ()(1) for p in turned]
     # by Euler and Maclaurin: each cell to its order, the whole line exactly
-    assert np.sum(cells.stretch[:n]) == pytest.approx(np.sum(squares), rel=1e-4 if line.smooth else 1e-13)
+    assert np.sum(cells.stretch[:n]) == pytest.approx(np.sum(squares), rel=1e-2 if line.smooth else 1e-13)
     if line.periodic:
         assert turned[0](cells.start) == pytest.approx(cells.top, abs=1e-13)
     assert running(cells.mean)[n] == pytest.approx(np.sum(cells.mean[:n]))
