@@ -1,4 +1,4 @@
-"""The ledger of the thesis: every claim, our figure for it, and the verdict; ``python -m benchmarks.thesis [LINES]``."""
+"""The thesis, claim by claim: our figure for each, and the verdict; ``python -m benchmarks.thesis [LINES]``."""
 
 from benchmarks.thesis import chapter_2, chapter_3
 from benchmarks.thesis.ledger import Claim, Studies, Verdict, page

@@ -40,7 +40,7 @@ def _regions(studies: Studies) -> Found:
     """Find region I, the plateau and its decay at a light load."""
     mu, _, velocity = _numbers(studies("friction_force")[""])
     light = mu.isel(normal_force=4)
-    start = power(velocity.to_numpy()[:3], light.to_numpy()[:3])
+    start = power(*(x.isel(normal_force=4, velocity=slice(3)).to_numpy() for x in (velocity, mu)))
     top, last = float(light.max()), float(light[-1])
     figure = f"mu ~ v^{start:.2f} at first, largest mu/slope {top:.2f}, {last:.2f} at the highest speed"
     return Found(figure, Verdict.HOLDS if abs(start - 1) < 0.05 and last < 0.95 * top else Verdict.FAILS)
@@ -49,15 +49,13 @@ def _regions(studies: Studies) -> Found:
 def _transition(studies: Studies) -> Found:
     """Measure how wide region II is: from 90 % of the line of region I to 90 % of the plateau."""
     mu, _, velocity = _numbers(studies("friction_force")[""])
-    heavy = mu.sel(normal_force=1.5, method="nearest").to_numpy()
-    speed = velocity.to_numpy()
-    leaves = np.interp(-0.9, -heavy / (heavy[0] / speed[0] * speed), np.log10(speed))
-    arrives = np.interp(
-        0.9 * heavy.max(), np.maximum.accumulate(heavy[: heavy.argmax() + 1]), np.log10(speed)[: heavy.argmax() + 1]
-    )
-    decades = arrives - leaves
-    ratio = 0.9 * heavy.max() / np.interp(leaves, np.log10(speed), heavy)
-    return judged(f"{decades:.1f} decades, mu rises by a factor {ratio:.1f} in it", abs(decades - 1), 0.3, 0.7)
+    heavy, speed = (x.sel(normal_force=1.5, method="nearest").to_numpy() for x in (mu, np.log10(velocity)))
+    below_line = heavy[0] * 10 ** (speed - speed[0]) / heavy
+    leaves = np.interp(1 / 0.9, np.maximum.accumulate(below_line), speed)
+    arrives = np.interp(0.9 * heavy.max(), np.maximum.accumulate(heavy), speed)
+    rise = 0.9 * heavy.max() / np.interp(leaves, speed, heavy)
+    figure = f"{arrives - leaves:.1f} decades, mu rises by a factor {rise:.1f} in it"
+    return judged(figure, abs(arrives - leaves - 1), 0.3, 0.7)
 
 
 def _alpha(studies: Studies) -> Found:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import tempfile
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import NamedTuple
@@ -54,23 +55,27 @@ class Studies:
     points: int | None = None
     folder: str = field(default_factory=tempfile.mkdtemp)
 
-    def __call__(self, name: str, **replaced: str) -> dict[str, xr.Dataset]:
-        """Return the series of a campaign, with some of its lines `key: value` replaced."""
+    def __call__(self, name: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
+        """Return the series of a campaign, all or those named, with some of its lines `key: value` replaced."""
         text = (CAMPAIGNS / f"{name}.yaml").read_text()
         wanted = int(found[1]) if (found := re.search(r"^realisations: (\d+)", text, flags=re.M)) else 1
         replaced = {"realisations": str(min(self.lines, wanted)), **replaced}
         if self.points:
             text = re.sub(r"\bpoints: 5000\b", f"points: {self.points}", text)
         for key, value in replaced.items():
-            text, count = re.subn(rf"^(\s*){key}: [^#\n]*", rf"\g<1>{key}: {value}", text, count=1, flags=re.M)
+            text, count = re.subn(rf"^(\s*){key}: [^#\n]*", rf"\g<1>{key}: {value} ", text, count=1, flags=re.M)
             assert count == 1, f"{name} has no line {key}"
-        url = str(Path(self.folder, f"{name}-{abs(hash(text)):x}.zarr"))
-        run(loads(text, f"{name}.yaml", str(CAMPAIGNS)), url, Resources(), lambda _: None)
+        campaign = loads(text, f"{name}.yaml", str(CAMPAIGNS))
+        if series:
+            campaign = replace(campaign, series=tuple(one for one in campaign.series if one.name in series))
+        digest = hashlib.sha256(f"{text}{series}".encode()).hexdigest()[:12]
+        url = str(Path(self.folder, f"{name}-{digest}.zarr"))
+        run(campaign, url, Resources(), lambda _: None)
         return datasets(url)
 
-    def fit(self, name: str, law: str, **replaced: str) -> dict[str, xr.Dataset]:
+    def fit(self, name: str, law: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
         """Return the constants that a law has on a campaign, by series."""
-        groups = self(name, **replaced)
+        groups = self(name, series, **replaced)
         model = next(iter(groups.values())).attrs["model"]
         return available(model)[law].results(groups)
 
@@ -127,9 +132,7 @@ def page(chapters: Iterable[tuple[str, Iterable[Claim]]], studies: Studies) -> s
     """Return the ledger as Markdown."""
     parts = []
     for title, claims in chapters:
-        parts.append(
-            f"## {title}\n\n| item | claim | our figure | verdict | why | command |\n|---|---|---|---|---|---|"
-        )
+        parts.append(f"## {title}\n\n| item | claim | our figure | verdict | why | command |\n|{'---|' * 6}")
         for claim in claims:
             found = claim.judge(studies)
             command = f"`{claim.command}`" if claim.command else ""
