@@ -9,13 +9,13 @@ PAGE = Path(__file__).parents[2] / "docs" / "thesis.md"
 HEAD = """\
 # The thesis, claim by claim
 
-Q. Li, *Simulation and Modeling of ... with the Method of Dimensionality Reduction* stands behind every model here. Each row below is one
-claim, law, figure or table of it: what it says, what is found here, and whether it holds. Figures with an interval (95 %) are from
-{lines} rough lines, unless the campaign has fewer. Made by `python -m benchmarks.thesis {lines}`; a test makes every figure again on a
-reduced study and fails if a verdict changes.
+Q. Li's dissertation stands behind every model here. Each row below is one claim, law, figure or table of it: what
+it says, what is found here, and whether it holds. Figures with an interval (95 %) are from {lines} rough lines, unless
+the campaign has fewer. Made by `python -m benchmarks.thesis {lines}`; a test makes every figure again on a reduced
+study and fails if a verdict changes.
 
-Verdicts: **holds**; **holds within** the miss given; **does not hold**; **no data**: the thesis shows measurements that are
-not public; **not modelled**.
+Verdicts: **holds**; **holds within** the miss given; **does not hold**; **no data**: the thesis shows measurements that
+are not public; **not modelled**.
 
 """
 

@@ -195,7 +195,8 @@ CLAIMS = (
         "slopes in contact are not those of the whole line.",
     ),
     Claim(
-        "(3.17)-(3.20), fig. 3.8", "One interpolation law for regions I to III", FIT.format("friction_force", "interpolation"),
+        "(3.17)-(3.20), fig. 3.8", "One interpolation law for regions I to III",
+        FIT.format("friction_force", "interpolation"),
         _interpolation, "Largest errors stand in region II.",
     ),
     Claim(
@@ -205,11 +206,13 @@ CLAIMS = (
         "Steep cones and barely touching bodies leave the law; the figure marks them.",
     ),
     Claim(
-        "(3.36), (3.40), fig. 3.15", "The exponent 1.5 fits all parameter sets", FIT.format("scirep2014_cone", "indenter"),
+        "(3.36), (3.40), fig. 3.15", "The exponent 1.5 fits all parameter sets",
+        FIT.format("scirep2014_cone", "indenter"),
         _indenter, "It rises with H.",
     ),
     Claim(
-        "(3.41)-(3.44)", "Curves over force at several speeds are pieces of one curve", RUN.format("force_master_curve"),
+        "(3.41)-(3.44)", "Curves over force at several speeds are pieces of one curve",
+        RUN.format("force_master_curve"),
         told(Verdict.HOLDS, "see docs/master-curves.md"), "For a rough sphere, its own bulk hysteresis taken off.",
     ),
     Claim(
