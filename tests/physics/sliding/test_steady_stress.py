@@ -56,8 +56,7 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
 )
 def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, reach, load, scheme):
     amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
-    lines = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    height, slope = (np.append(line, line[0]) for line in lines)
+    height, slope = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
     numbers = (10**coefficient, exponent, np.array([10**reach]), np.array([10**load]), scheme)
     steady = under_indenter(height, slope, *numbers)
     assert steady.status[0] in (sliding.CONVERGED, sliding.OUTSIDE_LINE)
