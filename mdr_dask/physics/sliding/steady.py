@@ -135,11 +135,11 @@ def _solve(
     depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
     and so the answer does not depend on the `trail` that the search follows.
     """
-    low, high = 0.0, np.inf
+    low, high, unwritten = 0.0, np.inf, np.empty(0)
     depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums)
+        sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
@@ -185,7 +185,7 @@ def _states(
     """
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK + 1)
-    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
+    sums, trail, first, unwritten = np.empty(SUMS), np.zeros(4), np.zeros(4), np.empty(0)
     deborah = -1.0
     first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
     for k in range(loads.size):
@@ -198,7 +198,7 @@ def _states(
         if guesses[k] > 0:
             trail[:] = math.log(guesses[k]), math.log(loads[k]), 0.7, 0.0
             if close > 0:
-                sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums)
+                sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
         if not converged:
             depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
