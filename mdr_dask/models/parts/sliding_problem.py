@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Setting:
-    """What cases share that are solved together: the line and the arms of the solid, without units."""
+    """What cases share that are solved together: the line and the arms of the solid (None of Kelvin), without units."""
 
     roughness: Roughness
     body: Shape | None
-    arms: Arms
+    arms: Arms | None
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def _lines(block: Block[Any], faults: dict[int, str]) -> tuple[list[Roughness], 
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any]]:
-    """Return static modulus, viscosity over it, and the arms (moduli over it, times) of every case."""
+    """Return static modulus, viscosity over it, and the arms (moduli over it, times) of every case, None of Kelvin."""
     static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
     arms: list[Any] = [None] * block.cases
     for j, material in enumerate(each(block, "material")):
@@ -131,7 +131,8 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
                 faults[j] = str(problem)
                 continue
             static[j], viscosity[j] = solid.static_modulus, solid.viscosity / solid.static_modulus
-            arms[j] = (solid.moduli / solid.static_modulus, solid.times) if solid.times.size else None
+            is_kelvin = solid.times.size == 0 and solid.viscosity > 0
+            arms[j] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
     return static, viscosity, arms
 
 
@@ -147,11 +148,10 @@ def _settings(
     """Return what the cases share, in units of length and height."""
     from mdr_dask.physics.sliding.problem import Arms
 
-    none = Arms()
     indenters = [indenter.line() for indenter in each(block, "indenter")]
     settings = []
     for j, (line, body) in enumerate(zip(roughness, indenters, strict=True)):
-        scaled, travelling = body, none
+        scaled, travelling = body, None
         if body is not None and j not in faults:
             scaled = body.scaled(length[j], height[j])
             scaled = replace(scaled, **{name: float(canonical(number)) for name, number in vars(scaled).items()})

@@ -176,7 +176,7 @@ def _seconds_of_line(
 ) -> float:
     """Estimate the time of some cases on one line."""
     points, auto = setting.roughness.points, oversampling == "auto"
-    if setting.arms.moduli:
+    if setting.arms is not None:
         grid = 2 * COARSEST if auto else int(oversampling)
         return solves * (GENERAL + (NODE_ARM * (len(setting.arms.moduli) + 1) + NODE_GENERAL) * points * grid)
     if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):

@@ -52,7 +52,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Arms:
-    """The relaxing arms of a solid as a line passes: G_m / G_inf and tau_m v / L; none of a Kelvin solid."""
+    """The relaxing arms of a solid as a line passes: G_m / G_inf and tau_m v / L."""
 
     moduli: tuple[float, ...] = ()
     deborah: tuple[float, ...] = ()
@@ -83,15 +83,15 @@ class Aim:
     with_errors: bool = True
 
 
-def solve(line: Line, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
+def solve(line: Line, arms: Arms | None, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
     """Return the steady states of a solid that slides over a line, and their absolute discretisation errors.
 
     Parameters
     ----------
     line : Line
         What it slides over.
-    arms : Arms
-        Of the solid.
+    arms : Arms or None
+        Of the solid; None for a Kelvin solid.
     deborah : array, shape (cases,)
         eta v / (G_inf L) of the dashpot: the Deborah number v tau / L of a Kelvin solid.
     loads : array, shape (cases,)
@@ -99,12 +99,11 @@ def solve(line: Line, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: A
     aim : Aim
         What is wanted.
     """
-    is_kelvin = not arms.moduli and bool(np.all(deborah > 0))
-    is_smooth = not np.any(line.roughness.coefficients)
-    if is_kelvin and is_smooth and (line.body is None or isinstance(line.body, PowerLaw)):
-        return _closed_form(line.body, deborah, loads)
-    if not is_kelvin:
+    if arms is not None:
         return _general(line, arms, deborah, loads, aim)
+    is_smooth = not np.any(line.roughness.coefficients)
+    if is_smooth and (line.body is None or isinstance(line.body, PowerLaw)):
+        return _closed_form(line.body, deborah, loads)
     ladder = Ladder(line, aim.scheme, deborah, loads, aim.columns)
     if aim.oversampling == "auto":
         return ladder.to_accuracy(aim.accuracy)

@@ -4,7 +4,7 @@ from schemes import under_indenter
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import shapes as indenter
 
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
@@ -66,7 +66,7 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     load = np.full(13, 0.02)
     steady = under_indenter(np.zeros(nodes), np.zeros(nodes), coefficient, exponent, reach, load)
     exact = solve(load, reach, coefficient, exponent)
-    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.status == Outcome.CONVERGED)
     # cubic cells hold a cone and a parabola exactly; a quartic to the fourth order
     assert steady.drag == pytest.approx(exact[indenter.DRAG], rel=1e-6)
     assert steady.depth == pytest.approx(exact[indenter.DEPTH], rel=1e-6)
@@ -89,7 +89,7 @@ def test_other_schemes_tend_to_the_closed_form(scheme):
 def test_a_contact_that_leaves_the_line_fails(scheme):
     zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
     steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
-    assert steady.status.tolist() == [sliding.CONVERGED, sliding.OUTSIDE_LINE, sliding.OUTSIDE_LINE]
+    assert steady.status.tolist() == [Outcome.CONVERGED, Outcome.OUTSIDE_LINE, Outcome.OUTSIDE_LINE]
 
 
 def test_low_velocity_gives_the_law():
