@@ -45,7 +45,7 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 @njit(nogil=True, cache=True)
-def _barrier(
+def write_barriers(
     height: FloatArray,
     enter: FloatArray,
     leave: FloatArray,
@@ -81,7 +81,7 @@ def _decayed(x: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
+def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return where w + deborah w' falls through 0 first between start and 1, or `NONE`."""
     # the force is a cubic itself, cut into its monotone pieces
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
@@ -153,10 +153,10 @@ def _touch(
     """
     for _ in range(3):
         force = w0 + low * (a + low * (b + low * c)) + deborah * (a + low * (2 * b + low * 3 * c))
-        first = low if force > 0 else _leaving(-w0, -a, -b, -c, deborah, low)
+        first = low if force > 0 else leaving(-w0, -a, -b, -c, deborah, low)
         if first >= stop:
             return NONE
-        high = min(_leaving(w0, a, b, c, deborah, first), stop)
+        high = min(leaving(w0, a, b, c, deborah, first), stop)
         if w0 + high * (a + high * (b + high * c)) > u - u * _decayed((high - start) / deborah):
             return _touching(w0, a, b, c, deborah, u, start, first, high)
         if high >= stop:
@@ -219,8 +219,10 @@ def sweep(
     deborah: float,
     depth: float,
     sums: FloatArray,
-) -> None:
-    """Follow an element once along the line.
+    touches: FloatArray,
+    leaves: FloatArray,
+) -> int:
+    """Follow an element once along the line; return how many patches it touches.
 
     Parameters
     ----------
@@ -237,6 +239,8 @@ def sweep(
         Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
         depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a line
         that is not periodic.
+    touches, leaves : array, shape (m,)
+        Written, as far as there is room: where each patch begins and ends, in cells.
     """
     # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
     height, enter, leave, peak, mean, stretches = (
@@ -251,7 +255,9 @@ def sweep(
     n, blocks, start = mean.size - 1, block_peak.size, cells.start
     decay, block_decay = np.exp(-1 / deborah), np.exp(-BLOCK / deborah)
     area = rate = drag = drag_rate = length = stretch = 0.0
-    i, x, contact = 0, start, cells.periodic
+    i, x, contact, patches = 0, start, cells.periodic, 0
+    if contact and touches.size > 0:
+        touches[0] = start
     # displacement where the contact was left and at the start of this cell; place of leaving
     u = free = left = 0.0
     # the turn ends in a part of a cell that repeats the first, at the highest point again
@@ -260,7 +266,7 @@ def sweep(
         if contact and x == 0:
             while i < n:
                 if math.isnan(block_barriers[i // BLOCK]):
-                    _barrier(height, enter, leave, deborah, i // BLOCK, barriers, block_barriers)
+                    write_barriers(height, enter, leave, deborah, i // BLOCK, barriers, block_barriers)
                 if not barriers[i] < depth:
                     break
                 if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
@@ -284,7 +290,7 @@ def sweep(
         while True:
             if contact:
                 pressed = w0 + x * (c1 + x * (c2 + x * c3)) + deborah * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
-                place = _leaving(w0, c1, c2, c3, deborah, x) if pressed else x
+                place = leaving(w0, c1, c2, c3, deborah, x) if pressed else x
                 end = min(place, stop)
                 part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
                 area += part
@@ -294,6 +300,9 @@ def sweep(
                 if place >= stop:
                     break
                 contact, left, x = False, i + place, place
+                if patches < leaves.size:
+                    leaves[patches] = left
+                patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
             # a force that is a cubic falls through 0 twice at most
             low = x + CLOSE if visits > 0 else x
@@ -304,6 +313,8 @@ def sweep(
             flight = _landed(u, i + touch - left, deborah, c1 + touch * (2 * c2 + touch * 3 * c3))
             area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
             contact, x = True, touch
+            if patches < touches.size:
+                touches[patches] = i + touch
         x = 0.0
         i += 1
     # the last flight: to the highest point, or without end
@@ -319,3 +330,24 @@ def sweep(
     sums[LENGTH] = length
     sums[STRETCH] = stretch
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
+    if not (cells.periodic or contact):
+        return patches
+    # a turn ends on the highest point, which an element that is still free touches at that very point
+    if patches < leaves.size:
+        touches[patches], leaves[patches] = touches[patches] if contact else n + start, n + start
+    return patches + 1
+
+
+@njit(nogil=True, cache=True)
+def patches_at(
+    cells: Cells, every: Blocks, deborah: float, depth: float, sums: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where each patch of the stationary state at a depth begins and ends, and write its sums; see `sweep`."""
+    n = cells.mean.size - 1
+    barriers, block_barriers = np.empty(n), np.full(n // BLOCK + 1, np.nan)
+    touches, leaves = np.empty(n // 8 + 2), np.empty(n // 8 + 2)
+    count = sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+    if count > touches.size:
+        touches, leaves = np.empty(count), np.empty(count)
+        sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+    return touches[:count], leaves[:count]
