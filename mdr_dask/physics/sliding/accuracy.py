@@ -33,7 +33,7 @@ class Settings(NamedTuple):
     of_a_peak: float = 0.1  # the error of that, times the oversampling squared
     restart: int = 4  # oversampling of the cubic cells that take over
     sampled: int = 2  # oversampling of a line that cases go along from node to node
-    refinements: tuple[int, ...] = (1, 2, 4, 8, 16, 32, 64, 128, 256)  # of the cells of half the width
+    refinements: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128, 256, 512)  # of its cells, where they are touched
     quickest: float = 1e-4  # accuracy that needs more than going from node to node
     # from node to node, for every column: of the last change between grids, of the one before it over that, and of the
     # largest relative change of any column but the depth
@@ -44,7 +44,7 @@ class Settings(NamedTuple):
     few: int = 5  # nodes in contact that are too few to go from node to node
     # of the profile between nodes, under the lightest contacts: relative errors, and of the depth in rms heights
     profile: tuple[float, ...] = (5e-5, 1e-7, 5e-5, 5e-5)
-    hope: int = 2  # refinement from which on a grid without a solution ends the way from node to node
+    hope: int = 4  # refinement from which on a grid without a solution ends the way from node to node
     roughly: float = 0.5  # of the accuracy, that the search for the depth may leave on the second grid
     trusted: float = 0.1  # and on finer ones
 
@@ -187,23 +187,21 @@ class Ladder:
         left = np.flatnonzero(sliding.valid(self.deborah, self.loads))
         height, slope = self._nodes(settings.sampled)
         cases = self.deborah[left], self.loads[left]
-        coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
+        line, coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
         before = np.zeros((len(COLUMNS), left.size))
-        for refinement in settings.refinements:
+        for refinement in (1, *settings.refinements):
+            if refinement > 1:
+                cases = self.deborah[left], self.loads[left]
+                grids, trusted = (coarse, fine), settings.trusted * accuracy
+                coarse, fine = fine, vectorised.settle(line, refinement, *cases, grids, trusted)
             found, change = fine.steady(), _changes(coarse, fine)
-            touching = fine.contact_fraction * self.line.points * 2 * refinement
+            touching = fine.contact_fraction * self.line.points * settings.sampled * refinement
             known = _sampled_errors(found, touching, change, before, fine.doubts)
             steady, errors = steady.replaced(left, found), errors.replaced(left, known)
             still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
-            left, before = left[still], change[:, still]
-            if not left.size or refinement == settings.refinements[-1]:
+            left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
+            if not left.size:
                 break
-            coarse, fine = coarse.only(still), fine.only(still)
-            cases = self.deborah[left], self.loads[left]
-            if refinement == settings.refinements[0]:
-                line = vectorised.finer(height, slope)
-            grid = vectorised.settle(line, refinement, *cases, (coarse, fine), settings.trusted * accuracy)
-            coarse, fine = fine, grid
         return steady, errors
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, Errors]:

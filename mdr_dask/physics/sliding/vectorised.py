@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, halved, nodes, summit, weights
+from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, nodes, summit, weights
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
@@ -174,8 +174,8 @@ def _solve(
 
 def begin(
     height: FloatArray, slope: FloatArray, deborah: FloatArray, loads: FloatArray, trusted: float
-) -> tuple[Sampled, Sampled]:
-    """Return the steady states on every other node of a periodic line, found roughly, and on all of them.
+) -> tuple[Nodes, Sampled, Sampled]:
+    """Return a periodic line from its summit on, and the steady states on every other node of it and on all of them.
 
     Parameters
     ----------
@@ -187,27 +187,19 @@ def begin(
     trusted : float
         Relative error of the drag on all nodes that the search may leave.
     """
-    strides = [1, 2]
+    strides = [2]
     while height.size > SETTINGS.coarsening * SETTINGS.coarsest * strides[-1]:
         strides.append(strides[-1] * SETTINGS.coarsening)
     depths, results = _shallow(loads), np.empty((loads.size, RESULTS))
     rates = np.full((loads.size, SECANTS), np.nan)
-    highest = int(np.argmax(height))
-    found = []
+    highest, cases = int(np.argmax(height)), (deborah, loads)
     for stride in reversed(strides):
-        line = nodes(height, slope, highest, stride, stride <= strides[1])
-        bounds = (SETTINGS.answer_step, trusted) if stride == 1 else SETTINGS.start
-        _solve(line, weights(1), 0.0, deborah, loads, *bounds, SETTINGS, depths, rates, results)
-        if stride <= strides[1]:
-            found.append(_sampled(line.top, depths, rates.copy(), results))
-    return found[0], found[1]
-
-
-def finer(height: FloatArray, slope: FloatArray) -> Nodes:
-    """Return the line that :func:`begin` was given on cells of half the width, from its summit on."""
-    height, slope = halved(height, slope)
+        line = nodes(height, slope, highest, stride, stride == strides[0])
+        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, SETTINGS, depths, rates, results)
+    coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
-    return nodes(height, slope, (cell + 1) % height.size, 1, True)
+    line = nodes(height, slope, (cell + 1) % height.size, 1, True)
+    return line, coarse, _settled(line, 1, cases, coarse.depth, rates, trusted)
 
 
 def settle(
@@ -218,12 +210,12 @@ def settle(
     grids: tuple[Sampled, Sampled],
     trusted: float,
 ) -> Sampled:
-    """Return the steady states on a line, or on a finer grid where it is touched.
+    """Return the steady states on a grid that is finer where the line is touched.
 
     Parameters
     ----------
     line : Nodes
-        The line that :func:`begin` was given, from :func:`finer`.
+        From :func:`begin`.
     refinement : int
         Cells of the finer grid for each of the line.
     deborah, loads : array, shape (cases,)
@@ -235,14 +227,26 @@ def settle(
     """
     coarse, fine = grids
     ahead = SETTINGS.ahead * (fine.depth - coarse.depth)
+    top = line.top + summit(line)
+    depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
+    return _settled(line, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
+
+
+def _settled(
+    line: Nodes,
+    refinement: int,
+    cases: tuple[FloatArray, FloatArray],
+    depths: FloatArray,
+    rates: FloatArray,
+    trusted: float,
+) -> Sampled:
+    """Return the steady states on a grid, searched for from some depths of the mean line on."""
     rise = summit(line)
-    depths = fine.depth + (line.top + rise)
-    depths += np.where(np.abs(ahead) < SETTINGS.near * depths, ahead, 0.0)
-    depths = np.where(depths > 0, depths, _shallow(loads))
-    rates, results = fine.rates.copy(), np.empty((loads.size, RESULTS))
+    top, results = line.top + rise, np.empty((depths.size, RESULTS))
+    depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
     bounds = SETTINGS.answer_step, trusted
-    _solve(line, weights(refinement), rise, deborah, loads, *bounds, SETTINGS, depths, rates, results)
-    return _sampled(line.top + rise, depths, rates, results)
+    _solve(line, weights(refinement), rise, *cases, *bounds, SETTINGS, depths, rates, results)
+    return _sampled(top, depths, rates, results)
 
 
 def _shallow(loads: FloatArray) -> FloatArray:

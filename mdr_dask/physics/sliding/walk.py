@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.sliding.nodes import (
+    ABOVE,
     AFTER,
     BEFORE,
     BLOCK,
@@ -28,7 +29,7 @@ from mdr_dask.physics.sliding.nodes import (
     SQUARES,
     STEEPEST,
     Nodes,
-    bend,
+    end_term,
     refine,
 )
 
@@ -43,7 +44,6 @@ DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
 CALM, LEAVES, CREST, GAP, HELD, LEFT, TOUCHES, WAITED = range(14, 22)
 ROWS = 22
 STATES, MOVED = DEPTH, CALM
-ABOVE = 4 / 27
 
 _inlined = njit(nogil=True, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
 
@@ -77,16 +77,17 @@ class Cell(NamedTuple):
 
 @_inlined
 def _pass_cell(cell: Cell, above: float, workspace: FloatArray, count: int) -> tuple[int, int]:
-    """Take cases over a cell that are in contact or in flight all along; return how many leave, and how many touch."""
+    """Take cases over a cell that are in contact or in flight all along; return how many may leave, and may touch."""
     leaving, touching = 0, 0
     for k in range(count):
         d, r, decay = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[DECAY * LANES + k]
         u, fade, was = workspace[U * LANES + k], workspace[FADE * LANES + k], workspace[CONTACT * LANES + k] > 0
         w, kept, lost = d + cell.h_end, decay * u, 1 - decay
-        stays = was & (w + r * cell.s_end > 0)
+        force = w + r * cell.s_end
+        stays = was & (force > 0)
         flies = (not was) & (d + above <= kept)
         calm = stays | flies
-        leaving += 0 if calm | (not was) else 1
+        leaving += 0 if calm | (force > 0) else 1
         touching += 0 if calm | was else 1
         load = r * lost * u if flies else 0.0
         loss = 0.5 * lost * (1 + decay) * u * u if flies else 0.0
@@ -100,7 +101,7 @@ def _pass_cell(cell: Cell, above: float, workspace: FloatArray, count: int) -> t
         workspace[U * LANES + k] = w if stays else then
         faded = decay * fade if flies else fade
         workspace[FADE * LANES + k] = 1.0 if stays else faded
-        workspace[CALM * LANES + k] = 1.0 if calm else 0.0
+        workspace[CALM * LANES + k], workspace[LEFT * LANES + k] = 1.0 if calm else 0.0, 0.0
     return leaving, touching
 
 
@@ -118,18 +119,12 @@ def _leave(cell: Cell, workspace: FloatArray, count: int) -> None:
         f0 = f0 if f0 > 0 else d + cell.h_summit
         peaked, fall = (f0 > 0) & (f1 <= 0), (1 - begins) / (f0 - f1)
         x = begins + f0 * fall if peaked else 1.0
-        # two steps of Newton with one tangent: in slow sliding a small error of the place is a large one of the loss
         w, s = w0 + x * (cell.s + x * (cell.a + x * cell.b)), cell.s + x * (s2 + x * s3)
         tangent = s + r * (s2 + 2 * s3 * x)
         tangent = -1 / tangent if tangent * fall < -0.5 else fall
         x += (w + r * s) * tangent if peaked else 0.0
         x = x if x > begins else begins
         x = x if x < 1 else 1.0
-        w, s = w0 + x * (cell.s + x * (cell.a + x * cell.b)), cell.s + x * (s2 + x * s3)
-        step = (w + r * s) * tangent
-        step = step if x + step > begins else begins - x
-        step = step if x + step < 1 else 1 - x
-        x += step if peaked else 0.0
         peak = w0 + x * (cell.s + x * (cell.a + x * cell.b))
         peak = peak if peak < r * cell.steepest else r * cell.steepest
         peak = peak if peak > 0 else 0.0
@@ -211,11 +206,13 @@ def _add(cell: Cell, workspace: FloatArray, count: int) -> None:
 @njit(nogil=True, cache=True, error_model="numpy")
 def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, workspace: FloatArray, count: int) -> None:
     """Take cases from node to node; `workspace` holds row after row of `LANES`."""
+    term = end_term(height, slope, first)
     for i in range(first, end):
         h0, h1, s0, s1 = height[i], height[i + 1], slope[i], slope[i + 1]
         rise, fall = h1 - h0, s0 - s1
         mean = 0.5 * (h0 + h1) + fall / 12
-        square = 0.5 * (s0 * s0 + s1 * s1) + (s0 * bend(height, slope, i) - s1 * bend(height, slope, i + 1)) / 6
+        next_term = end_term(height, slope, i + 1)
+        square, term = 0.5 * (s0 * s0 + s1 * s1) + term - next_term, next_term
         a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
         summit = s0 / fall if (s0 > 0) & (s1 < 0) else 0.0
         h_summit = h0 + summit * (s0 + summit * (a + summit * b))
@@ -224,7 +221,8 @@ def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, workspace
         leaving, touching = _pass_cell(cell, max(h0, h1) + ABOVE * (max(s0, 0.0) + max(-s1, 0.0)), workspace, count)
         if leaving + touching == 0:
             continue
-        _leave(cell, workspace, count)
+        if leaving > 0:
+            _leave(cell, workspace, count)
         if touching > 0:
             _touch(cell, workspace, count)
         _add(cell, workspace, count)
