@@ -36,14 +36,16 @@ class Settings(NamedTuple):
     refinements: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128, 256, 512)  # of its cells, where they are touched
     quickest: float = 1e-4  # accuracy that needs more than going from node to node
     # from node to node, for every column: of the last change between grids, of the one before it over that, and of the
-    # largest relative change of any column but the depth
-    of_change: tuple[float, ...] = (0.1, 0.1, 0.2, 0.2)
+    # largest relative change of any column but the depth (of the depth in rms heights)
+    of_change: tuple[float, ...] = (0.07, 0.2, 0.2, 0.2)
     of_change_before: float = 0.1
-    of_any_change: tuple[float, ...] = (0.03, 0.0, 0.2, 0.2)
-    averaged: float = 1000.0  # nodes whose errors are an average: fewer of them are trusted less
+    of_any_change: tuple[float, ...] = (0.02, 0.01, 0.2, 0.2)
+    averaged: float = 800.0  # nodes whose errors are an average: fewer of them are trusted less
+    by_chance: float = 0.3  # over the nodes in contact: what agrees on the first two grids by chance
     few: int = 5  # nodes in contact that are too few to go from node to node
     # of the profile between nodes, under the lightest contacts: relative errors, and of the depth in rms heights
-    profile: tuple[float, ...] = (5e-5, 1e-7, 5e-5, 5e-5)
+    profile: tuple[float, ...] = (5e-5, 1e-6, 5e-5, 5e-5)
+    lightest: float = 0.1  # Nyquist points in contact for which that is twice as large
     hope: int = 4  # refinement from which on a grid without a solution ends the way from node to node
     roughly: float = 0.5  # of the accuracy, that the search for the depth may leave on the second grid
     trusted: float = 0.1  # and on finer ones
@@ -195,8 +197,9 @@ class Ladder:
                 grids, trusted = (coarse, fine), settings.trusted * accuracy
                 coarse, fine = fine, vectorised.settle(line, refinement, *cases, grids, trusted)
             found, change = fine.steady(), _changes(coarse, fine)
-            touching = fine.contact_fraction * self.line.points * settings.sampled * refinement
-            known = _sampled_errors(found, touching, change, before, fine.doubts)
+            touched = fine.contact_fraction * self.line.points
+            errors_now = _sampled_errors(found, touched, settings.sampled * refinement, change, before)
+            known = Errors(*(errors_now + np.nan_to_num(fine.doubts)))
             steady, errors = steady.replaced(left, found), errors.replaced(left, known)
             still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
             left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
@@ -255,24 +258,26 @@ def _changes(coarse: Any, fine: Any) -> FloatArray:
 
 
 def _sampled_errors(
-    steady: Steady, touching: FloatArray, change: FloatArray, before: FloatArray, doubts: FloatArray
-) -> Errors:
+    steady: Steady, touched: FloatArray, oversampling: int, change: FloatArray, before: FloatArray
+) -> FloatArray:
     """Return the errors of the finer of two grids from the changes of the columns, infinite if too few nodes touch.
 
     Two grids may agree by chance: hardly in all columns, hardly twice, and hardly where many nodes touch, or for the
-    contact where many do not.
+    contact where many do not. `touched` is how many Nyquist points are in contact.
     """
     settings = SETTINGS
     of_change, of_any, profile = (
         np.array(factors)[:, None] for factors in (settings.of_change, settings.of_any_change, settings.profile)
     )
     sizes = np.array([steady.drag, np.ones(steady.drag.size), steady.contact_fraction, steady.contact_slope])
+    touching = touched * oversampling
     with np.errstate(all="ignore"):
         apart = np.clip(touching * (1 / steady.contact_fraction - 1), settings.few, touching)
         nodes = np.array([touching, touching, apart, apart])
         any_change = np.max((change / sizes)[[0, 2, 3]], axis=0)
-        errors = np.maximum(
-            of_change * np.maximum(change, settings.of_change_before * before), of_any * any_change * sizes
-        )
-        errors = errors * (1 + np.sqrt(settings.averaged / nodes)) + profile * sizes + doubts
-    return Errors(*np.where((touching > settings.few) & np.isfinite(errors), errors, np.inf))
+        errors = np.maximum(of_change * change, of_change * settings.of_change_before * before)
+        errors = np.maximum(errors, of_any * any_change * sizes) * (1 + np.sqrt(settings.averaged / nodes))
+        if oversampling == settings.sampled:
+            errors[[0, 2, 3]] = np.maximum(errors, settings.by_chance / nodes * sizes)[[0, 2, 3]]
+        errors += profile * (1 + settings.lightest / touched) * sizes
+    return np.where((touching > settings.few) & np.isfinite(errors), errors, np.inf)

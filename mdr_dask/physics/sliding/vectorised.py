@@ -46,6 +46,7 @@ class Settings(NamedTuple):
     ahead: float = 0.06  # of the change of the depth between two grids, where the search on the next one begins
     near: float = 0.3  # how far off that may be
     doubted: float = 0.1  # of the last step of a column, which is taken along its secant
+    doubted_rate: float = 3e-3  # of the last step of the depth, which is taken along the tangent
     exact_step: float = 1e-12
     rounding: float = 3e-12
 
@@ -163,7 +164,9 @@ def _solve(
                     for j in range(SECANTS):
                         results[case, j] = now[j] * (1 + rate[j] * step)
                         results[case, DOUBTS + j] = settings.doubted * abs(rate[j] * step) + settings.rounding
-                    results[case, DOUBT_OF_DEPTH] = 0.5 * size * abs(step) + settings.rounding * depth
+                    results[case, DOUBT_OF_DEPTH] = (settings.doubted_rate + 0.5 * size) * abs(
+                        step
+                    ) + settings.rounding * depth
                     continue
                 ahead = depth + step if step > -0.7 * depth else 0.3 * depth
                 last_step[kept], last[kept], lanes[kept] = ahead - depth, now, case
