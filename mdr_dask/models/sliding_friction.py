@@ -15,7 +15,7 @@ from mdr_dask.models.base import Block, Model, Output, Result, Status, canonical
 from mdr_dask.models.parts import general_sliding
 from mdr_dask.models.parts.indenter import Plane
 from mdr_dask.models.parts.material import fit_notes
-from mdr_dask.models.parts.rough_line import FINEST, Line, Task
+from mdr_dask.models.parts.rough_line import Line, Realisation
 from mdr_dask.models.parts.sliding_body import SlidingBody
 
 if TYPE_CHECKING:
@@ -46,6 +46,14 @@ class SlidingFriction(SlidingBody):
         return self.material is not None or self.profile is not None
 
 
+#: Outputs, and the column of a steady state that each is.
+COLUMNS = {
+    "friction_coefficient": "drag",
+    "indentation_depth": "depth",
+    "contact_fraction": "contact_fraction",
+    "contact_slope": "contact_slope",
+    "discretisation_error": "drag",
+}
 OUTPUTS = (
     Output("friction_coefficient", "1", "coefficient of friction"),
     Output("indentation_depth", "m", "penetration of the mean line into the undeformed body"),
@@ -227,19 +235,21 @@ class _Group:
 
     def solve(self, r: int, realisation: int, answer: _Answer) -> None:
         """Solve the cases in one realisation, the r-th of the block."""
+        from mdr_dask.physics.sliding.accuracy import Errors, Ladder
         from mdr_dask.physics.surfaces import roughness
 
         block = answer.block
         turned = roughness.turns(block.seed, realisation, self.line.points // 2)
-        contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
-        task = Task(self.line, turned, self.scheme, self.reaches, self.loads, contact)
+        columns = [column for output, column in COLUMNS.items() if output in block.outputs]
+        ladder = Ladder(Realisation(self.line, turned), self.scheme, self.reaches, self.loads, columns)
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
         if self.oversampling == "auto":
-            steady, error = task.to_accuracy(accuracy)
+            steady, errors = ladder.to_accuracy(accuracy)
         elif "discretisation_error" in block.outputs:
-            steady, error = task.with_error(int(self.oversampling))
+            steady, errors = ladder.with_errors(int(self.oversampling))
         else:
-            steady, error = task.on_grid(int(self.oversampling)), np.full(self.loads.size, np.nan)
+            steady, errors = ladder.on_grid(int(self.oversampling)), Errors.unknown(self.loads.size)
+        error = errors.drag / steady.drag
         answer.solves += self.loads.size
         which = self.which
         found = {
@@ -311,12 +321,15 @@ def seconds(block: Block[SlidingFriction]) -> float:
     if block.parameters.is_general:
         general = dict.fromkeys(_general_cases(block))
         return sum(general_sliding.seconds(case) for case in general) * len(block.realisations)
+    from mdr_dask.physics.sliding.accuracy import goes_from_node_to_node
+
     cases = _cases(block)
     total = 1e-4
     for (line, oversampling, scheme), members in cases.groups():
         numbers = np.stack([cases.reaches[members], cases.loads[members]])
         solves = np.unique(numbers, axis=1).shape[1]
-        if oversampling == "auto" and scheme == "hermite" and line.sampled(block.accuracy or ACCURACY):
+        auto = oversampling == "auto" and scheme == "hermite"
+        if auto and goes_from_node_to_node(line.coefficient, block.accuracy or ACCURACY):
             total += len(block.realisations) * line.points * (POINT_LINE + solves * POINT_SAMPLED)
             continue
         grid = 4 if oversampling == "auto" else int(oversampling)
@@ -329,7 +342,9 @@ def seconds(block: Block[SlidingFriction]) -> float:
 
 def memory(block: Block[SlidingFriction]) -> float:
     """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
-    grid = [2 * (FINEST if value == "auto" else int(value)) for value in block.column("oversampling")]
+    from mdr_dask.physics.sliding.accuracy import SETTINGS
+
+    grid = [2 * (SETTINGS.finest if value == "auto" else int(value)) for value in block.column("oversampling")]
     return float(np.max(np.array(grid) * _number(block, "points")) * 8 * ARRAYS)
 
 

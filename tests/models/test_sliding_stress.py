@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdr_dask.campaign.units import to_si
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.solids import complex_modulus, prony
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.units import to_si
 
 ALL = tuple(output.name for output in MODEL.outputs)
 LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7}

@@ -11,6 +11,7 @@ from scipy.interpolate import Akima1DInterpolator
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.sliding.steady import INVALID as STEADY_INVALID
 from mdr_dask.physics.sliding.steady import steady_sliding
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.march import Pace, march
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -165,7 +166,7 @@ def velocity_jumps(
     if not np.all(np.isfinite(height)):
         return [_failed(times, INVALID)] * loads.size
     every = 2 if height.size >= LONG_LINE and height.size % 2 == 0 else 1
-    steady = steady_sliding(height[::every], slope[::every], reaches.ravel(), np.repeat(loads, 2), contact=False)
+    steady = steady_sliding(periodic_line(height[::every], slope[::every]), reaches.ravel(), np.repeat(loads, 2))
     depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
     profile, top = cubic_profile(height, slope)
     equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from schemes import on_line
 
 from mdr_dask.physics import solids as rheology
-from mdr_dask.physics.sliding.steady import steady_sliding
 from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients.element import Foundation
@@ -144,7 +144,7 @@ def test_kelvin_ends_in_the_direct_steady_state_at_second_order() -> None:
     for oversampling in (8, 32):
         height, slope = rough(oversampling)
         _, found = jump(closed_line(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
-        steady = steady_sliding(height, slope, np.array([0.12]), np.array([0.3]))
+        steady = on_line(height, slope, np.array([0.12]), np.array([0.3]))
         errors.append(abs(found.drag[-1] / steady.drag[0] - 1))
     assert errors[0] < 6e-3
     assert errors[1] < errors[0] / 8
