@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Dimensions that outputs have of their own, for data without a status.
 OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
+#: Points of a curve from which on they have no markers.
+MANY_POINTS = 60
 #: Line styles that tell a second parameter apart.
 MOST_STYLES = len(style.LINES)
 
@@ -107,7 +109,10 @@ def meaning_of_bars(*groups: xr.Dataset, outputs: Sequence[str]) -> str:
 
 
 def with_outputs(
-    groups: Mapping[str, xr.Dataset], outputs: Sequence[str], *varied: str, where: Callable[[xr.Dataset], bool] | None = None
+    groups: Mapping[str, xr.Dataset],
+    outputs: Sequence[str],
+    *varied: str,
+    where: Callable[[xr.Dataset], bool] | None = None,
 ) -> dict[str, xr.Dataset]:
     """Return the series that hold outputs and vary along parameters.
 
@@ -229,26 +234,30 @@ def family(data: xr.Dataset, output: str, along: str, by: Sequence[str] = (), st
     sizes = {dim: data.sizes[dim] for dim in others}
     told: list[str] = []
     if int(np.prod(list(sizes.values()), dtype=int)) > len(style.COLOURS):
-        shown = _most_shown(sizes, by, styled)
-        data, told = hold(data, [dim for dim in others if dim not in shown])
-        others = shown
+        kept = _most_shown(sizes, by, styled)
+        data, told = hold(data, [dim for dim in others if dim not in kept])
+        others = kept
     together = parameters_along(data, over) if over else [along]
     joined = over is not None and len(together) == 1 and data.sizes[over] > 1
     curves, heading, bar = _split(data, others, joined)
     varying = [name for dim in (over, others[0] if bar else None) if dim for name in parameters_along(data, dim)]
     shown = {along, over, bar[0] if bar else None}
-    return Family(curves, joined, heading, bar, scalars(data), told, tuple(name for name in varying if name not in shown))
+    return Family(
+        curves, joined, heading, bar, scalars(data), told, tuple(name for name in varying if name not in shown)
+    )
 
 
 def _most_shown(sizes: Mapping[str, int], by: Sequence[str], styled: bool) -> list[str]:
-    """Return the axis for the colours, and perhaps one for line styles: those that show most, of these the preferred."""
+    """Return the axis for the colours, and perhaps one for line styles: those that show most, preferred ones first."""
     wanted = [dim for dim in by if sizes.get(dim, 1) > 1]
     ranked = [*wanted, *(dim for dim in sizes if dim not in wanted and sizes[dim] > 1)]
     choices = [[dim] for dim in ranked]
     if styled:
         pairs = [[one, two] for one in ranked for two in ranked if two != one and sizes[two] <= MOST_STYLES]
         choices = pairs or choices
-    return max(choices, key=lambda dims: np.prod([sizes[dim] for dim in dims]) if not wanted or wanted[0] in dims else 0)
+    return max(
+        choices, key=lambda dims: np.prod([sizes[dim] for dim in dims]) if not wanted or wanted[0] in dims else 0
+    )
 
 
 def _split(
@@ -286,7 +295,9 @@ def _split(
 def _names(part: xr.Dataset, dims: Sequence[str | None]) -> Iterator[str]:
     """Yield how the parameters along some axes are written, for one curve."""
     for dim in dims:
-        here = [str(name) for name, value in part.coords.items() if value.ndim == 0 and name in (dim, *_along(part, dim))]
+        here = [
+            str(name) for name, value in part.coords.items() if value.ndim == 0 and name in (dim, *_along(part, dim))
+        ]
         yield ", ".join(style.named(name, part[name]) for name in here) or str(dim)
 
 
@@ -299,11 +310,6 @@ def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
     return {str(name): value for name, value in data.coords.items() if value.ndim == 0}
 
 
-def at(data: xr.Dataset, one: Family) -> xr.Dataset:
-    """Return a series with the parameters that a family holds, for the title."""
-    return data.drop_vars([name for name in one.held if name in data.coords]).assign_coords(one.held)
-
-
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
     """Return a series with at most so many values along an axis, spread evenly, and what is left out."""
     size = data.sizes[dim]
@@ -311,7 +317,9 @@ def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:
         return data, []
     chosen = np.unique(np.linspace(0, size - 1, most).round().astype(int))
     names = " and ".join(parameters_along(data, dim))
-    return data.isel({dim: chosen}), [f"{size - chosen.size} of {size} values of {names} ({chosen.size} drawn, spread evenly)"]
+    return data.isel({dim: chosen}), [
+        f"{size - chosen.size} of {size} values of {names} ({chosen.size} drawn, spread evenly)"
+    ]
 
 
 def fixed_text(held: Mapping[str, xr.DataArray], names: Sequence[str]) -> str:
@@ -330,7 +338,10 @@ def fixed_by_all(held: Sequence[Mapping[str, xr.DataArray]]) -> dict[str, xr.Dat
     return {
         name: value
         for name, value in first.items()
-        if all(name in each and np.array_equal(each[name].values, value.values, equal_nan=value.dtype.kind == "f") for each in held)
+        if all(
+            name in each and np.array_equal(each[name].values, value.values, equal_nan=value.dtype.kind == "f")
+            for each in held
+        )
     }
 
 
@@ -341,30 +352,43 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
 
 
 def draw(axes: Axes, curve: Curve, x: Any, y: Mean, bars: bool = False) -> None:
-    """Draw a curve with its band, or with bars."""
+    """Draw a curve with its band, or with bars; points that belong on no line have bars."""
     across, value, low, high = (_flat(each) for each in (x, y.value, y.low, y.high))
     order = np.argsort(across, kind="stable")
     across, value, low, high = across[order], value[order], low[order], high[order]
-    size = 3 if value.size < 60 else 0
-    marker = curve.marker if size or not curve.line else ""
-    (line,) = axes.plot(
-        across,
-        value,
-        linestyle=curve.line or "none",
-        marker=marker,
-        **{"ms": size or 3, "lw": 1.2, "color": curve.colour, "label": curve.label or None},
-    )
-    line.set_gid(style.DATA)
-    known = np.isfinite(low) & np.isfinite(high)
-    if not known.any():
+    few = value.size < MANY_POINTS
+    marker, size = curve.marker if few or not curve.line else "", 3
+    look: dict[str, Any] = {"ms": size, "lw": 1.2, "color": curve.colour, "label": curve.label or None}
+    axes.plot(across, value, linestyle=curve.line or "none", marker=marker, gid=style.DATA, **look)
+    if not np.isfinite(low).any():
         return
     if bars or not curve.line:
-        ends = np.clip([value - low, high - value], 0, None)
-        container = axes.errorbar(across, value, np.where(known, ends, 0.0), fmt="none", ecolor=curve.colour, elinewidth=0.8, capsize=2)
-        container.lines[2][0].set_gid(style.DATA)
+        _draw_bars(axes, across, value, _lengths(value, low, high), curve.colour)
         return
-    band = axes.fill_between(across, low, high, color=curve.colour, alpha=0.25, linewidth=0)
-    band.set_gid(style.DATA)
+    axes.fill_between(across, low, high, color=curve.colour, alpha=0.25, linewidth=0, gid=style.BAND)
+
+
+def scatter(
+    axes: Axes, x: Any, y: Mean, colour: Any, marker: str, label: str | None, along: Mean | None = None
+) -> None:
+    """Draw points with their bars, upwards and perhaps sideways."""
+    across, value = _flat(x), _flat(y.value)
+    axes.plot(across, value, marker, ms=4, color=colour, label=label, gid=style.DATA)
+    _draw_bars(axes, across, value, _lengths(value, _flat(y.low), _flat(y.high)), colour)
+    if along is not None:
+        sideways = _lengths(across, _flat(along.low), _flat(along.high))
+        axes.errorbar(across, value, xerr=sideways, fmt="none", ecolor=colour, elinewidth=0.6)
+
+
+def _lengths(value: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the lengths of bars down and up, 0 where they are not known."""
+    lengths: FloatArray = np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
+    return lengths
+
+
+def _draw_bars(axes: Axes, x: FloatArray, y: FloatArray, lengths: FloatArray, colour: Any) -> None:
+    bars = axes.errorbar(x, y, lengths, fmt="none", ecolor=colour, elinewidth=0.8, capsize=2)
+    bars.lines[2][0].set_gid(style.BAND)
 
 
 def _flat(values: Any) -> FloatArray:
@@ -385,7 +409,9 @@ def finish(figure: Figure, axes: Axes, one: Family) -> None:
     style.legend(axes, one.heading)
 
 
-def results(compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset], groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+def results(
+    compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset], groups: Mapping[str, xr.Dataset]
+) -> dict[str, xr.Dataset]:
     """Return what a fit finds for each series that has the data for it, with every parameter as a coordinate.
 
     Raises
@@ -414,4 +440,6 @@ def with_coordinates(found: xr.Dataset, data: xr.Dataset) -> xr.Dataset:
         for name, value in data.coords.items()
         if name not in found.coords and name not in found.variables and name not in dims and set(value.dims) <= dims
     }
-    return found.assign_coords(missing).assign_attrs(axes=data.attrs.get("axes", []), parameters=data.attrs.get("parameters", "{}"))
+    return found.assign_coords(missing).assign_attrs(
+        axes=data.attrs.get("axes", []), parameters=data.attrs.get("parameters", "{}")
+    )

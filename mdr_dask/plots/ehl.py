@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -124,7 +124,13 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
             expected = formula(W, U, G)
             inside = np.array([not formula.outside(*case) for case in zip(W, U, G, strict=True)])
             marker = "os^Dv"[index % 5]
-            look = {"marker": marker, "linestyle": "", "color": style.COLOURS[index % 7], "gid": style.DATA, "ms": 4}
+            look: dict[str, Any] = {
+                "marker": marker,
+                "linestyle": "",
+                "color": style.COLOURS[index % 7],
+                "gid": style.DATA,
+                "ms": 4,
+            }
             label = name or "film"
             axes.plot(expected[inside], films[inside] / expected[inside], label=label, **look)
             if not inside.all():
@@ -217,7 +223,9 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _draw_along(groups: Mapping[str, xr.Dataset], along: str, outputs: tuple[str, ...], ylabel: str, subject: str) -> Figure:
+def _draw_along(
+    groups: Mapping[str, xr.Dataset], along: str, outputs: tuple[str, ...], ylabel: str, subject: str
+) -> Figure:
     """Draw outputs along one parameter, a panel for each series."""
     found, told = curves.few(_with(groups, outputs, along))
     figure, panels = style.panels(len(found))
@@ -283,7 +291,9 @@ def draw_traction(groups: Mapping[str, xr.Dataset]) -> Figure:
 PLOTS: tuple[Plot, ...] = (
     Plot("film_profile", MODELS, "film and pressure against the position (thesis figure B.3)", draw_profile),
     Plot("film_formula", MODELS, "films found against the formulas of Pan and Hamrock", draw_formula),
-    Plot("film_regimes", MODELS, "minimum film against load in Moes' numbers, with the isoviscous limits", draw_regimes),
+    Plot(
+        "film_regimes", MODELS, "minimum film against load in Moes' numbers, with the isoviscous limits", draw_regimes
+    ),
     Plot("regime_map", MODELS, "the four regimes by name over Moes' numbers, and the films in them", draw_regime_map),
     Plot("starvation", MODELS, "central and minimum film against the position of the inlet", draw_starvation),
     Plot("traction", MODELS, "traction coefficient against the slide-roll ratio", draw_traction),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -276,7 +275,9 @@ def draw_zone_one(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def draw_plateau(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the plateau against the Hurst exponent (figure 3.11)."""
-    row = _Panel("plateau", r"largest $\mu$ / rms slope", lambda hurst: np.full_like(hurst, np.sqrt(2)), "√2 (eq. 3.15)")
+    row = _Panel(
+        "plateau", r"largest $\mu$ / rms slope", lambda hurst: np.full_like(hurst, np.sqrt(2)), "√2 (eq. 3.15)"
+    )
     return _against_hurst("plateau", groups, "plateau of friction", (row,))
 
 
@@ -287,7 +288,9 @@ def _indenter_points(data: xr.Dataset) -> dict[str, np.ndarray]:
     within = within_indenter_law(data, slope)
     columns = xr.broadcast(indenter_xi(data, slope), *value, within)
     names = ("xi", "value", "low", "high", "within")
-    return {name: np.asarray(column.values, dtype=np.float64).ravel() for name, column in zip(names, columns, strict=True)}
+    return {
+        name: np.asarray(column.values, dtype=np.float64).ravel() for name, column in zip(names, columns, strict=True)
+    }
 
 
 def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -306,13 +309,11 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
         known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
         within = known & (one["within"] > 0)
         inside += int(within.sum())
-        axes.plot(one["xi"][known & ~within], one["value"][known & ~within], ".", ms=2, color="0.8", zorder=1)
-        bars = np.clip([one["value"] - one["low"], one["high"] - one["value"]], 0, None)[:, within]
-        drawn = axes.errorbar(
-            *(one["xi"][within], one["value"][within], np.nan_to_num(bars)),
-            **{"fmt": "o", "ms": 3, "lw": 0.8, "color": colour, "label": name or "simulated"},
+        axes.plot(
+            one["xi"][known & ~within], one["value"][known & ~within], ".", ms=2, color="0.8", zorder=1, gid=style.DATA
         )
-        drawn.lines[0].set_gid(style.DATA)
+        value = curves.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
+        curves.scatter(axes, one["xi"][within], value, colour, "o", name or "simulated")
     spans = [one["xi"][np.isfinite(one["xi"]) & (one["xi"] > 0)] for one in points.values()]
     span = np.concatenate(spans)
     if not span.size:
@@ -335,36 +336,42 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw length and slope of the contact against the load, with F^(1 / (1 + H)) (eq. 3.12, 3.21)."""
-    found = curves.with_outputs(groups, ["contact_fraction", "contact_slope"], "normal_force", where=is_plane)
+    found = curves.with_outputs(groups, GROWTH, "normal_force", where=is_plane)
     found, told = curves.few(found, 3)
     figure, panels = style.panels(2 * len(found), columns=2)
     families = []
-    for number, (name, data) in enumerate(found.items()):
-        part = data[[n for n in data if n in ("contact_fraction", "contact_slope", "status", "rms_slope")]]
-        slope = spectral_slope(part)
-        for axes, output, factor in zip(
-            panels[2 * number : 2 * number + 2], ("contact_fraction", "contact_slope"), (1.0, 1 / slope), strict=True
-        ):
-            one = curves.family(part.assign({output: part[output] * factor}), output, "normal_force", ("hurst", "velocity"))
-            for curve in one.curves:
-                number_of_force = laws.force_number(
-                    *(curve.data[key] for key in ("normal_force", "shear_modulus", "rms_roughness", "length"))
-                )
-                value = curves.mean(curve.data[output])
-                curves.draw(axes, curve, number_of_force, value)
-                if output == "contact_fraction" and one.joined:
-                    _draw_growth(axes, curve, number_of_force.values, value.value.values)
-            axes.set_xlabel(r"force number $F_N / (G h L)$")
-            axes.set_ylabel("contact length / L" if factor is not slope and output == "contact_fraction" else "slope in contact / rms slope")
-            style.logarithmic(axes, "xy" if output == "contact_fraction" else "x")
-            curves.finish(figure, axes, one)
+    for k, (name, data) in enumerate(found.items()):
+        for axes, output in zip(panels[2 * k : 2 * k + 2], GROWTH, strict=True):
+            one = curves.family(data, output, "normal_force", ("hurst", "velocity"))
             families.append(one)
+            for curve in one.curves:
+                _draw_contact(axes, curve, output, one.joined)
+            style.logarithmic(axes, "xy" if output == GROWTH[0] else "x")
+            curves.finish(figure, axes, one)
         told += [f"{name}: {each}" if name else each for each in families[-1].left_out]
-    bars = curves.meaning_of_bars(*found.values(), outputs=["contact_fraction"])
-    names = [name for name in found for _ in range(2)]
-    _titles(figure, panels, names, families, r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load", bars)
+    bars = curves.meaning_of_bars(*found.values(), outputs=GROWTH)
+    names = [name for name in found for _ in GROWTH]
+    subject = r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load"
+    _titles(figure, panels, names, families, subject, bars)
     style.leave_out(figure, told)
     return figure
+
+
+GROWTH = ("contact_fraction", "contact_slope")
+
+
+def _draw_contact(axes: Axes, curve: curves.Curve, output: str, joined: bool) -> None:
+    """Draw length or slope of the contact of one family's curve against the force number."""
+    data = curve.data
+    keys = ("normal_force", "shear_modulus", "rms_roughness", "length")
+    force = laws.force_number(*(data[key] for key in keys))
+    is_length = output == GROWTH[0]
+    value = curves.measured(data, output, 1.0 if is_length else 1 / spectral_slope(data))
+    curves.draw(axes, curve, force, value)
+    axes.set_xlabel("force number $F_N / (G h L)$")
+    axes.set_ylabel("contact length / L" if is_length else "rms slope in contact / rms slope")
+    if is_length and joined:
+        _draw_growth(axes, curve, np.asarray(force.values), np.asarray(value.value.values))
 
 
 def _draw_growth(axes: Axes, curve: curves.Curve, force: Any, fraction: Any) -> None:
@@ -383,9 +390,9 @@ def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
     points = []
     for data in found.values():
         one = _small(data)
-        ratio, force, velocity = numbers(one)
-        crossover = laws.crossover(force, laws.alpha(one["hurst"]), laws.BETA)
-        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], force)
+        ratio, number, velocity = numbers(one)
+        crossover = laws.crossover(number, laws.alpha(one["hurst"]), laws.BETA)
+        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], number)
         points.append([np.asarray(column.values, dtype=np.float64).ravel() for column in columns])
     x, y, hurst, force = (np.concatenate(column) for column in zip(*points, strict=True))
     known = np.isfinite(y) & (y > 0)
@@ -420,6 +427,11 @@ PLOTS: tuple[Plot, ...] = (
     Plot("zone_one", MODELS, "alpha and beta against the Hurst exponent (Fig. 3.10)", draw_zone_one),
     Plot("plateau", MODELS, "plateau of friction against the Hurst exponent (Fig. 3.11)", draw_plateau),
     Plot("collapse", MODELS, "all friction of planes on the scales of the general law (eq. 3.22, 3.23)", draw_collapse),
-    Plot("contact_growth", MODELS, "length and slope of the contact against the load (eq. 3.12, 3.21)", draw_contact_growth),
+    Plot(
+        "contact_growth",
+        MODELS,
+        "length and slope of the contact against the load (eq. 3.12, 3.21)",
+        draw_contact_growth,
+    ),
     Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", draw_indenter),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -47,9 +47,9 @@ def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, x
     return {best: groups[best]}, [f"series {', '.join(rest)}"] if rest else []
 
 
-def _title(figure: Figure, subject: str, found: xr.Dataset, name: str) -> None:
+def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str) -> None:
     text = subject + (f", series {name}" if name else "")
-    style.title(figure, text, curves.fixed_text(curves.scalars(found), HELD), INTERVALS)
+    style.title(figure, text, curves.fixed_text(held, HELD), INTERVALS)
 
 
 def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -72,26 +72,26 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
         style.logarithmic(axes, "xy")
     panels[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
     curves.finish(figure, panels[1], family)
-    _title(figure, "friction before the jump, and the jump", curves.at(found, family), name)
+    _title(figure, "friction before the jump, and the jump", family.held, name)
     style.leave_out(figure, [*family.left_out, *told])
     return figure
 
 
-class _Cases:
+class _Cases(NamedTuple):
     """The cases of a series with one Hurst exponent."""
 
-    def __init__(self, hurst: float, colour: Any, data: xr.Dataset) -> None:
-        self.hurst, self.colour, self.data = hurst, colour, data
+    hurst: float
+    colour: Any
+    data: xr.Dataset
 
     def column(self, name: str) -> FloatArray:
         """Return one number for every case."""
         return np.ravel(np.asarray(self.data[name].values, dtype=np.float64))
 
-    def bars(self, name: str) -> FloatArray:
-        """Return the lengths of error bars down and up to the ends of the intervals; 0 where they are not known."""
-        value = self.column(name)
-        ends = [value - self.column(f"{name}_low"), self.column(f"{name}_high") - value]
-        return np.nan_to_num(np.clip(ends, 0, None))
+    def constant(self, name: str, where: Any = slice(None)) -> curves.Mean:
+        """Return one constant of some of the cases, with its interval."""
+        columns = (self.column(f"{name}{end}")[where] for end in ("", "_low", "_high"))
+        return curves.Mean(*(xr.DataArray(column, dims="case") for column in columns))
 
 
 def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
@@ -130,12 +130,9 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     figure, (axes,) = style.panels(1)
     x, y = "before_over_slope", "jump_over_slope"
     for cases in by_hurst(found):
-        across, up = cases.column(x), cases.column(y)
-        drawn = axes.errorbar(
-            *(across, up, cases.bars(y), cases.bars(x)),
-            **{"fmt": ".", "color": cases.colour, "ms": 4, "lw": 0.6, "label": _hurst_label(found, cases)},
-        )
-        drawn.lines[0].set_gid(style.DATA)
+        across = cases.constant(x)
+        label = _hurst_label(found, cases)
+        curves.scatter(axes, across.value, cases.constant(y), cases.colour, ".", label, across)
     known = np.ravel(found[x].values)
     fine = np.geomspace(known[known > 0].min(), np.nanmax(known), 200)
     axes.plot(fine, jump_law(fine, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
@@ -147,7 +144,7 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set_ylim(jumps[jumps > 0].min() / 2, 3 * np.nanmax(jumps))
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "the jump against friction before it", found, name)
+    _title(figure, "the jump against friction before it", curves.scalars(found), name)
     style.leave_out(figure, told)
     return figure
 
@@ -164,12 +161,9 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     for cases in by_hurst(found):
         good = well_known(cases.column("rate_low"), cases.column("rate_high"))
         left += int(np.count_nonzero(~good))
-        x, rate = cases.column("passing_number"), cases.column("rate")
-        drawn = axes.errorbar(
-            *(x[good], rate[good], cases.bars("rate")[:, good]),
-            **{"color": cases.colour, "fmt": ".", "ms": 4, "lw": 0.6, "label": _hurst_label(found, cases)},
-        )
-        drawn.lines[0].set_gid(style.DATA)
+        x = cases.column("passing_number")
+        label = _hurst_label(found, cases)
+        curves.scatter(axes, x[good], cases.constant("rate", good), cases.colour, ".", label)
         _draw_powers(axes, powers, cases, x[good])
         whole = np.sort(x)
         axes.plot(whole, np.where(whole < 1, whole, whole ** (1 - cases.hurst)), ":", color=cases.colour, lw=0.8)
@@ -180,7 +174,7 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set(xlabel=r"$v_1 \tau q_{max}$", ylabel="rate of relaxation $b$")
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "rate of relaxation", found, name)
+    _title(figure, "rate of relaxation", curves.scalars(found), name)
     unknown = f"{left} rates not known to a factor of 1.6" if left else ""
     style.leave_out(figure, [unknown, *told])
     return figure
@@ -225,19 +219,16 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     )
     for number, (regime, power, label) in enumerate(rows):
         for cases in by_hurst(found.sel(regime=regime)):
-            value, bars = cases.column(power), cases.bars(power)
-            known = np.isfinite(value)
-            drawn = axes.errorbar(
-                *(np.full(int(known.sum()), cases.hurst), value[known], bars[:, known]),
-                **{"fmt": style.MARKERS[number], "color": style.COLOURS[number], "ms": 4, "capsize": 2},
-            )
-            drawn.lines[0].set_gid(style.DATA)
+            known = np.isfinite(cases.column(power))
+            value = cases.constant(power, known)
+            across = np.full(value.value.size, cases.hurst)
+            curves.scatter(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
         axes.plot([], [], style.MARKERS[number], color=style.COLOURS[number], ms=4, label=label)
     line = np.array([0.0, 1.0])
     axes.plot(line, 1 - line, "k-", lw=1, label="1 - H")
     axes.plot(line, [1, 1], "k:", lw=1, label="1")
     axes.set(xlabel=style.label("hurst"), ylabel="power of $b$")
     style.legend(axes)
-    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", found, name)
+    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name)
     style.leave_out(figure, told)
     return figure

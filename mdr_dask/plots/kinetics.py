@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.errors import DataError
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate
@@ -27,7 +26,6 @@ CASE = (
     *("rms_roughness", "length", "points"),
 )
 EXPONENT = 0.7  # Hurst exponent of Figs. 4.1-4.4
-BEFORE = 0.3  # of the width of the figure that shows the steady state before the jump
 LAST = 3.0  # (t - t_0) / tau up to which traces are shown
 TIME = r"$(t - t_0)/\tau$"
 MU = r"$\mu$ / rms slope"
@@ -44,8 +42,8 @@ def relaxing(data: xr.Dataset) -> xr.DataArray:
     return aggregation.mean(abs(data[BEFORE_JUMP] + data[JUMP] - data[AFTER]) / slope)
 
 
-def trace(data: xr.Dataset) -> tuple[Any, curves.Mean]:
-    """Return times from before the jump on, and friction with its interval."""
+def trace(data: xr.Dataset, lead: float = 0.3) -> tuple[Any, curves.Mean]:
+    """Return times from before the jump on, by a share of the last one, and friction with its interval."""
     slope, _ = over_slope(data)
     time = np.asarray(data["relaxation_times"].values)
     instant = data.assign({JUMP: data[BEFORE_JUMP] + data[JUMP]})
@@ -56,14 +54,14 @@ def trace(data: xr.Dataset) -> tuple[Any, curves.Mean]:
         xr.DataArray(np.concatenate([[float(b), float(b), float(a)], np.ravel(c.values)]), dims="time")
         for b, a, c in zip(before, at, later, strict=True)
     ]
-    return np.concatenate([[-BEFORE * time[-1], 0.0, 0.0], time]), curves.Mean(*joined)
+    return np.concatenate([[-lead * time[-1], 0.0, 0.0], time]), curves.Mean(*joined)
 
 
 def _joined(data: xr.Dataset, slope: Any) -> xr.DataArray | None:
     """Return the error of friction just after the jump: those of both its parts."""
     parts = [aggregation.companion(data, name) for name in (BEFORE_JUMP, JUMP)]
     errors = [abs(part) / slope for part in parts if part is not None]
-    return sum(errors) if errors else None  # type: ignore[return-value]
+    return sum(errors[1:], errors[0]) if errors else None
 
 
 def _early(data: xr.Dataset) -> xr.Dataset:
@@ -203,7 +201,9 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
         return found[name].values[order]
 
     axes.fill_between(inside, curve("one_low"), curve("one_high"), color="C3", alpha=0.25, lw=0)
-    axes.plot(inside, curve("one"), "C3", label=f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance")
+    axes.plot(
+        inside, curve("one"), "C3", label=f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance"
+    )
     alike = f"$b$ = {float(found['rate_unweighted']):.2f} ({ends('rate_unweighted')}), all times alike"
     axes.plot(inside, curve("alike"), "C1-.", lw=1, label=alike)
     law = float(found["law_rate"])
@@ -240,7 +240,9 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         error = np.sqrt(np.nanmean((np.interp(time[2:], t, course) - value.value.values[2:]) ** 2))
         size = abs(after - before) + abs(jump)
         axes.plot(t, course, "k--", lw=1, label="closed course")
-        axes.set_title(f"{style.named('velocity', case['velocity'])}: rms {error / size:.1%} of the change", fontsize="small")
+        axes.set_title(
+            f"{style.named('velocity', case['velocity'])}: rms {error / size:.1%} of the change", fontsize="small"
+        )
         axes.set(xlabel=TIME, ylabel=label)
     style.legend(panels[0])
     held = curves.fixed_by_all([curves.scalars(case) for case in cases])
@@ -254,7 +256,12 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
 _MODELS = ("velocity_jump",)
 PLOTS: tuple[Plot, ...] = (
     Plot("jump_trace", _MODELS, "friction against time through a jump up and down (Fig. 4.1)", draw_trace),
-    Plot("jump_velocities", _MODELS, "steady friction against v_1, and against time at every v_1 (Fig. 4.2)", draw_velocities),
+    Plot(
+        "jump_velocities",
+        _MODELS,
+        "steady friction against v_1, and against time at every v_1 (Fig. 4.2)",
+        draw_velocities,
+    ),
     Plot("jump_fit", _MODELS, "relaxing part against time with one exponential fitted (Fig. 4.3)", draw_fit),
     Plot("jump_height", _MODELS, "mu_1 and d_mu_0 v_1 / dv against v_1 for every load (Fig. 4.4)", draw_jump),
     Plot("jump_law", _MODELS, "d_mu_0 v_1 / dv against mu_1 for every H, with eq. 4.11 (Fig. 4.5)", draw_jump_law),

@@ -25,8 +25,8 @@ MOST_PANELS = 6
 PANEL = (6.4, 4.4)
 SMALL_PRINT = 15
 DPI = 150
-#: What data lines carry as their gid, so that a test can tell them from laws and guides.
-DATA = "data"
+#: What data carry as their gid, so that they can be told from laws and guides.
+DATA, BAND = "data", "band"
 
 
 class Quantity(NamedTuple):
@@ -212,7 +212,7 @@ def _plain_ticks(axis: Axis, low: float, high: float) -> None:
 
 def legend(axes: Axes, heading: str = "") -> None:
     """Draw the legend of a panel where it has anything to name, outside where it is long."""
-    handles, labels = axes.get_legend_handles_labels()
+    handles, _ = axes.get_legend_handles_labels()
     if not handles:
         return
     long = len(handles) > 9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -85,7 +85,7 @@ def _draw_limit(axes: Axes, groups: Mapping[str, xr.Dataset], data: xr.Dataset, 
         rest = [dim for dim in curves.axes_of(limit, output) if limit.sizes[dim] > 1 and dim != "cycles"]
         if any(not np.allclose(limit[key], data[key]) for key in keys if key in data.coords) or rest:
             continue
-        limit = limit.isel({dim: -1 for dim in curves.axes_of(limit, output)})
+        limit = limit.isel(dict.fromkeys(curves.axes_of(limit, output), -1))
         axes.plot(limit[place], aggregation.mean(limit[output]), "k:", label="limit")
         return
 
@@ -110,22 +110,22 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     if chosen.size < len(rows):
         told.append(f"{len(rows) - chosen.size} of {len(rows)} cases ({chosen.size} drawn, spread evenly)")
     figure, panels = style.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
-    alike = curves.fixed_by_all([_without(rows[number][1], ("cycles", RULE)) for number in chosen])
+    alike = curves.fixed_by_all([_without(curves.scalars(rows[number][1]), ("cycles", RULE)) for number in chosen])
     for k, number in enumerate(chosen):
         name, part = rows[number]
         for axes, (output, place) in zip(panels[2 * k : 2 * k + 2], PROFILES, strict=True):
             if output in part:
                 _draw_rules(figure, axes, part, output, place, named=k == 0)
                 _label(axes, output, part)
-        text = curves.fixed_text(_without(part, ("cycles", RULE, *alike)), CASE)
+        text = curves.fixed_text(_without(curves.scalars(part), ("cycles", RULE, *alike)), CASE)
         panels[2 * k].set_title(", ".join(part for part in (name, text) if part), fontsize="small", wrap=True)
     style.title(figure, "worn shapes by rule and cycles", curves.fixed_text(alike, CASE))
     style.leave_out(figure, told)
     return figure
 
 
-def _without(data: xr.Dataset, names: Sequence[str]) -> dict[str, xr.DataArray]:
-    return {name: value for name, value in curves.scalars(data).items() if name not in names}
+def _without(held: Mapping[str, xr.DataArray], names: Sequence[str]) -> dict[str, xr.DataArray]:
+    return {name: value for name, value in held.items() if name not in names}
 
 
 def _rows(name: str, data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
@@ -180,12 +180,14 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
         for curve in one.curves:
             curves.draw(axes, curve, curve.data[along], _spread(curve.data))
         axes.set_xlabel(_over(along, data))
-        axes.set_ylabel(style.with_unit("worn volume $V$", "m³") if not dimensionless(data) else "worn volume $V/(a_0^2 d_0)$")
+        axes.set_ylabel(
+            style.with_unit("worn volume $V$", "m³") if not dimensionless(data) else "worn volume $V/(a_0^2 d_0)$"
+        )
         values = np.asarray(data[along].values, dtype=np.float64)
         if style.is_geometric(values):
             style.logarithmic(axes, "x")
         curves.finish(figure, axes, one)
-        own = curves.fixed_text(_without(curves.at(data, one), ("cycles",)), CASE)
+        own = curves.fixed_text(_without(one.held, ("cycles",)), CASE)
         axes.set_title("\n".join(part for part in (name, own) if part), fontsize="small", wrap=True)
     band = f"median of {most} realisations; bands hold 95 % of them" if most > 1 else "one realisation: no bands"
     style.title(figure, "worn volume", band)
@@ -198,7 +200,9 @@ def _spread(data: xr.Dataset) -> curves.Mean:
     volume = data["wear_volume"]
     if volume.sizes["realisation"] < 2:
         return curves.measured(data, "wear_volume")
-    low, middle, high = (volume.quantile(q, "realisation") for q in (0.025, 0.5, 0.975))
+    known = volume.notnull().any("realisation")
+    ends = volume.where(known, 0.0).quantile([0.025, 0.5, 0.975], "realisation", skipna=True).where(known)
+    low, middle, high = (ends.isel(quantile=k) for k in range(3))
     return curves.Mean(middle, low, high)
 
 

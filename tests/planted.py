@@ -12,6 +12,7 @@ import zarr
 
 from mdr_dask import campaign, plan, store
 from mdr_dask.models.base import Status
+from mdr_dask.models.fretting_wear.parameters import FrettingWear
 from mdr_dask.physics.sliding import laws
 
 LINE = """
@@ -36,6 +37,7 @@ model: ehl_line
 outputs: [central_film, minimum_film, film, pressure, traction_coefficient]
 parameters:
 """
+RULE = "wear_rule" if "wear_rule" in FrettingWear.model_fields else "method"
 FRETTING = """
 model: fretting_wear
 outputs: [wear_volume, contact_radius, worn_profile, worn_image]
@@ -61,17 +63,26 @@ def make(folder: Path, text: str, realisations: int = 4, failed: bool = False) -
 def _fill(group: zarr.Group, model: str, data: xr.Dataset, failed: bool) -> None:
     status = xr.full_like(data["status"], Status.DONE.value)
     if failed:
-        status[{dim: -1 for dim in status.dims}] = Status.FAILED.value
+        status[dict.fromkeys(status.dims, -1)] = Status.FAILED.value
         status[{dim: 0 for dim in status.dims if dim != "realisation"}] = Status.FAILED.value
-    noise = xr.DataArray(1 + 0.02 * np.random.default_rng(0).standard_normal(data.sizes["realisation"]), dims="realisation")
+    noise = xr.DataArray(
+        1 + 0.02 * np.random.default_rng(0).standard_normal(data.sizes["realisation"]), dims="realisation"
+    )
     numbers = PLANTED[model](data, noise)
     for name in data.data_vars:
         if name == "status":
             continue
         value = numbers.get(name, _anything(data[name], noise))
-        value = value.broadcast_like(data[name]).transpose(*data[name].dims)
+        value = _as_limit(value.broadcast_like(data[name]), data).transpose(*data[name].dims)
         group[str(name)][...] = value.where(status == Status.DONE.value).transpose(*data[name].dims).values
     group["status"][...] = status.values
+
+
+def _as_limit(value: xr.DataArray, data: xr.Dataset) -> xr.DataArray:
+    """Return worn shapes whose limit is the same after any number of cycles."""
+    if RULE not in value.dims or "cycles" not in value.dims:
+        return value
+    return value.where(data[RULE] != "limit", value.isel(cycles=-1))
 
 
 def _anything(like: xr.DataArray, noise: xr.DataArray) -> xr.DataArray:
