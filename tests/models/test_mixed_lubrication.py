@@ -278,7 +278,9 @@ def test_bad_profiles_give_one_error(tmp_path):
     files = profiles(tmp_path)
     assert "expected the profiles of both rollers or of none" in refused(profile_1=files["profile_1"])
     (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, many\n")
-    assert "bad.csv:3:4: column z: expected a number, got 'many'" in refused(**files | {"profile_2": str(tmp_path / "bad.csv")})
+    assert "bad.csv:3:4: column z: expected a number, got 'many'" in refused(
+        **files | {"profile_2": str(tmp_path / "bad.csv")}
+    )
     assert "wider than the line" in refused(**files | {"normal_force": 1e7})
 
 
