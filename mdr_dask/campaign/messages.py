@@ -11,8 +11,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.problems import Path, did_you_mean, shown
-from mdr_dask.campaign.units import expected
+from mdr_dask.campaign.problems import Path, shown
+from mdr_dask.errors import did_you_mean
+from mdr_dask.units import expected
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
 Report = Callable[[Path, bool, str], None]

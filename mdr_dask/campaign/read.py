@@ -12,11 +12,11 @@ from mdr_dask.campaign.definition import Campaign, Replication, Series, Toleranc
 from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.messages import report_errors
-from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
+from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
-from mdr_dask.campaign.units import to_si
-from mdr_dask.errors import ModelError
+from mdr_dask.errors import ModelError, did_you_mean
 from mdr_dask.models.base import Model
+from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
