@@ -12,7 +12,8 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.loading_history import pieces
-from mdr_dask.models.velocity_jump import VelocityJump, time_unit
+from mdr_dask.models.velocity_jump import VelocityJump
+from mdr_dask.models.velocity_jump.solve import time_unit
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.velocity_jump.solve import compute
 from mdr_dask.physics.surfaces import roughness
 
 EVERY = tuple(output.name for output in MODEL.outputs)

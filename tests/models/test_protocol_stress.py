@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.velocity_jump.solve import compute
 
 EVERY = tuple(output.name for output in MODEL.outputs)
 BASE = {

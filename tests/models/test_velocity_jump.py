@@ -6,7 +6,9 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute, coordinates, distinct, seconds
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.velocity_jump.declaration import coordinates
+from mdr_dask.models.velocity_jump.solve import compute, distinct, seconds
 from mdr_dask.physics.transients import velocity_jump as kinetics
 
 EVERY = tuple(output.name for output in MODEL.outputs if output.default)

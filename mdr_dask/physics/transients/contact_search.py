@@ -88,9 +88,7 @@ def _remember(place: float, places: FloatArray, known: int) -> int:
 
 
 @inlined
-def _leaving(
-    now: Moment, depth: float, low: float, until: float, next_free: float
-) -> tuple[float, bool, float]:
+def _leaving(now: Moment, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
     """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones.
 
     At `until` the force vanishes, or the part ends.

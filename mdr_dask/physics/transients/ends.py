@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -76,11 +76,12 @@ class Ends(NamedTuple):
 
     def only(self, cases: NDArray[np.int64]) -> Ends:
         """Return some of the cases."""
-        return Ends(*(column[cases] for column in self))
+        columns: list[Any] = [column[cases] for column in self]
+        return Ends(*columns)
 
     def replaced(self, cases: NDArray[np.int64], other: Ends) -> Ends:
         """Return all cases, some of them from another solution."""
-        columns = [column.copy() for column in self]
+        columns: list[Any] = [column.copy() for column in self]
         for column, found in zip(columns, other, strict=True):
             column[cases] = found
         return Ends(*columns)
@@ -105,9 +106,7 @@ def ends_on(line: CubicLine, loads: FloatArray, deborah: FloatArray, near: Ends 
     """
     guesses = None if near is None else near.depth.ravel()
     steady = steady_sliding(line, deborah.ravel(), np.repeat(loads, 2), guesses)
-    drag, depth, contact = (
-        column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction)
-    )
+    drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
     good = np.flatnonzero(outcome == Outcome.CONVERGED)

@@ -143,8 +143,8 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
     """Return the height at y of a cubic over 0..1, and the integrals of it and of its slope squared from 0 to y."""
     height = c0 + y * (c1 + y * (c2 + y * c3))
     area = y * (c0 + y * (c1 / 2 + y * (c2 / 3 + y * c3 / 4)))
-    square = (
-        y * c1 * c1 + y * y * (2 * c1 * c2 + y * ((4 * c2 * c2 + 6 * c1 * c3) / 3 + y * c3 * (3 * c2 + y * 1.8 * c3)))
+    square = y * c1 * c1 + y * y * (
+        2 * c1 * c2 + y * ((4 * c2 * c2 + 6 * c1 * c3) / 3 + y * c3 * (3 * c2 + y * 1.8 * c3))
     )
     return height, area, square
 
@@ -231,9 +231,7 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
 
 
 @compiled
-def released(
-    track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray
-) -> None:
+def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 
     Parameters

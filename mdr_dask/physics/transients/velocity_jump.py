@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
-from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE, patches_at
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
@@ -152,7 +152,12 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], co
 
 
 def velocity_jumps(
-    line: CubicLine, loads: FloatArray, deborah: FloatArray, ends: Ends, course: Course
+    line: CubicLine,
+    loads: FloatArray,
+    deborah: FloatArray,
+    ends: Ends,
+    course: Course,
+    left_out: BoolArray | None = None,
 ) -> list[Jump]:
     """Return the jumps of many cases on one line, of which none depends on the others.
 
@@ -163,6 +168,9 @@ def velocity_jumps(
     ends : Ends
         Of the same line.
     course : Course
+        What is asked of the march.
+    left_out : array, shape (cases,), optional
+        Cases whose transient is left out, however large.
     """
     prepared = line_of(line) if np.any(ends.outcome == Outcome.CONVERGED) else None
     jumps = []
@@ -170,7 +178,8 @@ def velocity_jumps(
         if prepared is None or ends.outcome[k] != Outcome.CONVERGED:
             jumps.append(_failed(course.times, Outcome(ends.outcome[k])))
         else:
-            jumps.append(_Relaxation.of(prepared, loads[k], deborah[k], ends, k, course).solve())
+            one = course if left_out is None or not left_out[k] else course._replace(accuracy=np.inf)
+            jumps.append(_Relaxation.of(prepared, loads[k], deborah[k], ends, k, one).solve())
     return jumps
 
 
@@ -196,9 +205,7 @@ class _Relaxation(NamedTuple):
     pace: Pace
 
     @classmethod
-    def of(
-        cls, line: Line, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course
-    ) -> _Relaxation:
+    def of(cls, line: Line, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course) -> _Relaxation:
         """Take the k-th case of some ends."""
         n, depth = line.track.cells, ends.depth[k]
         return cls(
@@ -240,9 +247,9 @@ class _Relaxation(NamedTuple):
         margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
         first = contact_before(self.line, self.depth[0] - self.line.cells.top, self.deborah[0])
         for _ in range(SETTINGS.widenings):
-            found = self.march(first, max(low - margin, SHALLOW * low), high + margin, transient)
+            found = self.march(jump, first, (max(low - margin, SHALLOW * low), high + margin), transient)
             if found is not None:
-                return jump._replace(**found)
+                return found
             margin *= 4
         return _failed(times, Outcome.DEPTH_NOT_FOUND)
 
@@ -256,8 +263,8 @@ class _Relaxation(NamedTuple):
         by_depth = abs(sums[DRAG_RATE] * (self.depth[1] - self.depth[0]))
         return float(abs(self.at - self.after) + abs(self.rate * self.tilt) + by_depth)
 
-    def march(self, first: Patches, low: float, high: float, transient: float) -> dict[str, object] | None:
-        """Return what a march between two depths finds, or None if it leaves them."""
+    def march(self, jump: Jump, first: Patches, limits: tuple[float, float], transient: float) -> Jump | None:
+        """Return the jump with what a march between two depths finds, or None if it leaves them."""
         accuracy, course = self.course.accuracy, self.course
         equilibrium = SETTINGS.equilibrium * (FINE_STEPS / course.per_decade) ** 3
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
@@ -265,9 +272,7 @@ class _Relaxation(NamedTuple):
         found = Trajectory(*np.empty((4, SETTINGS.moments)))
         for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
             column[0] = value
-        marching = Marching(
-            self.line.track, first, self.reachable(low, high), self.deborah[1], self.load, low, high
-        )
+        marching = Marching(self.line.track, first, self.reachable(*limits), self.deborah[1], self.load, *limits)
         work = workspace_for(self.line.track, first.count)
         count, outcome = march(marching, self.pace, Aim(self.depth[1], self.after, close, settled), found, work)
         if outcome == LEFT_LIMITS:
@@ -275,12 +280,12 @@ class _Relaxation(NamedTuple):
         time, depth, _, drag = (column[:count] for column in found)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > SETTINGS.stray * np.ptp(drag)
         if outcome != Outcome.CONVERGED or strayed:
-            return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)._asdict()
-        return {
-            "trace": _at_times(time, drag, course.times, self.after),
-            "depth": _at_times(time, depth, course.times, self.depth[1]) - self.line.cells.top,
-            "moments": count,
-        }
+            return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
+        return jump._replace(
+            trace=_at_times(time, drag, course.times, self.after),
+            depth=_at_times(time, depth, course.times, self.depth[1]) - self.line.cells.top,
+            moments=count,
+        )
 
     def reachable(self, low: float, high: float) -> Reachable:
         """Return where elements can be in contact between two depths."""
