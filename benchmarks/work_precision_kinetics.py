@@ -16,7 +16,7 @@ from numba import njit
 
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.protocol import follow
+from mdr_dask.physics.transients.elements.follow import follow
 from mdr_dask.physics.transients.velocity_jump import velocity_jump
 
 POINTS, REACH, CHANGE, LOAD, RUN_IN = 500, 0.05, 0.2, 0.3, 10.0

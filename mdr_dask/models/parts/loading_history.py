@@ -14,7 +14,7 @@ from mdr_dask.models.base import NamedFile, Parameters, quantity
 from mdr_dask.models.parts.tables import parse_table
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.transients.loading_history import Piece
+    from mdr_dask.physics.transients.elements.loading_history import Piece
 
 Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 
@@ -92,7 +92,7 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
     DataError
         If a table does not hold a course.
     """
-    from mdr_dask.physics.transients.loading_history import Piece
+    from mdr_dask.physics.transients.elements.loading_history import Piece
 
     if isinstance(protocol, Jump):
         after = velocity * (1 + change)

@@ -22,8 +22,9 @@ from mdr_dask.physics.sliding.problem import Line
 from mdr_dask.physics.solids import LinearSolid, kelvin
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
-from mdr_dask.physics.transients.loading_history import Trace, trace
-from mdr_dask.physics.transients.protocol import closed_line, foundation, indented_line
+from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
+from mdr_dask.physics.transients.elements.foundation import foundation
+from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import Course
 
 ACCURACY = 0.01  # of the ends, where the campaign does not say

@@ -4,10 +4,10 @@ from schemes import on_line
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.protocol import follow
+from mdr_dask.physics.transients.elements.follow import follow
 from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jump
 
 POINTS, OVERSAMPLING = 100, 8

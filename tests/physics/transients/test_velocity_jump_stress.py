@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.ends import ends_on
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jumps

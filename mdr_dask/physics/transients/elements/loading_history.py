@@ -13,10 +13,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.element import Foundation
-from mdr_dask.physics.transients.elements import State
-from mdr_dask.physics.transients.forces import Line
-from mdr_dask.physics.transients.protocol import Response, follow_line, steady_start
+from mdr_dask.physics.transients.elements.edges import Line
+from mdr_dask.physics.transients.elements.follow import Response, follow_line, steady_start
+from mdr_dask.physics.transients.elements.foundation import Foundation
+from mdr_dask.physics.transients.elements.steps import State
 
 
 class Settings(NamedTuple):
@@ -151,7 +151,7 @@ def trace(
     Parameters
     ----------
     line, solid
-        As in :func:`~mdr_dask.physics.transients.protocol.follow_line`.
+        As in :func:`~mdr_dask.physics.transients.elements.follow.follow_line`.
     before : float
         Velocity until t = 0, at which the body slides steadily, or rests, under the first load.
     pieces : sequence of Piece

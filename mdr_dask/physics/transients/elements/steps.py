@@ -12,7 +12,8 @@ from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.element import (
+from mdr_dask.physics.transients.elements.edges import Edges, Line, balance, depth_for, under_elements
+from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Scratch,
     advance,
@@ -25,7 +26,6 @@ from mdr_dask.physics.transients.element import (
     scratch_for,
     stored,
 )
-from mdr_dask.physics.transients.forces import Edges, Line, balance, depth_for, under_elements
 
 DRAG, DEPTH, RATE, CONTACT, STORED, WORK, LOST = range(7)
 ROWS = 7

@@ -8,14 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.shapes import Shape
-from mdr_dask.physics.transients.element import Foundation
-from mdr_dask.physics.transients.elements import (
+from mdr_dask.physics.transients.elements.edges import Edges, Line, under_elements
+from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation
+from mdr_dask.physics.transients.elements.steps import (
     ROWS,
     State,
     follow_elements,
@@ -23,7 +23,6 @@ from mdr_dask.physics.transients.elements import (
     note_edges,
     orbit,
 )
-from mdr_dask.physics.transients.forces import Edges, Line, under_elements
 
 TURNS = 3000  # of an element around the line before it is as it was
 STEADY = 1e-14  # of the depth at the start
@@ -61,42 +60,6 @@ class Response(NamedTuple):
     displacement: FloatArray
     status: Outcome
     state: State
-
-
-def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
-    """Return the foundation of a solid, with the modes in which it recovers without force.
-
-    Parameters
-    ----------
-    moduli, times : array_like, shape (arms,)
-        G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
-    viscosity : float
-        eta / G_inf in that unit; 1 for the Kelvin body (no arms) if the unit is tau.
-
-    Raises
-    ------
-    ValueError
-        If the solid is elastic, so that nothing relaxes.
-    """
-    g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
-    if g.size == 0 and not viscosity > 0:
-        raise ValueError("expected a solid with an arm or a dashpot, got an elastic one")
-    glass = 1 + g.sum()
-    arms, load = np.diag(g), np.zeros(g.size)
-    if viscosity > 0:
-        weight = np.append(viscosity, g * tau)
-        stiffness = np.block([[np.array([[glass]]), -g[None, :]], [-g[:, None], arms]])
-        load = np.append(1.0, load)
-    else:
-        weight, stiffness, load = g * tau, arms - np.outer(g, g) / glass, g / glass
-    root = np.sqrt(weight)
-    rates, modes = np.linalg.eigh(stiffness / root / root[:, None])
-    outward = np.ascontiguousarray(modes / root[:, None])
-    inward = np.ascontiguousarray(modes.T * root)
-    return Foundation(g, tau, float(viscosity), rates, outward, inward, modes.T @ (load / root))
-
-
-KELVIN = foundation([], [], 1.0)
 
 
 def closed_line(height: FloatArray, slope: FloatArray) -> Line:
