@@ -27,22 +27,30 @@ class Settings(NamedTuple):
     ----------
     finest : int
         Oversampling beyond which the ends are not refined.
-    of_change, of_change_before : float
-        Of the change of an end between the last two grids, and between the two before.
+    of_first_change, of_change, of_change_before : float
+        Of the change of a level between the first two grids, any later two, and the two before.
+    of_others, of_contact : float
+        Of the larger relative change of friction before and after, and of that of the length in contact: two grids may
+        agree by chance in one number.
     of_transient : float
         Of the change of the transient from half the nodes and half the steps.
-    hardly, of_a_peak : float
-        Nodes in contact that see a peak by its curvature only, and the error of that times the oversampling squared.
+    few, of_few, of_a_peak : float
+        Nodes in contact that see little of the peaks, and the error of that times the number of them squared, or at
+        most times the oversampling squared.
     rounding : float
         Least relative error.
     """
 
     finest: int = 64
-    of_change: float = 0.5
-    of_change_before: float = 0.05
+    of_first_change: float = 2.0
+    of_change: float = 1.0
+    of_change_before: float = 0.1
+    of_others: float = 0.5
+    of_contact: float = 0.1
     of_transient: float = 1.4
-    hardly: float = 2.0
-    of_a_peak: float = 0.1
+    few: float = 20.0
+    of_few: float = 0.3
+    of_a_peak: float = 1.0
     rounding: float = 1e-8
 
 
@@ -192,9 +200,9 @@ def _changes(fine: Jump, coarse: Jump, depth: FloatArray, coarse_depth: FloatArr
 
 def _refined(problem: Problem, aim: Aim, coarse: Ends, fine: Ends) -> tuple[Levels, Levels]:
     """Return the levels on the coarsest grid on which all that are wanted meet the accuracy, and their errors."""
-    levels, oversampling = np.stack(Levels.of(fine)), aim.oversampling
-    change = np.abs(levels - np.stack(Levels.of(coarse)))
-    errors = _errors(problem, oversampling, fine, change, np.zeros_like(change))
+    points, oversampling = problem.line.points, aim.oversampling
+    levels, change = np.stack(Levels.of(fine)), _change(coarse, fine)
+    errors = np.maximum(SETTINGS.of_first_change * change, _least(fine, points, oversampling)) * np.abs(levels)
     wanted = np.array([name in aim.levels for name in Levels._fields])
     while oversampling < SETTINGS.finest:
         late = ~(errors <= aim.accuracy * np.abs(levels)) & wanted[:, None]
@@ -202,24 +210,30 @@ def _refined(problem: Problem, aim: Aim, coarse: Ends, fine: Ends) -> tuple[Leve
         if not missing.size:
             break
         oversampling *= 2
-        some, near = problem.only(missing), fine.only(missing)
+        some, near, before = problem.only(missing), fine.only(missing), change[:, missing]
         finer = ends_on(some.on(oversampling), some.loads, some.deborah, near)
-        found, before = np.stack(Levels.of(finer)), change[:, missing]
-        change[:, missing] = np.abs(found - levels[:, missing])
-        errors[:, missing] = _errors(some, oversampling, finer, change[:, missing], before)
-        levels[:, missing] = found
+        change[:, missing] = _change(near, finer)
+        levels[:, missing] = np.stack(Levels.of(finer))
+        known = np.maximum(SETTINGS.of_change * change[:, missing], SETTINGS.of_change_before * before)
+        known = np.maximum(known, _least(finer, points, oversampling))
+        errors[:, missing] = known * np.abs(levels[:, missing])
         fine = fine.replaced(missing, finer)
     return Levels(*levels), Levels(*errors)
 
 
-def _errors(problem: Problem, oversampling: int, ends: Ends, change: FloatArray, before: FloatArray) -> FloatArray:
-    """Return the errors of levels from their last change between grids and the one before; infinite of what is unknown.
+def _change(coarse: Ends, fine: Ends) -> FloatArray:
+    """Return the relative changes of levels between two grids; infinite where one has no solution."""
+    with np.errstate(all="ignore"):
+        change = np.abs(1 - np.stack(Levels.of(coarse)) / np.stack(Levels.of(fine)))
+        contact = np.abs(1 - coarse.contact / fine.contact).max(axis=1)
+    common = np.maximum(SETTINGS.of_others * np.maximum(change[0], change[2]), SETTINGS.of_contact * contact)
+    change = np.maximum(change, common)
+    return np.where(np.isnan(change), np.inf, change)
 
-    Where a peak is touched on less than two nodes the curvature of its cubic counts, on both grids.
-    """
-    levels = np.stack(Levels.of(ends))
-    hardly = ends.contact.min(axis=1) * problem.line.points * oversampling < SETTINGS.hardly
-    least = SETTINGS.rounding + np.where(hardly, SETTINGS.of_a_peak / oversampling**2, 0.0)
-    errors = np.maximum(SETTINGS.of_change * change, SETTINGS.of_change_before * before)
-    errors = np.maximum(errors, least * np.abs(levels))
-    return np.where(np.isnan(errors), np.inf, errors)
+
+def _least(ends: Ends, points: int, oversampling: int) -> FloatArray:
+    """Return the least relative errors: rounding, and of contacts on few nodes, which see little of the peaks."""
+    touching = ends.contact.min(axis=1) * points * oversampling
+    with np.errstate(all="ignore"):
+        peak = np.minimum(SETTINGS.of_few / touching**2, SETTINGS.of_a_peak / oversampling**2)
+    return SETTINGS.rounding + np.where(touching < SETTINGS.few, peak, 0.0)
