@@ -246,7 +246,7 @@ def test_thin_films_and_loaded_asperities_are_warned_of_whatever_is_wanted(outpu
 
 
 def write_profile(path, spacing, heights):
-    path.write_text("# x, z in m\n" + "".join(f"{i * spacing:.9e}, {z:.9e}\n" for i, z in enumerate(heights)))
+    path.write_text("# a scan\nx [m],z [m]\n" + "".join(f"{i * spacing:.9e}, {z:.9e}\n" for i, z in enumerate(heights)))
     return str(path)
 
 
@@ -277,8 +277,10 @@ def test_bad_profiles_give_one_error(tmp_path):
     assert "expected profiles of the same spacing, got 1e-06 m and 2e-06 m" in refused(**profiles(tmp_path, 2e-6))
     files = profiles(tmp_path)
     assert "expected the profiles of both rollers or of none" in refused(profile_1=files["profile_1"])
-    (tmp_path / "bad.csv").write_text("x, z\n1, 2\n3, many\n")
-    assert "bad.csv:3: expected 2 numbers" in refused(**files | {"profile_2": str(tmp_path / "bad.csv")})
+    (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, many\n")
+    assert "bad.csv:3:4: column z: expected a number, got 'many'" in refused(
+        **files | {"profile_2": str(tmp_path / "bad.csv")}
+    )
     assert "wider than the line" in refused(**files | {"normal_force": 1e7})
 
 
