@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol
+from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.sliding_body import SlidingBody
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.solids import LinearSolid
 
 TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 
@@ -39,6 +45,21 @@ class VelocityJump(SlidingBody):
         if self.velocity_change == 0:
             raise ValueError("expected a velocity_change other than 0")
         return self
+
+    def solid(self) -> LinearSolid:
+        """Return the solid of the body."""
+        from mdr_dask.physics.solids import kelvin
+
+        if self.material is not None:
+            return solid_of(self.material)
+        assert self.shear_modulus is not None
+        assert self.relaxation_time is not None
+        return kelvin(self.shear_modulus, self.relaxation_time)
+
+    def time_unit(self) -> float:
+        """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
+        solid = self.solid()
+        return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 
 
 OUTPUTS = (

@@ -12,14 +12,12 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.loading_history import pieces
-from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
 from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.problem import Line
-from mdr_dask.physics.solids import LinearSolid, kelvin
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
 from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
@@ -218,7 +216,7 @@ class _Followed(_Group):
         """Follow the case on every so many of its nodes."""
         case = self.block.case(int(self.members[0]))
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
-        solid, unit = _solid(case), time_unit(case)
+        solid, unit = case.solid(), case.time_unit()
         static = solid.static_modulus
         before, course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
         velocity, force = length / unit, 4 * static * length * height
@@ -242,21 +240,6 @@ def _check_rough(roughness: Roughness) -> None:
         height = line_of(roughness.profile).height
         if not height.std() > FLAT * float(np.max(np.abs(height), initial=0.0)):
             raise DataError(f"expected a rough line, got {roughness.profile.file.name}, which is flat")
-
-
-def _solid(case: VelocityJump) -> LinearSolid:
-    """Return the solid of a case."""
-    if case.material is not None:
-        return solid_of(case.material)
-    assert case.shear_modulus is not None
-    assert case.relaxation_time is not None
-    return kelvin(case.shear_modulus, case.relaxation_time)
-
-
-def time_unit(case: VelocityJump) -> float:
-    """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
-    solid = _solid(case)
-    return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
 
 
 STATUS = np.array(
