@@ -65,6 +65,12 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     return rows
 
 
+def regrouped(stack: FloatArray) -> FloatArray:
+    """Return a stack of cases, each with errors of its own, as a stack in which neighbouring cases err together."""
+    own = np.abs(stack[1 + RESAMPLES :] - stack[0]).sum(axis=0)
+    return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
+
+
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
     """Return 95 % intervals from a stack, along its first axis.
 
@@ -105,17 +111,20 @@ def widening(count: ArrayLike) -> FloatArray:
     return wider
 
 
-def chance(residuals: FloatArray, count: int) -> float:
+def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return how often scatter and errors alone leave residuals as large as those of the first row.
 
     Parameters
     ----------
-    residuals : array, shape (1 + RESAMPLES + groups, cases)
+    residuals : array, shape (1 + RESAMPLES + groups, ...)
         Stack of data less law. If the law holds, the first row is to the truth as the resamples are to the first row.
     count : int
         Realisations that were resampled.
+    draws : int
+        Resamples among the rows.
     """
-    size = np.sqrt(np.sum(residuals[0] ** 2))
-    away = np.sqrt(np.sum((residuals[1:] - residuals[0]) ** 2, axis=1))
-    alone = widening(count) * away[:RESAMPLES] + away[RESAMPLES:].sum()
+    flat = residuals.reshape(residuals.shape[0], -1)
+    size = np.sqrt(np.sum(flat[0] ** 2))
+    away = np.sqrt(np.sum((flat[1:] - flat[0]) ** 2, axis=1))
+    alone = widening(count) * away[:draws] + away[draws:].sum()
     return float(np.mean(alone >= size))

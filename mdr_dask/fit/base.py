@@ -88,7 +88,7 @@ class Fitted(NamedTuple):
     ----------
     constants : array, shape (1 + RESAMPLES + groups, p)
         Stack of the constants, for `mdr_dask.bootstrap.interval`.
-    departures : array, shape (cases,)
+    departures : array, shape (...)
         Data less law.
     chance : float
         How often scatter and errors alone leave as much; NaN where one realisation has no scatter.
@@ -101,7 +101,7 @@ class Fitted(NamedTuple):
 
 def fitted(
     fit: Callable[[FloatArray], FloatArray],
-    law: Callable[[FloatArray], FloatArray],
+    left: Callable[[FloatArray, FloatArray], FloatArray],
     data: FloatArray,
     count: int,
 ) -> Fitted:
@@ -110,16 +110,16 @@ def fitted(
     Parameters
     ----------
     fit : callable
-        From data, shape (rows, cases), to constants, shape (rows, p).
-    law : callable
-        From constants to data.
-    data : array, shape (1 + RESAMPLES + groups, cases)
+        From data, shape (rows, ...), to constants, shape (rows, p).
+    left : callable
+        From data and constants to what the law leaves of the data.
+    data : array, shape (1 + RESAMPLES + groups, ...)
         Stack of the data.
     count : int
         Realisations that were resampled.
     """
     constants = fit(data)
-    residuals = data - law(constants)
+    residuals = left(data, constants)
     probability = bootstrap.chance(residuals, count) if count > 1 else np.nan
     if not probability >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])

@@ -177,7 +177,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     design = np.vstack([-x, np.ones(x.size)])
     found = fitted(
         lambda logs: logs @ np.linalg.pinv(design),
-        lambda constants: constants @ design,
+        lambda logs, constants: logs - constants @ design,
         np.log(table.stack(used) / (np.sqrt(2) * velocity[used])),
         count,
     )
@@ -315,7 +315,9 @@ def _interpolation(data: xr.Dataset) -> Variables:
     hurst = float(data["hurst"])
     start = (laws.alpha(hurst), float(np.log(laws.BETA)))
     stack = table.stack(used)
-    found = fitted(lambda rows: _least_squares(model, start, rows), model, stack, count)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
+    )
     at = int(np.argmax(np.abs(found.departures)))
     worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
     return {
@@ -403,7 +405,9 @@ def _indenter(data: xr.Dataset) -> Variables:
         return law
 
     start = (math.log(laws.INDENTER_EXPONENT),)
-    found = fitted(lambda rows: _least_squares(model, start, rows), model, logs, count)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count
+    )
     of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
     worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
     return {

@@ -7,14 +7,15 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
+from mdr_dask.fit.base import DOUBTFUL
 
 Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 WINDOW = 8.0  # over the expected rate
 FLOOR = 0.01  # of the largest relaxing part: what the grid adds to the standard error of a moment (docs/kinetics.md)
 ENOUGH = 2e-3  # share of the squared trace below which what is left may be the grid's: FLOOR at every moment
-DOUBTFUL = 0.05  # probability below which one exponential is rejected
 GRID = 121
 ROUNDS = 6
 STEPS, STEPS_ON = 25, 8  # from a guess, and from the fit to the trace itself to that of a resample
@@ -43,6 +44,8 @@ GOODNESS_FIELDS = {
     "probability": ("1", "of a residual as large as this if one exponential were true, by bootstrap"),
     "stretched_unexplained": ("1", "share that the stretched exponential leaves"),
     "two_unexplained": ("1", "share that two exponentials leave"),
+    "stretched_probability": ("1", "of a residual as large as that of the stretched exponential, by bootstrap"),
+    "two_probability": ("1", "of a residual as large as that of two exponentials, by bootstrap"),
 }
 
 
@@ -159,28 +162,35 @@ def least_squares(
 
 
 def _followed(
-    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray
-) -> tuple[FloatArray, float]:
-    """Fit the first trace from several starts, and the others from what was found."""
+    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray, count: int
+) -> tuple[FloatArray, float, float]:
+    """Fit the first trace from several starts, and the others from what was found.
+
+    Returns
+    -------
+    parameters, unexplained, probability
+        The last two of the first trace.
+    """
     tried, left = least_squares(law, time, np.repeat(traces[:1], len(starts), axis=0), weights, starts)
     best = int(np.argmin(left))
     from_here = np.repeat(tried[best : best + 1], len(traces), axis=0)
     found, _ = least_squares(law, time, traces, weights, from_here, STEPS_ON)
-    return found, float(left[best])
+    residuals = (traces - law(found, time)[0]) * np.sqrt(weights)
+    return found, float(left[best]), bootstrap.chance(residuals, count, SHAPED)
 
 
 def _shapes(
-    time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float
+    time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float, count: int
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
     """Fit a stretched exponential and two exponentials: samples of their constants, and shares that they leave."""
     scale = np.abs(traces[0]).max()
-    scaled = traces[: 1 + SHAPED] / scale
+    used = np.r_[: 1 + SHAPED, 1 + bootstrap.RESAMPLES : len(traces)]
+    scaled = traces[used] / scale
     b = np.log(rate)
-    one, left_one = _followed(
-        stretched, time, scaled, weights, np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
-    )
+    starts = np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
+    one, left_one, chance_one = _followed(stretched, time, scaled, weights, starts, count)
     starts = np.array([[0.5, 0.5, b - 0.7, b + 0.7], [0.8, 0.2, b - 0.2, b + 2], [1.2, -0.2, b + 0.2, b + 1.5]])
-    two, left_two = _followed(double, time, scaled, weights, starts)
+    two, left_two, chance_two = _followed(double, time, scaled, weights, starts, count)
     two = np.where(two[:, 2:3] <= two[:, 3:], two, two[:, [1, 0, 3, 2]])
     samples = {
         "stretched_rate": np.exp(one[:, 1]),
@@ -190,14 +200,19 @@ def _shapes(
         "fast_share": two[:, 1] / two[:, :2].sum(axis=1),
         "two_amplitude": two[:, :2].sum(axis=1) * scale,
     }
-    return samples, {"stretched_unexplained": left_one, "two_unexplained": left_two}
+    return {name: _spread(values, used, len(traces)) for name, values in samples.items()}, {
+        "stretched_unexplained": left_one,
+        "two_unexplained": left_two,
+        "stretched_probability": chance_one,
+        "two_probability": chance_two,
+    }
 
 
-def _probability(traces: FloatArray, curves: FloatArray, weights: FloatArray) -> float:
-    """Return how often the scatter alone leaves as much as is left: residuals of the resamples about the residual."""
-    residual = traces - curves
-    by_scatter = (residual[1:] - residual[0]) ** 2 @ weights
-    return float(np.mean(by_scatter >= residual[0] ** 2 @ weights))
+def _spread(values: FloatArray, used: NDArray[np.int64], size: int) -> FloatArray:
+    """Return the rows used at their places in a stack, NaN elsewhere."""
+    stack = np.full(size, np.nan)
+    stack[used] = values
+    return stack
 
 
 def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> NDArray[np.bool_]:
@@ -207,18 +222,20 @@ def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> N
 
 
 def relaxation_of(
-    time: FloatArray, traces: FloatArray, error: FloatArray, expected: float, shaped: bool = False
+    time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float, shaped: bool = False
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Fit the relaxation of a mean trace and of its resamples.
+    """Fit the relaxation of a mean trace.
 
     Parameters
     ----------
     time : array, shape (m,)
         (t - t_0) / tau from zero on.
-    traces : array, shape (n, m)
-        Mean of mu - mu_2 over the realisations, and the same over resamples of them.
+    traces : array, shape (1 + RESAMPLES + groups, m)
+        Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)
         Standard error of the mean.
+    count : int
+        Realisations.
     expected : float
         Rate of the law, which fixes the window of the fit, 8 / expected.
     shaped : bool
@@ -226,8 +243,9 @@ def relaxation_of(
 
     Returns
     -------
-    samples : dict of array, shape (n,)
-        The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough.
+    stacks : dict of array
+        The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough;
+        what one exponential leaves there has moved the last rows of its constants.
     goodness : dict of float
         The entries of `GOODNESS_FIELDS` that there are.
     """
@@ -236,17 +254,22 @@ def relaxation_of(
     t, y = time[inside], traces[:, inside]
     weights = point_weights(t, y[0], error[inside])
     rate, amplitude, left = exponential(t, y, weights)
-    rate_alike, amplitude_alike, _ = exponential(t, y, widths(t))
-    samples = {
+    residuals = y - amplitude[:, None] * np.exp(-rate[:, None] * t)
+    probability = bootstrap.chance(residuals * np.sqrt(weights), count)
+    enough = bool(one_is_enough(left[0], probability))
+    missed = y if enough else np.concatenate([y, bootstrap.moved(y[0], residuals[0])])
+    if not enough:
+        rate, amplitude, _ = exponential(t, missed, weights)
+    rate_alike, amplitude_alike, _ = exponential(t, missed, widths(t))
+    stacks = {
         "rate": rate,
         "rate_unweighted": rate_alike,
         "amplitude": amplitude,
         "amplitude_unweighted": amplitude_alike,
         "integral_rate": traces[:, 0] / (traces @ widths(time)),
     }
-    probability = _probability(y, amplitude[:, None] * np.exp(-rate[:, None] * t), weights)
     goodness = {"window": float(t[-1]), "unexplained": float(left[0]), "probability": probability}
-    if not shaped or one_is_enough(left[0], probability):
-        return samples, goodness
-    shapes, shares = _shapes(t, y, weights, float(rate[0]))
-    return samples | shapes, goodness | shares
+    if not shaped or enough:
+        return stacks, goodness
+    shapes, shares = _shapes(t, y, weights, float(rate[0]), count)
+    return stacks | shapes, goodness | shares
