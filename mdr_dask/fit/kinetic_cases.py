@@ -107,7 +107,7 @@ class Cases:
         return np.pi * self.column("points") / self.column("length")
 
     def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return stacks of mu_1, d_mu_0 and mu_2, shapes (1 + RESAMPLES + groups, cases)."""
+        """Return stacks of mu_1, d_mu_0 and mu_2, shapes (1 + RESAMPLES + 2 groups, cases)."""
         outputs = np.stack([self.output(name).T for name in LEVELS], axis=1)
         stack = bootstrap.means(outputs + 0 * outputs.sum(axis=1, keepdims=True))  # NaN in one is NaN in all three
         errors = np.stack([self.error(name) for name in LEVELS])

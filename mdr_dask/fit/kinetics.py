@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,16 +12,17 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fit.base import LAW_HOLDS, Fit, fitted, law_holds
 from mdr_dask.fit.kinetic_cases import LEAST, LEVELS, Cases, law_rate
 from mdr_dask.fit.relaxation import (
     AMPLITUDE_FIELDS,
-    ENOUGH,
-    GOODNESS_FIELDS,
+    LAWS,
     RATE_FIELDS,
     SHAPE_FIELDS,
-    one_is_enough,
+    Left,
+    enough,
     relaxation_of,
+    window,
 )
 
 Series = Mapping[str, xr.Dataset]
@@ -71,45 +73,61 @@ def _numbers(cases: Cases) -> dict[str, FloatArray]:
     }
 
 
-def _relaxations(cases: Cases, shaped: bool = False) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Fit the relaxation of every case: stacks of its constants, and goodness of fit.
+class Relaxations(NamedTuple):
+    """The relaxation of every case: stacks of its constants, shape (rows, cases), what laws leave, windows.
 
-    The last `GROUPS` rows are moved by what one exponential leaves, those before by the errors of the grid.
+    The last rows are moved by what one exponential leaves, those before by the errors of the grid.
     """
+
+    stacks: dict[str, FloatArray]
+    left: list[dict[str, Left]]
+    window: FloatArray
+
+    def measure(self, law: str, name: str) -> FloatArray:
+        """Return an entry of what a law leaves of every case."""
+        return np.array([getattr(left[law], name) if law in left else np.nan for left in self.left])
+
+    def verdicts(self) -> NDArray[np.str_]:
+        """Say of every case whether one exponential is enough."""
+        return np.array([_says(left, "one") for left in self.left])
+
+
+def _says(left: Mapping[str, Left], *laws: str) -> str:
+    """Say which of some laws hold."""
+    if not set(laws) <= set(left):
+        return "not tested: nothing relaxes" if not left else "not tested: one exponential is enough"
+    good = [law for law in laws if enough(left[law])]
+    parts = [
+        f"{LAWS[law]} leaves {left[law].unexplained:.2g} of the square, at most {left[law].largest:.2g} of the"
+        f" relaxing part; by scatter alone with probability {left[law].probability:.2g}"
+        for law in good or laws
+    ]
+    return f"{'yes' if good else 'no'}: {', '.join(parts)}"
+
+
+def _relaxations(cases: Cases, shaped: bool = False) -> Relaxations:
+    """Fit the relaxation of every case."""
     time = np.concatenate([[0.0], cases.data["relaxation_times"].values])
     expected, slope = law_rate(cases.passing, cases.column("hurst")), cases.slope
     fields = RATE_FIELDS | AMPLITUDE_FIELDS | SHAPE_FIELDS
-    size = 1 + bootstrap.RESAMPLES + 2 * bootstrap.GROUPS
+    size = 1 + bootstrap.RESAMPLES + 4 * bootstrap.GROUPS + 2
     stacks = {name: np.full((size, expected.size), np.nan) for name in fields}
-    goodness = {name: np.full(expected.size, np.nan) for name in GOODNESS_FIELDS}
+    lefts: list[dict[str, Left]] = []
     for k, (relaxing, grid) in enumerate(zip(cases.relaxing(), cases.relaxing_error(), strict=True)):
         good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
         if len(good) < LEAST or not np.abs(good.mean(axis=0)).max() > INSTANT * slope[k]:
+            lefts.append({})
             continue
         means = bootstrap.means(bootstrap.complete(relaxing))
         traces = np.concatenate([means, bootstrap.moved(means[0], grid)])
         error = good.std(axis=0, ddof=1) / np.sqrt(len(good))
-        found, measures = relaxation_of(time, traces, error, len(good), float(expected[k]), shaped)
+        found, left = relaxation_of(time, traces, error, len(good), float(expected[k]), shaped)
+        lefts.append(left)
         for name, values in found.items():
             stacks[name][:, k] = values[0]
             stacks[name][: len(values), k] = values
-        for name, value in measures.items():
-            goodness[name][k] = value
-    return stacks, goodness
-
-
-def _one_exponential(left: FloatArray, probability: FloatArray) -> NDArray[np.str_]:
-    """Say of every case whether one exponential is enough."""
-
-    def say(share: float, chance: float) -> str:
-        if np.isnan(share):
-            return "not tested: nothing relaxes"
-        leaves = f"one exponential leaves {share:.2g} of the squared relaxing part"
-        if share < ENOUGH:
-            return f"yes: {leaves}, less than {ENOUGH:g}"
-        return f"{'yes' if chance >= DOUBTFUL else 'no'}: {leaves}; by scatter alone with probability {chance:.2g}"
-
-    return np.array([say(*case) for case in zip(left.ravel(), probability.ravel(), strict=True)])
+    windows = [window(time, rate) if left else np.nan for rate, left in zip(expected, lefts, strict=True)]
+    return Relaxations(stacks, lefts, np.array(windows))
 
 
 def _lengths(cases: Cases, rate: FloatArray) -> dict[str, FloatArray]:
@@ -138,37 +156,46 @@ def _kinetics(series: Series) -> xr.Dataset:
 def _relaxation(series: Series) -> xr.Dataset:
     """Return the rate, length and time of the relaxation of every case, and how good one exponential is."""
     cases = Cases.of(series, *_needed())
-    samples, goodness = _relaxations(cases)
-    samples |= _lengths(cases, samples["rate"])
-    constants = cases.constants(samples, RATE_FIELDS | LENGTH_FIELDS, POSITIVE)
+    found = _relaxations(cases)
+    stacks = found.stacks | _lengths(cases, found.stacks["rate"])
+    constants = cases.constants(stacks, RATE_FIELDS | LENGTH_FIELDS, POSITIVE)
     law = law_rate(cases.passing, cases.column("hurst"))
-    verdict = _one_exponential(goodness["unexplained"], goodness["probability"])
     first = {"passing_number": cases.found(cases.passing, "1", "v_1 tau q_max")}
-    measures = {
-        "law_rate": cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12"),
-    }
-    measures |= {name: cases.found(goodness[name], *GOODNESS_FIELDS[name]) for name in ("unexplained", "probability")}
+    measures = {"law_rate": cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12")}
+    for name, meaning in LEFT_FIELDS.items():
+        measures[name] = cases.found(found.measure("one", name), "1", f"{meaning} one exponential leaves")
     first |= {name: constants[name] for name in ("rate", "rate_low", "rate_high")}
-    window = {"window": cases.found(goodness["window"], *GOODNESS_FIELDS["window"])}
-    judged = {"law_holds": cases.found(verdict, "1", LAW_HOLDS["long_name"])}
-    return xr.Dataset(first | measures | constants | window | judged, attrs={"window": WINDOW_TEXT})
+    last = {
+        "window": cases.found(found.window, "1", "last t' of the fit"),
+        "law_holds": cases.found(found.verdicts(), "1", LAW_HOLDS["long_name"]),
+    }
+    return xr.Dataset(first | measures | constants | last, attrs={"window": WINDOW_TEXT})
+
+
+LEFT_FIELDS = {
+    "unexplained": "weighted share of the squared relaxing part that",
+    "largest": "largest part of the relaxing part that",
+    "probability": "how often scatter and errors alone leave as much as",
+}
 
 
 def _shape(series: Series) -> xr.Dataset:
-    """Return a stretched exponential and two exponentials where one is not enough."""
+    """Return a stretched and two exponentials where one exponential is not enough; no interval where they do not hold."""
     cases = Cases.of(series, *_needed())
-    samples, goodness = _relaxations(cases, shaped=True)
-    if np.all(np.isnan(goodness["two_unexplained"])):
+    found = _relaxations(cases, shaped=True)
+    if not any("two" in left for left in found.left):
         raise FitError("one exponential is enough in every case")
-    result = xr.Dataset(cases.constants(samples, SHAPE_FIELDS, POSITIVE))
-    for name in ("unexplained", "stretched_unexplained", "two_unexplained"):
-        result[name] = cases.found(goodness[name], *GOODNESS_FIELDS[name])
-    held = {law: one_is_enough(goodness[f"{law}_unexplained"], goodness[f"{law}_probability"]) for law in SHAPES}
+    result = xr.Dataset(cases.constants(found.stacks, SHAPE_FIELDS, POSITIVE))
     for law, names in SHAPES.items():
-        known = cases.found(held[law], "1", "")
+        held = np.array([law in left and enough(left[law]) for left in found.left])
         for name in (f"{name}_{end}" for name in names for end in ("low", "high")):
-            result[name] = result[name].where(known).assign_attrs(result[name].attrs)
-    result["law_holds"] = cases.found(_shapes_hold(held, goodness), "1", LAW_HOLDS["long_name"])
+            result[name] = result[name].where(cases.found(held, "1", "")).assign_attrs(result[name].attrs)
+    for law, meaning in LAWS.items():
+        share = found.measure(law, "unexplained")
+        name = "unexplained" if law == "one" else f"{law}_unexplained"
+        result[name] = cases.found(share, "1", f"weighted share of the squared relaxing part that {meaning} leaves")
+    verdicts = np.array([_says(left, "stretched", "two") for left in found.left])
+    result["law_holds"] = cases.found(verdicts, "1", LAW_HOLDS["long_name"])
     result.attrs["window"] = WINDOW_TEXT
     return result
 
@@ -179,30 +206,12 @@ SHAPES = {
 }
 
 
-def _shapes_hold(held: Mapping[str, NDArray[np.bool_]], goodness: Mapping[str, FloatArray]) -> NDArray[np.str_]:
-    """Say of every case which of the two laws holds: the other one has no interval."""
-
-    def say(k: int) -> str:
-        if np.isnan(goodness["two_unexplained"][k]):
-            return "not tested: one exponential is enough, or nothing relaxes"
-        left = {
-            "stretched exponential": goodness["stretched_unexplained"][k],
-            "two exponentials": goodness["two_unexplained"][k],
-        }
-        leave = ", ".join(f"{share:.2g} by {law}" for law, share in left.items())
-        good = [law for law, holds in zip(left, (held["stretched"][k], held["two"][k]), strict=True) if holds]
-        verdict = f"yes: {' and '.join(good)}" if good else "no: neither law"
-        return f"{verdict}; left of the squared relaxing part: {leave}"
-
-    return np.array([say(k) for k in range(goodness["two_unexplained"].size)])
-
-
 def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
     """Return the laws fitted to the only case of a series, over rms slope, over t within the window, with a band."""
     cases = Cases.of({"": data}, *_needed())
-    samples, goodness = _relaxations(cases, shaped=True)
-    t = np.append(0.0, np.geomspace(1e-4, 1, 200)) * goodness["window"][0]
-    found = {name: values[:, 0] for name, values in samples.items()}
+    fitted_here = _relaxations(cases, shaped=True)
+    t = np.append(0.0, np.geomspace(1e-4, 1, 200)) * fitted_here.window[0]
+    found = {name: values[:, 0] for name, values in fitted_here.stacks.items()}
     one = found["amplitude"][:, None] * np.exp(-found["rate"][:, None] * t) / cases.slope[0]
     alike = found["amplitude_unweighted"][0] * np.exp(-found["rate_unweighted"][0] * t) / cases.slope[0]
     low, high = bootstrap.interval(one, cases.count())
@@ -388,8 +397,8 @@ def _rate_power(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *_needed())
     along = {dim for name in ("velocity", "relaxation_time", "points", "length") for dim in cases.data[name].dims}
     rows = [dim for dim in cases.template.dims if dim not in along]
-    samples, _ = _relaxations(cases)
-    known = 1 + bootstrap.RESAMPLES + min(bootstrap.GROUPS, 1 + cases.data["relaxation_times"].size)
+    samples = _relaxations(cases).stacks
+    known = 1 + bootstrap.RESAMPLES + 2 * min(bootstrap.GROUPS, 1 + cases.data["relaxation_times"].size)
     samples = {name: samples[name][:known] for name in RATE_FIELDS}  # without what one exponential leaves
     x, place = np.log(cases.passing), cases.places(rows)
     hurst = cases.column("hurst")
@@ -467,8 +476,8 @@ def _rate_and_state(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *_needed())
     before, jump, after = cases.levels()
     logarithm = np.log1p(cases.column("velocity_change"))
-    relaxing, goodness = _relaxations(cases)
-    lengths = _lengths(cases, relaxing["rate"])
+    relaxing = _relaxations(cases)
+    lengths = _lengths(cases, relaxing.stacks["rate"])
     samples = {
         "direct_effect": jump / logarithm,
         "evolution_effect": (before + jump - after) / logarithm,
@@ -477,8 +486,7 @@ def _rate_and_state(series: Series) -> xr.Dataset:
         "slip_length_times_wavenumber": lengths["length_times_wavenumber"],
     }
     result = xr.Dataset(cases.constants(samples, STATE_FIELDS, POSITIVE))
-    verdict = _one_exponential(goodness["unexplained"], goodness["probability"])
-    result["law_holds"] = cases.found(verdict, "1", LAW_HOLDS["long_name"])
+    result["law_holds"] = cases.found(relaxing.verdicts(), "1", LAW_HOLDS["long_name"])
     result.attrs["law"] = "mu = mu_1 + a ln(v_2 / v_1) - b ln(v_2 / v_1) (1 - exp(-s / D_c)), s slipped since the jump"
     result.attrs["window"] = WINDOW_TEXT
     return result

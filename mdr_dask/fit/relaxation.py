@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.fit.base import DOUBTFUL
+from mdr_dask.fit.base import DOUBTFUL, WITHIN
 
 Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
@@ -38,15 +39,41 @@ SHAPE_FIELDS = {
     "slow_rate": ("1", "smaller rate of two exponentials"),
     "fast_share": ("1", "share of the amplitude that relaxes at the greater rate; negative where it grows first"),
 }
-GOODNESS_FIELDS = {
-    "window": ("1", "last t' of the fit"),
-    "unexplained": ("1", "weighted share of the squared relaxing part that one exponential leaves"),
-    "probability": ("1", "of a residual as large as this if one exponential were true, by bootstrap"),
-    "stretched_unexplained": ("1", "share that the stretched exponential leaves"),
-    "two_unexplained": ("1", "share that two exponentials leave"),
-    "stretched_probability": ("1", "of a residual as large as that of the stretched exponential, by bootstrap"),
-    "two_probability": ("1", "of a residual as large as that of two exponentials, by bootstrap"),
-}
+
+
+class Left(NamedTuple):
+    """What a law leaves of a mean trace.
+
+    Attributes
+    ----------
+    unexplained : float
+        Weighted share of the squared trace.
+    rms, largest : float
+        Residual over the largest relaxing part, every moment of the log-spaced times alike.
+    probability : float
+        How often scatter and errors leave as much, the smaller one of both ways to weigh the moments.
+    """
+
+    unexplained: float
+    rms: float
+    largest: float
+    probability: float
+
+
+LAWS = {"one": "one exponential", "stretched": "a stretched exponential", "two": "two exponentials"}
+
+
+def _left(
+    residuals: FloatArray, trace: FloatArray, weights: FloatArray, count: int, draws: int = bootstrap.RESAMPLES
+) -> Left:
+    relative = np.abs(residuals[0]) / np.abs(trace).max()
+    chances = (bootstrap.chance(residuals * weight, count, draws) for weight in (np.sqrt(weights), 1.0))
+    return Left(
+        float(residuals[0] ** 2 @ weights / (trace**2 @ weights)),
+        float(np.sqrt(np.mean(relative**2))),
+        float(relative.max()),
+        min(chances),
+    )
 
 
 def widths(time: FloatArray) -> FloatArray:
@@ -163,34 +190,27 @@ def least_squares(
 
 def _followed(
     law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray, count: int
-) -> tuple[FloatArray, float, float]:
-    """Fit the first trace from several starts, and the others from what was found.
-
-    Returns
-    -------
-    parameters, unexplained, probability
-        The last two of the first trace.
-    """
+) -> tuple[FloatArray, Left]:
+    """Fit the first trace from several starts, and the others from what was found."""
     tried, left = least_squares(law, time, np.repeat(traces[:1], len(starts), axis=0), weights, starts)
     best = int(np.argmin(left))
     from_here = np.repeat(tried[best : best + 1], len(traces), axis=0)
     found, _ = least_squares(law, time, traces, weights, from_here, STEPS_ON)
-    residuals = (traces - law(found, time)[0]) * np.sqrt(weights)
-    return found, float(left[best]), bootstrap.chance(residuals, count, SHAPED)
+    return found, _left(traces - law(found, time)[0], traces[0], weights, count, SHAPED)
 
 
 def _shapes(
     time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float, count: int
-) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Fit a stretched exponential and two exponentials: samples of their constants, and shares that they leave."""
+) -> tuple[dict[str, FloatArray], dict[str, Left]]:
+    """Fit a stretched exponential and two exponentials: stacks of their constants, and what they leave."""
     scale = np.abs(traces[0]).max()
     used = np.r_[: 1 + SHAPED, 1 + bootstrap.RESAMPLES : len(traces)]
     scaled = traces[used] / scale
     b = np.log(rate)
     starts = np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
-    one, left_one, chance_one = _followed(stretched, time, scaled, weights, starts, count)
+    one, left_one = _followed(stretched, time, scaled, weights, starts, count)
     starts = np.array([[0.5, 0.5, b - 0.7, b + 0.7], [0.8, 0.2, b - 0.2, b + 2], [1.2, -0.2, b + 0.2, b + 1.5]])
-    two, left_two, chance_two = _followed(double, time, scaled, weights, starts, count)
+    two, left_two = _followed(double, time, scaled, weights, starts, count)
     two = np.where(two[:, 2:3] <= two[:, 3:], two, two[:, [1, 0, 3, 2]])
     samples = {
         "stretched_rate": np.exp(one[:, 1]),
@@ -201,10 +221,8 @@ def _shapes(
         "two_amplitude": two[:, :2].sum(axis=1) * scale,
     }
     return {name: _spread(values, used, len(traces)) for name, values in samples.items()}, {
-        "stretched_unexplained": left_one,
-        "two_unexplained": left_two,
-        "stretched_probability": chance_one,
-        "two_probability": chance_two,
+        "stretched": left_one,
+        "two": left_two,
     }
 
 
@@ -215,22 +233,22 @@ def _spread(values: FloatArray, used: NDArray[np.int64], size: int) -> FloatArra
     return stack
 
 
-def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> NDArray[np.bool_]:
-    """Return where what one exponential leaves may be chance, or the grid's."""
-    enough: NDArray[np.bool_] = (unexplained < ENOUGH) | (np.asarray(probability) >= DOUBTFUL)
-    return enough
+def enough(left: Left) -> bool:
+    """Return whether what a law leaves may be chance, or is too small to count."""
+    small = left.unexplained < ENOUGH and left.rms <= WITHIN and left.largest <= 2 * WITHIN
+    return bool(small or left.probability >= DOUBTFUL)
 
 
 def relaxation_of(
     time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float, shaped: bool = False
-) -> tuple[dict[str, FloatArray], dict[str, float]]:
+) -> tuple[dict[str, FloatArray], dict[str, Left]]:
     """Fit the relaxation of a mean trace.
 
     Parameters
     ----------
     time : array, shape (m,)
         (t - t_0) / tau from zero on.
-    traces : array, shape (1 + RESAMPLES + groups, m)
+    traces : array, shape (1 + RESAMPLES + 2 groups, m)
         Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)
         Standard error of the mean.
@@ -244,32 +262,39 @@ def relaxation_of(
     Returns
     -------
     stacks : dict of array
-        The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough;
-        what one exponential leaves there has moved the last rows of its constants.
-    goodness : dict of float
-        The entries of `GOODNESS_FIELDS` that there are.
+        The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough.
+        There the last rows of its rate are moved by what it leaves, and to the other rates.
+    left : dict of Left
+        Of ``one`` exponential, and of the laws ``stretched`` and ``two`` that were fitted.
     """
-    early = time[min(8, time.size - 1)]
-    inside = time <= max(WINDOW / expected, early)
+    inside = time <= window(time, expected)
     t, y = time[inside], traces[:, inside]
     weights = point_weights(t, y[0], error[inside])
-    rate, amplitude, left = exponential(t, y, weights)
+    rate, amplitude, _ = exponential(t, y, weights)
     residuals = y - amplitude[:, None] * np.exp(-rate[:, None] * t)
-    probability = bootstrap.chance(residuals * np.sqrt(weights), count)
-    enough = bool(one_is_enough(left[0], probability))
-    missed = y if enough else np.concatenate([y, bootstrap.moved(y[0], residuals[0])])
-    if not enough:
-        rate, amplitude, _ = exponential(t, missed, weights)
+    left = {"one": _left(residuals, y[0], weights, count)}
+    integral = traces[:, 0] / (traces @ widths(time))
+    missed = y if enough(left["one"]) else np.concatenate([y, bootstrap.moved(y[0], residuals[0])])
+    rate, amplitude, _ = exponential(t, missed, weights)
     rate_alike, amplitude_alike, _ = exponential(t, missed, widths(t))
     stacks = {
         "rate": rate,
         "rate_unweighted": rate_alike,
         "amplitude": amplitude,
         "amplitude_unweighted": amplitude_alike,
-        "integral_rate": traces[:, 0] / (traces @ widths(time)),
+        "integral_rate": integral,
     }
-    goodness = {"window": float(t[-1]), "unexplained": float(left[0]), "probability": probability}
-    if not shaped or enough:
-        return stacks, goodness
-    shapes, shares = _shapes(t, y, weights, float(rate[0]), count)
-    return stacks | shapes, goodness | shares
+    if enough(left["one"]):
+        return stacks, left
+    for name in ("rate", "rate_unweighted", "integral_rate"):
+        others = [stacks[other][0] for other in ("rate", "rate_unweighted", "integral_rate") if other != name]
+        stacks[name] = np.append(stacks[name], others)
+    if not shaped:
+        return stacks, left
+    shapes, those = _shapes(t, y, weights, float(rate[0]), count)
+    return stacks | shapes, left | those
+
+
+def window(time: FloatArray, expected: float) -> float:
+    """Return the last time of a fit."""
+    return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])
