@@ -70,8 +70,10 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
     DataArray
         With the dimension ``bound`` (``low``, ``high``) in place of ``realisation`` (`mdr_dask.bootstrap.interval`).
     """
-    whole = array if error is None else xr.concat([array, grid_error(error)], "realisation")
-    bounds = _reduce(whole, _interval, {"count": array.sizes["realisation"]}, "bound", 2)
+    count = array.sizes["realisation"]
+    if error is not None:
+        array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
+    bounds = _reduce(array, _interval, {"count": count}, "bound", 2)
     return bounds.assign_coords(bound=np.array(["low", "high"], dtype=object))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -71,11 +72,14 @@ def tabled(
     problems : Problems
         Receives what is wrong with the file: unknown columns, units, missing cells.
     """
+    path = Path(directory, name)
     try:
-        text = Path(directory, name).read_text(encoding="utf-8-sig")
+        if path.exists() and not path.is_file():
+            raise OSError(errno.EINVAL, "no regular file")
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8"
-        problems.add(origin.place, origin.name, f"cannot read {Path(directory, name)}: {reason}")
+        problems.add(origin.place, origin.name, f"cannot read {path}: {reason}")
         return None
     try:
         sheet = read_sheet(text, name, numeric=False)

@@ -131,6 +131,8 @@ def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options:
 
     study = load(campaign)
     url = options["url"] or study.store
+    if url.startswith("memory:"):
+        raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
     if dry_run:
         _print_plan(study, url, form)
         return 0

@@ -59,6 +59,11 @@ def _aligned(name: str, cell: str, width: int) -> str:
     return cell.ljust(width) if name == "law_holds" else cell.rjust(width)
 
 
+def printable(text: str) -> str:
+    """Return a text without control characters, which would speak to the terminal in place of the user."""
+    return "".join(mark if mark.isprintable() or mark == "\n" else repr(mark)[1:-1] for mark in text)
+
+
 def print_json(document: Any) -> None:
     """Print one JSON document."""
     click.echo(json.dumps(document, indent=1, default=_plain))
@@ -133,7 +138,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 
 def _finite(value: Any) -> Any:

@@ -1,30 +1,35 @@
-"""A generated rough line: the numbers that fix it, and one realisation of it on any grid."""
+"""The roughness of a line as a campaign names it: generated, measured or none; each a sum of waves."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.models.parts.measured_line import ProfileFile, line_of
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.surfaces.waves import Waves
 
 
 @dataclass(frozen=True)
-class Line:
-    """What fixes a line but for its phases, in units of its length and rms height."""
+class Generated:
+    """Self-affine roughness: what fixes it but for its phases, in units of its length and rms height."""
 
     hurst: float
     points: int
-    rolloff: float
+    rolloff: float  # harmonic numbers: length over wavelength, 0 for none
     longest: float
-    coefficient: float  # of the indenter c |x|^n, 0 for a plane
-    exponent: float
+    is_random = True
 
-    def amplitudes(self) -> FloatArray:
-        """Return the amplitudes of its harmonics."""
-        return _amplitudes(self.points // 2, self.hurst, self.rolloff, self.longest)
+    def waves(self, seed: int, realisation: int) -> Waves:
+        """Return one realisation; ValueError if no wave is left between the cut-offs."""
+        from mdr_dask.physics.surfaces import roughness
+        from mdr_dask.physics.surfaces.waves import Waves
+
+        amplitude = _amplitudes(self)
+        return Waves(0.5 * amplitude * roughness.turns(seed, realisation, self.points // 2), self.points)
 
     def slope(self) -> float:
         """Return the spectral rms slope."""
@@ -32,52 +37,70 @@ class Line:
 
 
 @lru_cache(maxsize=32)
-def _amplitudes(modes: int, hurst: float, rolloff: float, longest: float) -> FloatArray:
+def _amplitudes(line: Generated) -> FloatArray:
     from mdr_dask.physics.surfaces import roughness
 
-    return roughness.amplitudes(modes, hurst, rolloff, longest)
+    return roughness.amplitudes(line.points // 2, line.hurst, line.rolloff, line.longest)
 
 
 @lru_cache(maxsize=1024)
-def _slope(line: Line) -> float:
+def _slope(line: Generated) -> float:
     from mdr_dask.physics.surfaces import roughness
 
-    return roughness.spectral_slope(line.amplitudes())
+    return roughness.spectral_slope(_amplitudes(line))
 
 
 @dataclass(frozen=True)
-class Realisation:
-    """One realisation of a line, in units of its length and rms height."""
+class Measured:
+    """The line of a file, the same in every realisation, in units of its length and rms height."""
 
-    line: Line
-    turned: NDArray[np.complex128]  # exp(i phi) of its harmonics
+    profile: ProfileFile
+    is_random = False
 
     @property
     def points(self) -> int:
-        """Number of Nyquist points."""
-        return self.line.points
+        """Nyquist points: the samples of the line."""
+        return int(line_of(self.profile).height.size)
 
-    @property
-    def coefficient(self) -> float:
-        """Of the indenter c |x|^n, 0 for a plane."""
-        return self.line.coefficient
+    def height(self) -> float:
+        """Return the unit of height, m: the rms height, or the length of a flat line."""
+        line = line_of(self.profile)
+        return float(line.height.std()) or line.length
 
-    @property
-    def exponent(self) -> float:
-        """Of the indenter."""
-        return self.line.exponent
+    def waves(self, seed: int, realisation: int) -> Waves:
+        """Return the waves of the line through the samples."""
+        return _waves(self)
 
-    def heights(self, oversampling: int) -> FloatArray:
-        """Return the roughness on a grid, both ends included where there is an indenter."""
-        return self._on_grid(oversampling, 0)
+    def slope(self) -> float:
+        """Return the spectral rms slope."""
+        return _waves(self).rms_slope()
 
-    def slopes(self, oversampling: int) -> FloatArray:
-        """Return its derivative by position."""
-        return self._on_grid(oversampling, 1)
 
-    def _on_grid(self, oversampling: int, derivative: int) -> FloatArray:
-        from mdr_dask.physics.surfaces import roughness
+@lru_cache(maxsize=16)
+def _waves(line: Measured) -> Waves:
+    from mdr_dask.physics.surfaces.waves import waves_of
 
-        amplitude, count = self.line.amplitudes(), self.line.points * oversampling
-        turn = roughness.turned_line(amplitude, self.turned, count, derivative)
-        return turn if self.line.coefficient == 0 else np.append(turn, turn[0])
+    return waves_of(line_of(line.profile).height / line.height())
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """No roughness, on as many points as a generated line would have."""
+
+    points: int
+    is_random = False
+
+    def waves(self, seed: int, realisation: int) -> Waves:
+        """Return no waves."""
+        import numpy as np
+
+        from mdr_dask.physics.surfaces.waves import Waves
+
+        return Waves(np.zeros(0, np.complex128), self.points)
+
+    def slope(self) -> float:
+        """Return 0."""
+        return 0.0
+
+
+Roughness = Generated | Measured | Smooth

@@ -20,7 +20,7 @@ from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.steady import Scheme, Steady
 from mdr_dask.physics.sliding.vectorised import Change
 from mdr_dask.physics.surfaces.cubic_line import indented_line, periodic_line
-from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.surfaces.shapes import Shape
 
 
 class Settings(NamedTuple):
@@ -64,18 +64,14 @@ class Line(Protocol):
         """Number of Nyquist points."""
 
     @property
-    def coefficient(self) -> float:
-        """Of the indenter c |x|^n that is taken away, 0 for a plane."""
+    def body(self) -> Shape | None:
+        """What is under the roughness; None for a plane."""
 
-    @property
-    def exponent(self) -> float:
-        """Of the indenter."""
+    def heights(self, nodes: int) -> FloatArray:
+        """Return the roughness at equidistant nodes of one period."""
 
-    def heights(self, oversampling: int) -> FloatArray:
-        """Return the roughness at so many nodes for every Nyquist point, and one more with an indenter."""
-
-    def slopes(self, oversampling: int) -> FloatArray:
-        """Return its derivative by position at the same nodes."""
+    def slopes(self, nodes: int) -> FloatArray:
+        """Return its derivative by position, over the length of the line."""
 
 
 class Errors(NamedTuple):
@@ -138,8 +134,8 @@ class Ladder:
 
     def on_grid(self, oversampling: int) -> Steady:
         """Solve the cases on one grid, without an estimate of their errors."""
-        slopes = self.line.slopes(oversampling) if self.scheme == "hermite" else None
-        return self._solve((self.line.heights(oversampling), slopes))
+        slopes = self.line.slopes(self.line.points * oversampling) if self.scheme == "hermite" else None
+        return self._solve((self.line.heights(self.line.points * oversampling), slopes))
 
     def with_errors(self, oversampling: int) -> tuple[Steady, Errors]:
         """Solve the cases on one grid and estimate their errors."""
@@ -150,7 +146,7 @@ class Ladder:
         """Solve every case on the coarsest grid on which the errors of all columns wanted meet a relative accuracy."""
         if self.scheme != "hermite":
             return self._swept(accuracy, 1)
-        if not goes_from_node_to_node(self.line.coefficient, accuracy):
+        if not goes_from_node_to_node(self.line.body, accuracy):
             return self._swept(accuracy, 2)
         steady, errors = self._sampled(accuracy)
         missing = ~self._met(steady, errors, accuracy)
@@ -166,7 +162,8 @@ class Ladder:
 
     def _nodes(self, oversampling: int) -> tuple[FloatArray, FloatArray]:
         """Return heights and slopes on a grid."""
-        return self.line.heights(oversampling), self.line.slopes(oversampling)
+        nodes = self.line.points * oversampling
+        return self.line.heights(nodes), self.line.slopes(nodes)
 
     def _solve(
         self,
@@ -179,8 +176,8 @@ class Ladder:
         height, slope = nodes
         scheme = scheme or self.scheme
         slopes = slope if scheme == "hermite" else None
-        body = PowerLaw(self.line.coefficient, self.line.exponent)
-        line = indented_line(height, slopes, body) if self.line.coefficient else periodic_line(height, slopes)
+        body = self.line.body
+        line = periodic_line(height, slopes) if body is None else indented_line(height, slopes, body)
         if scheme == "backward_euler":
             contact = not {"contact_fraction", "contact_slope"}.isdisjoint(self.columns)
             return sliding.stepped_sliding(line, self.deborah, self.loads, contact)
@@ -251,9 +248,9 @@ class Ladder:
         return _changes(steady, other, steady, np.maximum(SETTINGS.safety * drag, least))
 
 
-def goes_from_node_to_node(coefficient: float, accuracy: float) -> bool:
-    """Return whether cubic cells are left to cases that are too hard from node to node, under c |x|^n."""
-    return coefficient == 0 and accuracy >= SETTINGS.quickest
+def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:
+    """Return whether cubic cells are left to cases that are too hard from node to node."""
+    return body is None and accuracy >= SETTINGS.quickest
 
 
 def _changes(coarse: Any, fine: Any, steady: Steady, drag: FloatArray) -> Errors:

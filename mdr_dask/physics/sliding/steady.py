@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.kelvin import (
     BLOCK,
@@ -31,14 +32,9 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
-CONVERGED, NOT_CONVERGED, OUTSIDE_LINE, INVALID = 0, 1, 2, 3
-MESSAGES = {
-    NOT_CONVERGED: "the depth for the load was not found in {iterations} sweeps",
-    OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
-    INVALID: "load, velocity and profile must be finite, the load and v tau positive",
-}
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
+SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -57,7 +53,7 @@ class Steady:
     contact_slope : array
         rms slope of the profile over the contact.
     status : int8 array
-        `CONVERGED` or a key of `MESSAGES`.
+        Values of `Outcome`.
     """
 
     drag: FloatArray
@@ -81,7 +77,7 @@ class Steady:
 def unsolved(cases: int) -> Steady:
     """Return what is known of cases before they are solved."""
     nothing = np.full(cases, np.nan)
-    return Steady(nothing, nothing, nothing, nothing, np.full(cases, INVALID, np.int8))
+    return Steady(nothing, nothing, nothing, nothing, np.full(cases, Outcome.INVALID, np.int8))
 
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
@@ -208,17 +204,20 @@ def _states(
         if not converged:
             depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
         if not converged:
-            status[k] = NOT_CONVERGED
+            status[k] = Outcome.DEPTH_NOT_FOUND
             trail[:] = first
             continue
         if starts:
             first[:] = trail
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
-        status[k] = OUTSIDE_LINE if sums[OUTSIDE] > 0 else CONVERGED
+        status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
+        # drag is force times slope
+        if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
+            status[k] = Outcome.DEPTH_NOT_FOUND
 
 
 def steady_sliding(
@@ -247,8 +246,8 @@ def steady_sliding(
     Returns
     -------
     Steady
-        With ``mu = drag / (load L)``, height and length L in the same unit; `OUTSIDE_LINE` where an end of a line that
-        is not periodic is in contact.
+        With ``mu = drag / (load L)``, height and length L in the same unit; `Outcome.OUTSIDE_LINE` where an end of a
+        line that is not periodic is in contact.
     """
     start = np.full(loads.size, np.nan) if guesses is None else guesses
     return _solved(line, deborah, loads, lambda good, de, load: _swept(line, de, load, start[good], close))
@@ -274,14 +273,15 @@ def _solved(
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
     """Solve the cases that are numbers, measured in cells."""
-    good = valid(deborah, loads)
+    n = line.enter.size
+    with np.errstate(over="ignore"):
+        good = valid(deborah * n, loads * n)
     good &= bool(np.all(np.isfinite(line.height)) and np.all(np.isfinite(line.enter)))
     results = np.full((4, loads.size), np.nan)
-    status = np.full(loads.size, INVALID, np.int8)
-    n = line.enter.size
+    status = np.full(loads.size, Outcome.INVALID, np.int8)
     if np.any(good):
         results[:, good], status[good] = solve(good, deborah[good] * n, loads[good] * n)
-    results[:, status != CONVERGED] = np.nan
+    results[:, status != Outcome.CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
@@ -324,5 +324,7 @@ def _stepped(
         backward_euler.contact(below, line.periodic, deborah, depths, results[2], results[3])
         results[2] /= n
         results[3] *= n
-    status = np.where(np.isnan(results[0]), NOT_CONVERGED, np.where(outside, OUTSIDE_LINE, CONVERGED))
+    status = np.where(
+        np.isnan(results[0]), Outcome.DEPTH_NOT_FOUND, np.where(outside, Outcome.OUTSIDE_LINE, Outcome.CONVERGED)
+    )
     return results, status.astype(np.int8)

@@ -63,19 +63,19 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
     Parameters
     ----------
-    height, slope : array, shape (n + 1,)
-        The roughness at the nodes, both ends included, and its derivative as in :func:`periodic_line`; slope may be
-        None.
+    height, slope
+        The roughness, periodic, as in :func:`periodic_line`.
     body : Shape
         What is under the roughness, its tip at node n // 2, in units of the length of the line and of the heights.
     """
-    n = height.size - 1
+    n = height.size
     smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
-    height = height + smooth
+    height = np.append(height, height[0]) + smooth
     if slope is None:
         rise = np.diff(height)
         return CubicLine(height, rise, rise, False, False)
-    return CubicLine(height, (slope + right)[:-1] / n, (slope + left)[1:] / n, False, False)
+    enter, leave = slope + right[:-1], np.roll(slope, -1) + left[1:]
+    return CubicLine(height, enter / n, leave / n, False, False)
 
 
 class Cells(NamedTuple):

@@ -9,7 +9,7 @@ from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.sliding.steady import INVALID as STEADY_INVALID
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.steady import steady_sliding
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.march import Pace, march
@@ -173,7 +173,7 @@ def velocity_jumps(
     jumps = []
     for k in range(loads.size):
         if states[k].any():
-            jumps.append(_failed(times, INVALID if STEADY_INVALID in states[k] else NOT_CONVERGED))
+            jumps.append(_failed(times, INVALID if Outcome.INVALID in states[k] else NOT_CONVERGED))
             continue
         change = float(depths[k, 1] - depths[k, 0])
         pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from schemes import on_line
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import cubic_line as profile
 from mdr_dask.physics.surfaces import roughness
 
@@ -23,7 +23,7 @@ def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
 def friction(height, slope, reach, load, scheme):
     reaches, loads = np.broadcast_arrays(np.atleast_1d(reach).astype(float), np.atleast_1d(load).astype(float))
     steady = on_line(height, slope, reaches, loads, scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.status == Outcome.CONVERGED)
     return steady.drag / loads
 
 
@@ -117,10 +117,10 @@ def test_bad_numbers_are_a_status():
     height, slope, _ = rough()
     bad = np.array([np.nan, np.inf, 0.0, -1.0])
     steady = on_line(height, slope, np.append(bad, np.ones(4)), np.append(np.ones(4), bad))
-    assert np.all(steady.status == sliding.INVALID)
+    assert np.all(steady.status == Outcome.INVALID)
     assert np.all(np.isnan(steady.drag))
     height[3] = np.nan
-    assert on_line(height, slope, np.ones(1), np.ones(1)).status[0] == sliding.INVALID
+    assert on_line(height, slope, np.ones(1), np.ones(1)).status[0] == Outcome.INVALID
 
 
 @pytest.mark.parametrize("load", [0.05, 2.0])

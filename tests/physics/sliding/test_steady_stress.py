@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from schemes import on_line, under_indenter
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 
 SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
@@ -34,7 +34,11 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
     h, slope = (10**height * roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
     carried = 10 ** (load + height)
     steady = solve(h, slope, 10**reach, carried, scheme)
-    assert steady.status[0] == sliding.CONVERGED
+    if steady.status[0] == Outcome.DEPTH_NOT_FOUND:
+        # the dashpot alone holds the load on a length, or at a depth, that is lost in the rounding of the line
+        assert load - reach < -12
+        return
+    assert steady.status[0] == Outcome.CONVERGED
     # the highest point, which lies above the nodes by part of the range, is pressed in; at most all of the line is
     slack = 1e-9 * (np.ptp(h) + carried)
     assert -np.max(h) - np.ptp(h) <= steady.depth[0] <= carried + np.ptp(h) + slack
@@ -56,19 +60,18 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
 )
 def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, reach, load, scheme):
     amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
-    lines = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    height, slope = (np.append(line, line[0]) for line in lines)
+    height, slope = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
     numbers = (10**coefficient, exponent, np.array([10**reach]), np.array([10**load]), scheme)
     steady = under_indenter(height, slope, *numbers)
-    assert steady.status[0] in (sliding.CONVERGED, sliding.OUTSIDE_LINE)
-    assert np.isfinite(steady.drag[0]) == (steady.status[0] == sliding.CONVERGED)
+    assert steady.status[0] in (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
+    assert np.isfinite(steady.drag[0]) == (steady.status[0] == Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_flat_line_has_no_friction(scheme):
     flat = np.zeros(64)
     steady = on_line(flat, flat, np.geomspace(1e-15, 1e15, 7), np.geomspace(1e-15, 1e15, 7), scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.status == Outcome.CONVERGED)
     assert np.all(steady.drag == 0)
     assert steady.depth == pytest.approx(np.geomspace(1e-15, 1e15, 7), rel=1e-12)
     # by time steps the fastest one loses less than rounding in a step, and cannot tell contact from flight
@@ -81,8 +84,10 @@ def test_spikes_and_steps_are_solved(scheme):
     height[40] = 1e6
     reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
     steady = on_line(height, np.zeros(200), reach, load, scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
-    assert np.all(steady.drag >= 0)
+    rounding = load / 1e6 / np.maximum(reach, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
+    found = steady.status == Outcome.CONVERGED
+    assert np.all(found | rounding)
+    assert np.all(steady.drag[found] >= 0)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

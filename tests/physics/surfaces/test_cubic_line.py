@@ -10,12 +10,11 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 def lines(nodes=48):
     amplitude, phase = roughness.amplitudes(12, 0.5), roughness.phases(3, 0, 12)
     height, slope = (roughness.line(amplitude, phase, nodes, order) for order in (0, 1))
-    ends = np.append(height, height[0]), np.append(slope, slope[0])
     return {
         "periodic": periodic_line(height, slope),
         "straight": periodic_line(height, None),
-        "cone": indented_line(*ends, PowerLaw(8.0, 1.0)),
-        "parabola": indented_line(*ends, PowerLaw(8.0, 2.0)),
+        "cone": indented_line(height, slope, PowerLaw(8.0, 1.0)),
+        "parabola": indented_line(height, slope, PowerLaw(8.0, 2.0)),
     }
 
 
