@@ -180,7 +180,7 @@ LEFT_FIELDS = {
 
 
 def _shape(series: Series) -> xr.Dataset:
-    """Return a stretched and two exponentials where one exponential is not enough; no interval where they do not hold."""
+    """Return more laws of the relaxation where one exponential is not enough; no interval of one that does not hold."""
     cases = Cases.of(series, *_needed())
     found = _relaxations(cases, shaped=True)
     if not any("two" in left for left in found.left):
