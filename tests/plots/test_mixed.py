@@ -106,7 +106,7 @@ def test_stribeck_has_four_panels_and_a_line_a_load():
 @pytest.mark.parametrize("name", sorted(DRAW))
 def test_a_store_without_the_outputs_is_told_what_is_missing(name):
     with pytest.raises(DataError, match="no series of the store"):
-        DRAW[name]({"": dataset({"normal_force": [1.0, 2.0]}, ["load_share"])})
+        DRAW[name]({"": dataset({"normal_force": [1.0, 2.0]}, ["asperity_load_share"])})
 
 
 def test_figures_can_be_saved(tmp_path):
