@@ -1,4 +1,4 @@
-"""The displaced surface of a foundation against the definition: the largest of all that decays from where it touched."""
+"""The displaced surface of a foundation against its definition: the largest of all that decays behind a contact."""
 
 import numpy as np
 import pytest
