@@ -146,8 +146,8 @@ def _untold(found: superposition.Superposition) -> dict[str, str]:
     runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
     mean, scatter = found.usual
     return {
-        "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are taken to "
-        f"be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
+        "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are "
+        f"taken to be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
     }
 
 
@@ -223,6 +223,9 @@ def _of_two_groups(
     for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
         part = rows[(first == one) & (second == other)]
         (_,), (curve,) = _curves(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
+        if np.ptp(curve[0]) == 0:
+            where = f"{by[0]} = {centres[0][one]:g}, {by[1]} = {centres[1][other]:g}"
+            raise DataError(f"the curve at {where} needs two or more distinct points")
         keys.append((centres[0][one], centres[1][other]))
         curves.append(curve)
     a, b = np.array(keys).T

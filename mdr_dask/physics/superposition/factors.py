@@ -8,8 +8,8 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.least_squares import Prior, Shifts, changes_of, fit
-from mdr_dask.physics.superposition.problem import RATIOS, Problem, differences
-from mdr_dask.physics.superposition.steps import Common, Steps, scan, scan_pairs, together
+from mdr_dask.physics.superposition.problem import RATIOS, Common, Problem, differences
+from mdr_dask.physics.superposition.steps import Steps, scan, scan_pairs, together
 
 
 class Settings(NamedTuple):
@@ -62,8 +62,8 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
     """Find horizontal shifts.
 
     A first fit knows smoothing and scatter. Scans of all pairs of neighbours then tell what steps have in common, a
-    joint fit with that knowledge finds the best shifts, and scans about these their means and errors. `least` is a scatter
-    of the ordinates to be allowed for, whatever they tell.
+    joint fit with that knowledge finds the best shifts, and scans about these their means and errors. `least` is a
+    scatter of the ordinates to be allowed for, whatever they tell.
     """
     guess = problem.first_guess()
     first = SETTINGS.first_weight * float(problem.grid.weights[-1]) / 1e6
@@ -82,7 +82,8 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
         variance = max(variance, least**2)
         _, covariance, *_ = changes_of(problem.points, shifts, problem.grid, weight, variance, [prior])
         spread = _of_steps(covariance)
-        steps = together(scan(problem, shifts.across, spread, variance, steps.common, pairs), problem)
+        scanned = scan(problem, shifts.across, spread, (weight, variance), steps.common, pairs)
+        steps = together(scanned, problem)
         apart = steps.mean - np.diff(shifts.across)
         if np.all(np.abs(apart) < SETTINGS.near * np.sqrt(np.diag(spread))):
             break
@@ -94,8 +95,9 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
 def find_both(problem: Problem) -> Found:
     """Find vertical shifts beside horizontal ones.
 
-    Vertical shifts enter linearly, so that the problem is linear about good horizontal ones. Scans of curves moved along
-    the ordinate, as a plateau lies level only then, tell whether they are good, and how wide steps on a plateau are.
+    Vertical shifts enter linearly, so that the problem is linear about good horizontal ones. Scans of curves moved
+    along the ordinate, as a plateau lies level only then, tell whether they are good, and how wide steps on a plateau
+    are.
     """
     starts = [find_horizontal(problem, rise * problem.height) for rise in SETTINGS.rises]
     found = _likeliest(problem, starts)

@@ -157,11 +157,16 @@ def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance
     best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
     residual = float(np.sqrt(np.mean((law(best)[0] - factors) ** 2)))
     quantile = float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
-    return _Fitted(best, np.linalg.pinv(precision), quantile, residual, scatter)
+    return _Fitted(best, np.asarray(np.linalg.pinv(precision), dtype=np.float64), quantile, residual, scatter)
 
 
 def _solved(
-    law: Law, constants: FloatArray, known: NDArray[np.bool_], vectors: FloatArray, variances: FloatArray, target: FloatArray
+    law: Law,
+    constants: FloatArray,
+    known: NDArray[np.bool_],
+    vectors: FloatArray,
+    variances: FloatArray,
+    target: FloatArray,
 ) -> tuple[FloatArray, float, FloatArray]:
     """Return constants by damped Gauss-Newton steps, the sum of squares, and the precision of the constants."""
 

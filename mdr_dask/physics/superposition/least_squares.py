@@ -112,7 +112,7 @@ def basis(x: float, low: float, step: float, splines: int, value: FloatArray) ->
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _slopes(
+def slopes(
     points: Points, across: FloatArray, low: float, step: float, curve: FloatArray
 ) -> FloatArray:  # pragma: no cover
     """Return the slope of a spline at each shifted point."""
@@ -265,7 +265,7 @@ def linearise(
     smooth, nothing = workspace(splines, 0), np.empty(0)
     total = assemble(points, shifts, nothing, low, step, smooth)
     misfit = max(total - eliminate(smooth, weight)[1], 1e-14 * total)
-    slope = _slopes(points, shifts.across, low, step, best_curve(smooth))
+    slope = slopes(points, shifts.across, low, step, best_curve(smooth))
     normal = workspace(splines, (shifts.across.size - 1) * (2 if vertical else 1))
     assemble(points, shifts, slope, low, step, normal)
     return normal, total, misfit
@@ -329,7 +329,9 @@ def restricted(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def likeliest(points: int, normal: Normal, total: float, weights: FloatArray) -> tuple[float, float]:  # pragma: no cover
+def likeliest(
+    points: int, normal: Normal, total: float, weights: FloatArray
+) -> tuple[float, float]:  # pragma: no cover
     """Return the smoothing of largest restricted likelihood, and the variance of the scatter with it."""
     least, best, variance = np.inf, weights[0], 0.0
     for weight in weights:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.physics.superposition.factors import Found, find_both, find_horizontal
-from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows
+from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows, slopes
 from mdr_dask.physics.superposition.problem import Problem
 
 CURVE_POINTS = 201
@@ -227,15 +227,15 @@ class _Merged:
 
     @classmethod
     def at(cls, problem: Problem, found: Found) -> _Merged:
+        """Return the problem about the shifts found, with the best curve through them."""
         points, shifts, step = problem.points, found.shifts, problem.grid.step
         low, splines = extent(points, shifts.across, step)
         basis = rows(points, shifts.across, low, step, splines)
         second = np.diff(np.eye(splines), 2, axis=0)
         smooth = basis.T @ basis + found.weight * second.T @ second
         target = points.y + shifts.along[points.member]
-        coefficients = np.linalg.solve(smooth, basis.T @ target)
-        ahead = rows(points, shifts.across + 1e-4 * step, low, step, splines)
-        slope = (ahead - basis) @ coefficients / (1e-4 * step)
+        coefficients = np.asarray(np.linalg.solve(smooth, basis.T @ target), dtype=np.float64)
+        slope = slopes(points, shifts.across, low, step, coefficients)
         moved = np.eye(problem.curves)[points.member][:, 1:]
         border = [moved * slope[:, None]]
         if found.prior.mean.size >= problem.curves:

@@ -4,16 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.least_squares import SETTINGS, Grid, Points, Prior
-from mdr_dask.physics.superposition.steps import Common
 
 RATIOS = np.geomspace(0.03, 2.0, 12)
 """Scatters considered of steps about their mean with vertical factors, in widths and in heights of a curve."""
+
+
+class Common(NamedTuple):
+    """Mean and scatter of the steps between neighbours."""
+
+    mean: float
+    scatter: float
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,8 @@ class Problem:
     def between(self, first: int, last: int) -> Points:
         """Return the points of some neighbours, the first of which is number zero."""
         low, high = np.searchsorted(self.points.member, [first, last + 1])
-        return Points(*(column[low:high] for column in self.points[:2]), self.points.member[low:high] - first)
+        x, y, member = self.points
+        return Points(x[low:high], y[low:high], np.asarray(member[low:high] - first, dtype=np.intp))
 
     def first_guess(self) -> FloatArray:
         """Return the step that brings each curve onto the one before it."""

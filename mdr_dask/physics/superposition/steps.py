@@ -8,7 +8,7 @@ scatter about a common mean: those that are measured tell where the others may l
 from __future__ import annotations
 
 from math import erf, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,14 +25,12 @@ from mdr_dask.physics.superposition.least_squares import (
     extent,
     workspace,
 )
-
-
-if TYPE_CHECKING:
-    from mdr_dask.physics.superposition.problem import Problem
+from mdr_dask.physics.superposition.least_squares import SETTINGS as FIT
+from mdr_dask.physics.superposition.problem import Common, Problem
 
 
 class Settings(NamedTuple):
-    """Numbers of the scan; `python -m benchmarks.superposition plateaus` shows what they do."""
+    """Numbers of the scan; `python -m benchmarks.superposition` shows what they do."""
 
     scatters: tuple[float, float, int] = (0.04, 1.0, 9)
     """Least, largest and number of the scatters considered of steps about their mean, in widths of a curve."""
@@ -50,7 +48,7 @@ class Settings(NamedTuple):
     """Widths of a curve over which a step without overlap becomes unlikely, and how unlikely at most."""
 
 
-SETTINGS = Settings()
+SETTINGS, NEAR = Settings(), FIT.near
 FINE = np.array([-4.0, -3.0, -2.5, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0])
 """Places of a scan about the best step, in standard deviations of the linearised problem."""
 
@@ -60,13 +58,6 @@ class Scan(NamedTuple):
 
     places: list[FloatArray]
     logs: list[FloatArray]
-
-
-class Common(NamedTuple):
-    """Mean and scatter of the steps between neighbours."""
-
-    mean: float
-    scatter: float
 
 
 class Steps(NamedTuple):
@@ -203,14 +194,14 @@ def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _smoothing(
-    points: Points, shifts: Shifts, grid: Grid, variance: float
-) -> float:  # pragma: no cover
-    """Return the likeliest smoothing of a few neighbours alone: a plateau is smoother than the rest."""
+def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, variance: float) -> float:  # pragma: no cover
+    """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)
     curve, nothing = workspace(splines, 0), np.empty(0)
-    least, best = np.inf, grid.weights[0]
+    least, best = np.inf, usual
     for weight in grid.weights:
+        if not usual / NEAR < weight < usual * NEAR:
+            continue
         total = assemble(points, shifts, nothing, low, grid.step, curve)
         volume, explained = eliminate(curve, weight)
         score = volume - (splines - 2) * np.log(weight) + (total - explained) / variance
@@ -223,15 +214,22 @@ def scan_pairs(problem: Problem, weight: float, variance: float) -> Scan:
     """Scan each step with its two curves alone, from one end of their overlap to the other."""
     found = Scan([], [])
     for k, window in enumerate(problem.windows):
-        place = np.linspace(*window, SETTINGS.coarse)
+        place = np.linspace(window[0], window[1], SETTINGS.coarse)
         ways = np.column_stack([np.zeros(place.size), place])
         found.places.append(place)
         found.logs.append(likelihoods(problem.between(k, k + 1), ways, problem.grid.step, weight, variance))
     return found
 
 
-def scan(problem: Problem, across: FloatArray, spread: FloatArray, variance: float, common: Common, pairs: Scan) -> Scan:
-    """Scan each step while the others follow it, with all curves that overlap across it.
+def scan(
+    problem: Problem,
+    across: FloatArray,
+    spread: FloatArray,
+    smoothing: tuple[float, float],
+    common: Common,
+    pairs: Scan,
+) -> Scan:
+    """Scan each step while the others follow it, with the curves that overlap across it.
 
     Parameters
     ----------
@@ -240,13 +238,14 @@ def scan(problem: Problem, across: FloatArray, spread: FloatArray, variance: flo
         Shifts found.
     spread : array, shape (steps, steps)
         Covariance of their steps in the linearised problem.
-    variance : float
-        Of the scatter.
+    smoothing : tuple of float
+        Weight of the curvature and variance of the scatter.
     common : Common
         What the other steps are expected to be.
     pairs : Scan
         Of two neighbours: where else a step may lie.
     """
+    weight, variance = smoothing
     found, best, wide = Scan([], []), np.diff(across), np.sqrt(np.diag(spread))
     for k, window in enumerate(problem.windows):
         near, far = best[k] + wide[k] * FINE, pairs.places[k]
@@ -255,10 +254,10 @@ def scan(problem: Problem, across: FloatArray, spread: FloatArray, variance: flo
         place = np.unique(np.append(near, far[(far < near[0]) | (far > near[-1]) | (wide[k] > gap)]))
         first, last = _overlapping(problem, across, k)
         points, own = problem.between(first, last), across[first : last + 1] - across[first]
-        weight = _smoothing(points, Shifts(own, np.zeros(own.size)), problem.grid, variance)
+        local = _smoothing(points, Shifts(own, np.zeros(own.size)), problem.grid, weight, variance)
         steps = best + np.outer(place - best[k], spread[:, k] / spread[k, k])
         ways = np.column_stack([np.zeros(place.size), np.cumsum(steps[:, first:last], axis=1)])
-        log = likelihoods(points, ways, problem.grid.step, weight, variance)
+        log = likelihoods(points, ways, problem.grid.step, local, variance)
         others = np.delete(steps, k, axis=1) - common.mean
         beyond = np.maximum(np.maximum(place - window[1], window[0] - place), 0) / (SETTINGS.beyond[0] * problem.width)
         log -= 0.5 * np.sum(others**2, axis=1) / common.scatter**2 + np.minimum(0.5 * beyond**2, SETTINGS.beyond[1])
@@ -268,10 +267,14 @@ def scan(problem: Problem, across: FloatArray, spread: FloatArray, variance: flo
 
 
 def _overlapping(problem: Problem, across: FloatArray, k: int) -> tuple[int, int]:
-    """Return first and last curve of those that overlap across step k, the two beside it at least."""
+    """Return first and last curve of those that overlap across step k, and of those beside its own two."""
     member = problem.points.member
-    ends = np.searchsorted(member, np.arange(problem.curves)), np.searchsorted(member, np.arange(problem.curves), "right")
+    ends = (
+        np.searchsorted(member, np.arange(problem.curves)),
+        np.searchsorted(member, np.arange(problem.curves), "right"),
+    )
     low, high = problem.points.x[ends[0]] + across, problem.points.x[ends[1] - 1] + across
-    before = np.flatnonzero(high[:k] > low[k + 1 :].min())
-    after = np.flatnonzero(low[k + 2 :] < high[: k + 1].max())
-    return int(before[0]) if before.size else k, k + 2 + int(after[-1]) if after.size else k + 1
+    met = np.argwhere((low[: k + 1, None] < high[k + 1 :]) & (high[: k + 1, None] > low[k + 1 :]))
+    first = int(met[:, 0].min()) if met.size else k
+    last = k + 1 + (int(met[:, 1].max()) if met.size else 0)
+    return max(min(first, k - 1), 0), min(max(last, k + 2), problem.curves - 1)
