@@ -12,7 +12,7 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.loading_history import pieces
-from mdr_dask.models.velocity_jump import VelocityJump, time_unit
+from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.kinetics import AFTER, CASE, OUTPUTS, TIME, over_slope, trace
@@ -41,7 +41,7 @@ def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
 
 def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return times in units of tau from before the course to `last`, with the velocity and the load then, in SI."""
-    unit = time_unit(case)
+    unit = case.time_unit()
     before, parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     columns = [np.array([[-BEFORE * last, 0.0], [before, before], [case.normal_force, case.normal_force]])]
     for part in parts:
