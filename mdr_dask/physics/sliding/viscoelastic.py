@@ -26,9 +26,9 @@ class Settings(NamedTuple):
     cells_of_a_peak: int = 16  # cells in contact for every peak of the line whose errors are independent
     safety: float = 2.4
     # of the last change of drag, depth, contact fraction and slope, which their errors are never below
-    by_chance: tuple[float, ...] = (0.04, 0.04, 0.15, 0.15)
+    by_chance: tuple[float, ...] = (0.03, 0.03, 0.15, 0.15)
     of_before: float = 0.15  # of the change before, which the last one is never taken for less than
-    of_others: tuple[float, ...] = (0.04, 0.0, 0.04, 0.04)  # of the largest relative change of the four
+    of_others: tuple[float, ...] = (0.02, 0.0, 0.04, 0.04)  # of the largest relative change of the four
     of_a_cell: tuple[float, ...] = (0.0, 0.0, 0.2, 0.1)  # over cells in contact: edges move within their cells
     near_a_node: int = 16  # cells in contact below which the height of the highest peak between nodes counts in full
 
