@@ -1,4 +1,8 @@
-"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own."""
+"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own.
+
+An output may have a companion with its discretisation errors. Both errors of a mean are kept apart, as
+``standard_error`` (scatter of the realisations) and ``grid_error``, and joined in its interval.
+"""
 
 from __future__ import annotations
 
@@ -18,11 +22,14 @@ _STEP = 2**22
 
 @dataclass(frozen=True)
 class Statistic:
-    """A reduction over ``realisation`` as data: its name, what it means, how it is computed."""
+    """A reduction over ``realisation`` as data: its name, what it means, how it is computed.
+
+    `compute` takes an output and its companion with errors, or None; it returns None where it needs what is not there.
+    """
 
     name: str
     meaning: str
-    compute: Callable[[xr.DataArray], xr.DataArray]
+    compute: Callable[[xr.DataArray, xr.DataArray | None], xr.DataArray | None]
 
 
 def count(array: xr.DataArray) -> xr.DataArray:
@@ -48,6 +55,21 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
     """Return the standard deviation of the mean; NaN below two realisations."""
     number = count(array)
     return standard_deviation(array) / number.where(number > 0) ** 0.5
+
+
+def grid_error(error: xr.DataArray) -> xr.DataArray:
+    """Return the discretisation error of the mean: that of one realisation, for errors of a grid need not cancel."""
+    return mean(abs(error))
+
+
+def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
+    """Return the bootstrap interval of the mean, its halves joined with the discretisation error, root sum square."""
+    bounds = bootstrap_interval(array)
+    if error is None:
+        return bounds
+    middle, side = mean(array), xr.DataArray([-1.0, 1.0], coords={"bound": bounds["bound"]}, dims="bound")
+    half: xr.DataArray = ((bounds - middle) ** 2 + grid_error(error).fillna(0.0) ** 2) ** 0.5
+    return middle + side * half
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
@@ -133,14 +155,25 @@ def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> 
 
 
 STATISTICS = (
-    Statistic("mean", "mean over realisations", mean),
-    Statistic("standard_deviation", "standard deviation over realisations", standard_deviation),
-    Statistic("standard_error", "standard error of the mean over realisations", standard_error),
-    Statistic("quantile", "quantiles over realisations", quantiles),
-    Statistic("interval", "95 % bootstrap interval of the mean over realisations", bootstrap_interval),
-    Statistic("count", "number of realisations that succeeded", count),
+    Statistic("mean", "mean over realisations", lambda array, _: mean(array)),
+    Statistic("standard_deviation", "standard deviation over realisations", lambda array, _: standard_deviation(array)),
+    Statistic("standard_error", "standard error of the mean over realisations", lambda array, _: standard_error(array)),
+    Statistic(
+        "grid_error",
+        "discretisation error of the mean",
+        lambda _, error: None if error is None else grid_error(error),
+    ),
+    Statistic("quantile", "quantiles over realisations", lambda array, _: quantiles(array)),
+    Statistic("interval", "95 % interval of the mean over realisations, discretisation included", interval),
+    Statistic("count", "number of realisations that succeeded", lambda array, _: count(array)),
 )
 NAMES = tuple(statistic.name for statistic in STATISTICS)
+
+
+def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
+    """Return the discretisation errors of an output, as its ``ancillary_variables`` name them; None without any."""
+    name = dataset[output].attrs.get("ancillary_variables")
+    return dataset[name] if name in dataset.data_vars else None
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
@@ -156,15 +189,21 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     Returns
     -------
     Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs.
+        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs;
+        ``<output>_grid_error`` where the output has a companion with errors.
     """
     wanted = [statistic for statistic in STATISTICS if statistic.name in statistics]
     reduced = {}
-    for name, array in dataset.data_vars.items():
-        if name == "status" or "realisation" not in array.dims:
+    errors = {name: companion(dataset, name) for name in map(str, dataset.data_vars)}
+    aside = {"status", *(str(error.name) for error in errors.values() if error is not None)}
+    for name, error in errors.items():
+        array = dataset[name]
+        if name in aside or "realisation" not in array.dims:
             continue
         for statistic in wanted:
-            result = statistic.compute(array)
+            result = statistic.compute(array, error)
+            if result is None:
+                continue
             units = "1" if statistic.name == "count" else array.attrs.get("units", "1")
             meaning = f"{array.attrs.get('long_name', name)}, {statistic.meaning}"
             reduced[f"{name}_{statistic.name}"] = result.assign_attrs(units=units, long_name=meaning)

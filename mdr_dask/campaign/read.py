@@ -112,16 +112,20 @@ def _model(document: Document, spec: CampaignSpec, problems: Problems) -> Model[
 
 
 def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems: Problems) -> tuple[str, ...]:
-    if spec.outputs is None:
-        return tuple(output.name for output in model.outputs if output.default)
     names = [output.name for output in model.outputs]
-    for index, name in enumerate(spec.outputs):
+    errors = {companion.name: name for name, companion in model.companions.items()}
+    wanted = spec.outputs or [output.name for output in model.outputs if output.default]
+    for index, name in enumerate(spec.outputs or ()):
         path = ("outputs", index)
-        if name not in names:
+        if name in errors:
+            what = f"this error comes with its output: expected {errors[name]!r}, and not errors: false, got {name!r}"
+            problems.add(document.place(path), dotted(path), what)
+        elif name not in names:
             problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")
-        elif name in spec.outputs[:index]:
+        elif name in wanted[:index]:
             problems.add(document.place(path), dotted(path), f"this output is given twice: {name}")
-    return tuple(name for name in names if name in spec.outputs)
+    kept = [name for name in names if name in wanted]
+    return model.with_companions(kept) if spec.errors else tuple(kept)
 
 
 def _replication(
@@ -135,6 +139,7 @@ def _replication(
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
         problems.add(document.place(path), dotted(path), what)
     until = {}
+    outputs = tuple(name for name in outputs if name in {output.name for output in model.outputs})
     for name, tolerance in wanted.until.items():
         path = ("realisations", "until", name)
         if name not in outputs:

@@ -96,6 +96,7 @@ def output_rows(model: Model[Any]) -> list[dict[str, str]]:
             "unit": output.unit,
             "dimensions": ", ".join(output.dims),
             "default": "yes" if output.default else "no",
+            "error": f"`{output.error.name}`" if output.has_error else "",
             "meaning": output.long_name,
         }
         for output in model.outputs

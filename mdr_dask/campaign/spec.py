@@ -113,4 +113,9 @@ class CampaignSpec(Parameters):
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
         None, description="arrays that are computed and stored; those marked as default if not given"
     )
+    errors: bool = Field(
+        True,
+        description="whether each output comes with its estimated discretisation error, <output>_error; false saves "
+        "that work",
+    )
     store: StoreSpec = Field(default_factory=StoreSpec, description="where results go")

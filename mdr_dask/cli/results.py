@@ -27,7 +27,7 @@ class Reading(click.Command):
             return super().invoke(context)
 
 
-STATISTICS = ("mean", "standard_deviation", "standard_error", "quantile", "interval", "count")
+STATISTICS = ("mean", "standard_deviation", "standard_error", "grid_error", "quantile", "interval", "count")
 
 store_argument = click.argument("store")
 series_option = click.option("--series", help="Name of the series, where the campaign has any.")
@@ -131,7 +131,9 @@ def show(
     limit: int,
     form: str | None,
 ) -> None:
-    """Show results as a table: means and standard errors, or every realisation.
+    """Show results as a table: means with their errors, or every realisation.
+
+    A mean stands with the standard error of the realisations and, behind a second +-, with the discretisation error.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
@@ -142,7 +144,7 @@ def show(
 
     dataset = selection.group(room.datasets(store), series)
     wanted = selection.select(selection.outputs(dataset, outputs), selections)
-    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error"))
+    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error", "grid_error"))
     rows, units = table(shown)
     if not (raw or statistic or form):
         rows, units = with_errors(rows, units)

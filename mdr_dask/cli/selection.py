@@ -31,7 +31,10 @@ def outputs(dataset: xr.Dataset, names: tuple[str, ...]) -> xr.Dataset:
             raise click.UsageError(f"no output {name!r} in this store{_meant(name, known)}; known: {', '.join(known)}")
     case_dims = set(dataset["status"].dims)
     kept = list(names) or [name for name in known if set(dataset[name].dims) <= case_dims]
-    return dataset[kept]
+    errors = [
+        dataset[name].attrs["ancillary_variables"] for name in kept if "ancillary_variables" in dataset[name].attrs
+    ]
+    return dataset[list(dict.fromkeys([*kept, *errors]))]
 
 
 def select(dataset: xr.Dataset, selections: tuple[str, ...]) -> xr.Dataset:
