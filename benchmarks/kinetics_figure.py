@@ -14,7 +14,7 @@ import sys
 import numpy as np
 from numba import njit
 
-from mdr_dask.fit import bootstrap
+from mdr_dask import bootstrap
 from mdr_dask.fit.relaxation import exponential, point_weights, widths
 from mdr_dask.physics.sliding.backward_euler import solve
 from mdr_dask.physics.surfaces import roughness
@@ -159,7 +159,7 @@ def straight(time: np.ndarray, traces: np.ndarray, weights: np.ndarray) -> np.nd
 
 def rates_of(time: np.ndarray, lines: np.ndarray) -> list[np.ndarray]:
     """Return samples of the rates of a way: windows, end fitted, straight line, weights 1 / variance, integral."""
-    traces = bootstrap.means(lines)
+    traces = bootstrap.means(bootstrap.complete(lines))
     found = []
     for window in WINDOWS:
         inside = time <= window

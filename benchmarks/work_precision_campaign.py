@@ -98,7 +98,11 @@ def chosen(folder, scene, truth):
 
 def picked(folder, scene, accuracy):
     """Return median and largest error estimate that `auto` stops at, in the first line of the cases."""
-    estimate = run(folder, scene, "hermite", "auto", 1, 0, accuracy, "discretisation_error")[0]
+    friction, error = (
+        run(folder, scene, "hermite", "auto", 1, 0, accuracy, output)[0]
+        for output in ("friction_coefficient", "friction_coefficient_error")
+    )
+    estimate = error / friction
     return float(np.median(estimate)), float(estimate.max())
 
 

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
+
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-CONFIDENCE = 0.95
-RESAMPLES = 1000
 #: Results that one step of the bootstrap holds in memory.
 _STEP = 2**22
 
@@ -63,13 +63,32 @@ def grid_error(error: xr.DataArray) -> xr.DataArray:
 
 
 def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
-    """Return the bootstrap interval of the mean, its halves joined with the discretisation error, root sum square."""
-    bounds = bootstrap_interval(array)
-    if error is None:
-        return bounds
-    middle, side = mean(array), xr.DataArray([-1.0, 1.0], coords={"bound": bounds["bound"]}, dims="bound")
-    half: xr.DataArray = ((bounds - middle) ** 2 + grid_error(error).fillna(0.0) ** 2) ** 0.5
-    return middle + side * half
+    """Return the bootstrap interval of the mean, with the discretisation error added to either side.
+
+    Returns
+    -------
+    DataArray
+        With the dimension ``bound`` (``low``, ``high``) in place of ``realisation`` (`mdr_dask.bootstrap.interval`).
+    """
+    count = array.sizes["realisation"]
+    if error is not None:
+        array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
+    bounds = _reduce(array, _interval, {"count": count}, "bound", 2)
+    return bounds.assign_coords(bound=np.array(["low", "high"], dtype=object))
+
+
+def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the ends of intervals from realisations along the last axis, and perhaps their error behind them."""
+    flat = values.reshape(-1, values.shape[-1])
+    bounds = np.full((len(flat), 2), np.nan)
+    step = max(1, _STEP // bootstrap.RESAMPLES)
+    for start in range(0, len(flat), step):
+        rows = flat[start : start + step].T
+        stack = bootstrap.means(rows[:count])
+        stack = np.concatenate([stack, stack[0] + np.nan_to_num(rows[count:])])
+        number = np.isfinite(rows[:count]).sum(axis=0)
+        bounds[start : start + step] = np.transpose(bootstrap.interval(stack, number))
+    return bounds.reshape(*values.shape[:-1], 2)
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
@@ -102,56 +121,6 @@ def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
     low = np.take_along_axis(ordered, below, axis=-1)
     high = np.take_along_axis(ordered, np.minimum(below + 1, last), axis=-1)
     return np.asarray(low + (position - below) * (high - low))
-
-
-def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:
-    """Return the percentile bootstrap interval of the mean.
-
-    Parameters
-    ----------
-    array : DataArray
-        With a dimension ``realisation``; NaN where a case failed.
-    seed : int
-        Seed of the resampling. Every case is resampled alike, so that differences between cases keep the pairing that
-        common random numbers give them.
-
-    Returns
-    -------
-    DataArray
-        With the dimension ``bound`` (``low``, ``high``) instead of ``realisation``, at the confidence `CONFIDENCE`;
-        deviations are stretched by sqrt(n / (n - 1)) and by Student's t over the normal quantile, without which small
-        ensembles are covered too rarely.
-    """
-    return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(
-        bound=np.array(["low", "high"], dtype=object)
-    )
-
-
-def _bootstrap(values: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    number = values.shape[-1]
-    draws = np.random.Generator(np.random.Philox(seed)).multinomial(number, np.full(number, 1 / number), RESAMPLES)
-    weights = draws.T.astype(float)
-    flat = values.reshape(-1, number)
-    bounds = np.full((len(flat), 2), np.nan)
-    step = max(1, _STEP // RESAMPLES)
-    for start in range(0, len(flat), step):
-        bounds[start : start + step] = _bootstrap_rows(flat[start : start + step], weights)
-    return bounds.reshape(*values.shape[:-1], 2)
-
-
-def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    from scipy.special import ndtri, stdtrit
-
-    valid = np.isfinite(rows)
-    number = valid.sum(axis=1)
-    spare = np.maximum(number - 1, 1)
-    mean = np.where(valid, rows, 0.0).sum(axis=1) / np.maximum(number, 1)
-    deviations = np.where(valid, rows - mean[:, None], 0.0) @ weights
-    drawn = valid.astype(float) @ weights
-    low, high = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
-    stretch = np.sqrt(number / spare) * stdtrit(spare, high) / ndtri(high)
-    shifts = np.quantile(deviations / np.maximum(drawn, 1.0), [low, high], axis=1).T
-    return np.where(number[:, None] > 1, mean[:, None] + stretch[:, None] * shifts, np.nan)
 
 
 STATISTICS = (

@@ -103,6 +103,13 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
         (LINE, "  radius: 20 mm\n", "", "line_load needs radius"),
         (LINE, "  radius: 20 mm\n", "  radius: 20 mm\n  load_parameter: 1e-5\n", "got load_parameter and line_load"),
         (LINE, "  radius: 20 mm\n", "  radius: 20 mm\n  inlet: 2\n", "expected a number below 0, got 2"),
+        (
+            LINE,
+            "  radius: 20 mm\n",
+            "  radius: 20 mm\n  neighbours: true\n",
+            "there is no neighbours any more: every case",
+        ),
+        (LINE, "outputs: [", "outputs: [discretisation_error, ", "any more: central_film and minimum_film come with"),
     ],
 )
 def test_bad_input_is_told_once_with_its_place(text, old, new, message, capsys):

@@ -12,10 +12,11 @@ from mdr_dask.campaign.definition import Campaign, Replication, Series, Toleranc
 from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.messages import report_errors
-from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
+from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
-from mdr_dask.campaign.units import to_si
+from mdr_dask.errors import ModelError, did_you_mean
 from mdr_dask.models.base import Model
+from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
@@ -71,7 +72,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     problems.raise_if_any()
     return Campaign(
         name=spec.name,
-        model=model.name,
+        model=spec.model,
         seed=spec.seed,
         replication=replication,
         series=series,
@@ -103,11 +104,11 @@ def _spec(document: Document, problems: Problems) -> tuple[CampaignSpec, set[str
 
 
 def _model(document: Document, spec: CampaignSpec, problems: Problems) -> Model[Any] | None:
-    if spec.model in models.NAMES:
+    try:
         return models.load(spec.model)
-    problems.add(
-        document.place(("model",)), "model", f"unknown model {spec.model!r}{did_you_mean(spec.model, models.NAMES)}"
-    )
+    except ModelError as error:
+        hint = did_you_mean(spec.model, models.names()) if str(error).startswith("unknown") else ""
+        problems.add(document.place(("model",)), "model", f"{error}{hint}")
     return None
 
 
@@ -119,6 +120,9 @@ def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems
         path = ("outputs", index)
         if name in errors:
             what = f"this error comes with its output: expected {errors[name]!r}, and not errors: false, got {name!r}"
+            problems.add(document.place(path), dotted(path), what)
+        elif name in model.parameters.gone:
+            what = f"there is no {name} any more: {model.parameters.gone[name]}"
             problems.add(document.place(path), dotted(path), what)
         elif name not in names:
             problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")

@@ -14,8 +14,8 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.campaign.units import DEFINITIONS
 from mdr_dask.models.base import DataFile, Model, unit_of
+from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\
 # The campaign file

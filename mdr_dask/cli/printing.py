@@ -49,9 +49,19 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     cells = [titles, *([_short(row[name]) for name in names] for row in shown)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
     for line in cells:
-        click.echo("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
+        click.echo("  ".join(map(_aligned, names, line, widths)).rstrip())
     if len(shown) < len(rows):
         click.echo(f"... {len(rows) - len(shown)} more rows (--limit 0 prints all)", err=True)
+
+
+def _aligned(name: str, cell: str, width: int) -> str:
+    """Return a cell, numbers to the right and the sentence of a fit to the left."""
+    return cell.ljust(width) if name == "law_holds" else cell.rjust(width)
+
+
+def printable(text: str) -> str:
+    """Return a text without control characters, which would speak to the terminal in place of the user."""
+    return "".join(mark if mark.isprintable() or mark == "\n" else repr(mark)[1:-1] for mark in text)
 
 
 def print_json(document: Any) -> None:
@@ -128,7 +138,7 @@ def _error(error: float, size: float) -> str:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 
 def _finite(value: Any) -> Any:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli import selection
-from mdr_dask.cli.printing import print_json, print_rows, table, with_errors, with_intervals
+from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_errors, with_intervals
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
 if TYPE_CHECKING:
@@ -68,8 +68,8 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
     for series, reason in dict.fromkeys((message["series"], message["message"]) for message in found):
         alike = [message for message in found if (message["series"], message["message"]) == (series, reason)]
         kind = "warning" if alike[0]["status"] == "done" else alike[0]["status"]
-        click.echo(f"{series + ': ' if series else ''}{len(alike)} x {kind}: {reason}")
-        click.echo(f"    {_shared(alike)}")
+        click.echo(printable(f"{series + ': ' if series else ''}{len(alike)} x {kind}: {reason}"))
+        click.echo(printable(f"    {_shared(alike)}"))
     if not found:
         click.echo("no failures" if not messages else "no messages")
 

@@ -76,7 +76,7 @@ def _pick(dataset: xr.Dataset, name: str, wanted: str) -> xr.Dataset:
 
 
 def _number(text: str, unit: str, name: str) -> float:
-    from mdr_dask.campaign.units import to_si
+    from mdr_dask.units import to_si
 
     try:
         return float(text)

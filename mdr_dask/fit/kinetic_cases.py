@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit import bootstrap
 
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 LEAST = 2  # realisations of a case that must have succeeded
@@ -90,7 +90,9 @@ class Cases:
     def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return means of mu_1, d_mu_0 and mu_2 and of their resamples, shapes (1 + RESAMPLES, cases)."""
         stacked = np.stack([self.output(name) for name in LEVELS], axis=-1)
-        before, jump, after = np.moveaxis(np.stack([bootstrap.means(case) for case in stacked], axis=1), -1, 0)
+        before, jump, after = np.moveaxis(
+            np.stack([bootstrap.means(bootstrap.complete(case)) for case in stacked], axis=1), -1, 0
+        )
         return before, jump, after
 
     def relaxing(self) -> FloatArray:

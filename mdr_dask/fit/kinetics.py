@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit import bootstrap
 from mdr_dask.fit.base import Fit
 from mdr_dask.fit.kinetic_cases import LEVELS, Cases, law_rate
 from mdr_dask.fit.relaxation import (
@@ -79,7 +79,7 @@ def _relaxations(cases: Cases, shaped: bool = False) -> tuple[dict[str, FloatArr
     samples = {name: np.full((1 + bootstrap.RESAMPLES, size), np.nan) for name in fields}
     goodness = {name: np.full(size, np.nan) for name in GOODNESS_FIELDS}
     for k, relaxing in enumerate(cases.relaxing()):
-        traces = bootstrap.means(relaxing)
+        traces = bootstrap.means(bootstrap.complete(relaxing))
         good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
         if not np.nanmax(np.abs(traces[0]), initial=0.0) > INSTANT * slope[k]:
             continue

@@ -9,7 +9,7 @@ from enum import IntEnum
 from functools import reduce
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,9 +30,13 @@ class Status(IntEnum):
 
 
 class Parameters(BaseModel):
-    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable."""
+    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
+
+    `gone` has the parameters and outputs that there once were, and what to write instead of each.
+    """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    gone: ClassVar[Mapping[str, str]] = {}
 
 
 def _looks_numeric(value: Any) -> bool:

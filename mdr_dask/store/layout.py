@@ -143,6 +143,7 @@ def _create_coordinate(
         shape=values.shape,
         chunks=(_COORDINATE_CHUNK,) * values.ndim,
         dtype="str" if values.dtype == object else values.dtype,
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
         dimension_names=dims,
         attributes=attrs,
     )

@@ -1,10 +1,8 @@
 """Do the 95 % intervals of the kinetic fits hold the truth, in synthetic stores whose lines scatter as real ones do?"""
 
 import numpy as np
-import pytest
 import xarray as xr
 
-from mdr_dask.fit import bootstrap
 from mdr_dask.fit.kinetics import FITS, jump_law
 
 FIT = {fit.name: fit for fit in FITS}
@@ -112,29 +110,3 @@ def test_constant_and_limits_of_the_jump() -> None:
     assert set(first["cases"].values) == {2}
     before = 0.05 * np.sqrt(x[:2])
     assert LEAST < coverage(first, "found", np.mean(jump_law(before, 0.42) / before)) < MOST
-
-
-@pytest.mark.parametrize("count", [5, 12, 60])
-def test_interval_of_a_mean_of_few(count: int) -> None:
-    values = np.random.default_rng(3).normal(2.0, 1.0, (count, 2000))
-    low, high = bootstrap.interval(bootstrap.means(values), count)
-    # 400 resamples and percentiles of five values leave a few per cent
-    assert np.mean((low < 2) & (high > 2)) == pytest.approx(0.95, abs=0.035)
-
-
-def test_interval_of_what_is_positive_is_the_same_for_its_inverse() -> None:
-    samples = bootstrap.means(np.random.default_rng(4).lognormal(0.0, 1.0, (20, 3)))
-    low, high = bootstrap.interval(samples, 20, positive=True)
-    other_low, other_high = bootstrap.interval(1 / samples, 20, positive=True)
-    # percentiles between two resamples are interpolated in logarithms in both
-    assert np.allclose([1 / high, 1 / low], [other_low, other_high], rtol=1e-12)
-    assert np.all(np.isnan(bootstrap.interval(samples, 1)))
-
-
-def test_a_realisation_that_failed_somewhere_is_left_out_everywhere() -> None:
-    values = np.random.default_rng(6).normal(size=(6, 4))
-    values[2, 1] = np.nan
-    found = bootstrap.means(values)
-    assert np.allclose(found[0], np.delete(values, 2, axis=0).mean(axis=0))
-    values[1:, 0] = np.nan
-    assert np.all(np.isnan(bootstrap.means(values)))

@@ -10,7 +10,8 @@ import xarray as xr
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block
-from mdr_dask.models.ehl_line import MODEL, STEEL, EhlLineParameters, compute, coordinates
+from mdr_dask.models.ehl_line.declaration import MODEL, STEEL, EhlLineParameters, coordinates
+from mdr_dask.models.ehl_line.solve import compute
 from mdr_dask.physics.lubrication.film_formulas import REGIMES
 from mdr_dask.plots.ehl import PLOTS
 

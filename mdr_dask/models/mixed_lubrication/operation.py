@@ -103,9 +103,9 @@ def _solved(contact: LineContact, W: float) -> Film:
     from mdr_dask.physics.lubrication import line_contact
 
     solution = line_contact.solve(contact)
-    if solution.status:
+    if solution.reason:
         return Film(np.nan, problem=solution.reason)
-    return Film(solution.central_film * 8 * W / np.pi, solution.reason)
+    return Film(float(solution.central_film.value) * 8 * W / np.pi)
 
 
 def fixed_values(operation: Operation) -> dict[str, float]:

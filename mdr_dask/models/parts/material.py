@@ -186,12 +186,12 @@ def _fit_of(kind: PowerLaw | ModulusTable) -> SeriesFit:
     return rheology.fit_series(omega, storage / divisor, loss / divisor, kind.arms_per_decade)
 
 
-def fit_error(material: Material) -> float:
+def fit_error(material: Material | None) -> float:
     """Return the rms relative error of the Prony series that stands for a law or a table; 0 for other materials.
 
     Raises as `solid_of` does.
     """
-    kind = material.power_law or material.dma_table
+    kind = None if material is None else material.power_law or material.dma_table
     return 0.0 if kind is None else _fit_of(kind).error
 
 

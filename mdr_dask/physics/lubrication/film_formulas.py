@@ -117,6 +117,20 @@ def fluid_friction(
     return float(np.sum(weights * stress * cosine) / (contact.pressure * np.sum(weights * cosine**2)))
 
 
+#: Film thickness over the radius above which a parabola is no longer the shape of a roller within some per cent.
+THICKEST_FILM = 0.1
+
+
+def thick_film(film: float) -> str:
+    """Say that a film h/R is too thick for lubrication theory; an empty string if it is not."""
+    if not film > THICKEST_FILM:
+        return ""
+    return (
+        f"the film is {film:.2g} of the radius, more than {THICKEST_FILM:g}: rollers are no parabolas there, and "
+        "Reynolds' equation does not hold"
+    )
+
+
 class Groups(NamedTuple):
     """Load, speed and material parameters ``W``, ``U``, ``G`` of a line contact."""
 

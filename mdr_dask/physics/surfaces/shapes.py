@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba import njit
@@ -27,6 +29,41 @@ def mapped(exponent: float) -> float:
     return 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
 
 
+class Shape(Protocol):
+    """The line of a body under the roughness: what an indenter has to say of itself to the solvers."""
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the height into the elastomer, 0 at the tip, and the slopes on the left and right of every x."""
+
+    def scaled(self, length: float, height: float) -> Shape:
+        """Return the shape in other units of length and height."""
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """The line -c |x|^n of a body of revolution, already mapped by the MDR rule; c > 0, n >= 1."""
+
+    coefficient: float
+    exponent: float
+
+    @classmethod
+    def of_body(cls, coefficient: float, exponent: float) -> PowerLaw:
+        """Return the line of a body c r^n."""
+        return cls(mapped(exponent) * coefficient, exponent)
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
+        distance = np.abs(x)
+        steepness = self.coefficient * self.exponent * distance ** (self.exponent - 1)
+        left = np.where(x > 0, -steepness, steepness)
+        right = np.where(x < 0, steepness, -steepness)
+        return -self.coefficient * distance**self.exponent, left, right
+
+    def scaled(self, length: float, height: float) -> PowerLaw:
+        """Return the shape in other units of length and height."""
+        return PowerLaw(self.coefficient * length**self.exponent / height, self.exponent)
+
+
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:
     """Return the static half-width a of the contact of a smooth line c |x|^n.
 
@@ -39,15 +76,6 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     """
     width: FloatArray = ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
     return width
-
-
-def shape(x: FloatArray, coefficient: float, exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
-    distance = np.abs(x)
-    steepness = coefficient * exponent * distance ** (exponent - 1)
-    left = np.where(x > 0, -steepness, steepness)
-    right = np.where(x < 0, steepness, -steepness)
-    return -coefficient * distance**exponent, left, right
 
 
 @njit(nogil=True, cache=True)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.surfaces.shapes import shape
+from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.transients.element import Foundation
 from mdr_dask.physics.transients.elements import (
     CONVERGED,
@@ -122,7 +122,7 @@ def indented_line(height: FloatArray, slope: FloatArray, coefficient: float, exp
         c > 0 and n >= 1; x is measured from node n // 2. The kink of a cone is rounded over one cell.
     """
     n = height.size - 1
-    smooth, left, right = shape((np.arange(n + 1) - n // 2) / n, coefficient, exponent)
+    smooth, left, right = PowerLaw(coefficient, exponent).at((np.arange(n + 1) - n // 2) / n)
     return Line(height + smooth, slope + 0.5 * (left + right), False)
 
 

@@ -9,8 +9,9 @@ from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.sliding.steady import INVALID as STEADY_INVALID
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.steady import steady_sliding
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.march import Pace, march
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -165,14 +166,14 @@ def velocity_jumps(
     if not np.all(np.isfinite(height)):
         return [_failed(times, INVALID)] * loads.size
     every = 2 if height.size >= LONG_LINE and height.size % 2 == 0 else 1
-    steady = steady_sliding(height[::every], slope[::every], reaches.ravel(), np.repeat(loads, 2), contact=False)
+    steady = steady_sliding(periodic_line(height[::every], slope[::every]), reaches.ravel(), np.repeat(loads, 2))
     depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
     profile, top = cubic_profile(height, slope)
     equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
     jumps = []
     for k in range(loads.size):
         if states[k].any():
-            jumps.append(_failed(times, INVALID if STEADY_INVALID in states[k] else NOT_CONVERGED))
+            jumps.append(_failed(times, INVALID if Outcome.INVALID in states[k] else NOT_CONVERGED))
             continue
         change = float(depths[k, 1] - depths[k, 0])
         pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])

@@ -1,9 +1,8 @@
 import numpy as np
 import pytest
+from schemes import material_on_line, on_line
 
 from mdr_dask.physics import solids as rheology
-from mdr_dask.physics.sliding.steady import steady_sliding
-from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients.element import Foundation
 from mdr_dask.physics.transients.elements import CONVERGED, OUTSIDE_LINE
@@ -133,7 +132,7 @@ def test_ends_in_the_direct_steady_state(solid: Foundation, last: float) -> None
     height, slope = rough()
     _, found = jump(closed_line(height, slope), solid, (0.1, 0.12), 0.3, last)
     body = rheology.prony(1.0, solid.moduli, solid.times, solid.viscosity)
-    steady = steady_viscoelastic_sliding(height, 1 / height.size, body, 0.12, 4 * 0.3)
+    steady = material_on_line(height, 1 / height.size, body, 0.12, 4 * 0.3)
     # second order in eight nodes for the shortest half wavelength
     assert found.drag[-1] / 0.3 == pytest.approx(steady.friction_coefficient, rel=5e-3)
     assert found.depth[-1] == pytest.approx(steady.depth, rel=2e-3)
@@ -144,7 +143,7 @@ def test_kelvin_ends_in_the_direct_steady_state_at_second_order() -> None:
     for oversampling in (8, 32):
         height, slope = rough(oversampling)
         _, found = jump(closed_line(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
-        steady = steady_sliding(height, slope, np.array([0.12]), np.array([0.3]))
+        steady = on_line(height, slope, np.array([0.12]), np.array([0.3]))
         errors.append(abs(found.drag[-1] / steady.drag[0] - 1))
     assert errors[0] < 6e-3
     assert errors[1] < errors[0] / 8

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from schemes import on_line
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from mdr_dask.physics.sliding.steady import steady_sliding
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients import velocity_jump as kinetics
 from mdr_dask.physics.transients.protocol import follow
@@ -32,7 +32,7 @@ def jump(change: float = 0.2, per_decade: float = 24, load: float = LOAD, oversa
 def test_ends_in_the_direct_steady_state(change: float) -> None:
     found = jump(change)
     height, slope = line()
-    steady = steady_sliding(height, slope, np.array([REACH, REACH * (1 + change)]), np.full(2, LOAD))
+    steady = on_line(height, slope, np.array([REACH, REACH * (1 + change)]), np.full(2, LOAD))
     assert found.status == CONVERGED
     # another quadrature of the same cubic cells
     assert np.allclose([found.before, found.after], steady.drag, rtol=1e-4)
@@ -55,7 +55,7 @@ def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np
     """Follow every element with steps of half its spacing from a steady state reached by sliding at v_1."""
     height, slope = line(oversampling=elements)
     nodes = height.size
-    first = steady_sliding(height, slope, np.array([REACH]), np.array([LOAD]))
+    first = on_line(height, slope, np.array([REACH]), np.array([LOAD]))
     step = 0.5 / nodes / REACH
     run_in = np.arange(0, 2 / REACH + 1e-9, step)  # two turns: exp(-20) of the start is left
     u = np.maximum(first.depth[0] + height, 0.0)
@@ -99,7 +99,7 @@ def test_jump_condition_against_ever_finer_steps() -> None:
     errors = []
     for elements in (256, 1024):
         fine_height, fine_slope = line(oversampling=elements)
-        steady = steady_sliding(fine_height, fine_slope, np.array([REACH]), np.array([LOAD]))
+        steady = on_line(fine_height, fine_slope, np.array([REACH]), np.array([LOAD]))
         w = steady.depth[0] + fine_height
         u = w.copy()
         fade = np.exp(-1 / fine_height.size / REACH)

@@ -1,4 +1,4 @@
-"""Units of a campaign file to SI; the only module that knows pint."""
+"""Units of campaign files and tables to SI: the one list, and the only module that knows pint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.campaign.problems import did_you_mean
+from mdr_dask.errors import did_you_mean
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -93,6 +93,7 @@ _MEANINGS = {
     "Pa s": ("a viscosity", "10 mPa s"),
     "m^2/s": ("a diffusivity", "1 mm^2/s"),
     "rad": ("an angle", "5 deg"),
+    "rad/s": ("an angular frequency", "10 rad/s"),
     "K": ("a temperature", "300 K"),
     "1/K": ("an inverse temperature", "1e-3 1/K"),
     "kg": ("a mass", "1 g"),
@@ -100,6 +101,10 @@ _MEANINGS = {
     "J": ("an energy", "1 mJ"),
     "W": ("a power", "1 W"),
 }
+
+#: What a unit may be: short, and with exponents of at most two digits. Others would keep pint busy for ever.
+_MOST_LETTERS = 60
+_UNTOLD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
@@ -126,9 +131,12 @@ def to_si(value: str, unit: str) -> float:
         If it is no number with a unit, the unit is unknown or of another dimension.
     """
     match = _QUANTITY.match(value)
-    if match is None or _NOT_A_UNIT.match(match[2]):
-        raise ValueError(f"expected {expected(unit)}, got {value!r}")
+    if match is None or _NOT_A_UNIT.match(match[2]) or len(match[2]) > _MOST_LETTERS or _UNTOLD_POWER.search(match[2]):
+        shown = value if len(value) <= _MOST_LETTERS else value[:_MOST_LETTERS] + "..."
+        raise ValueError(f"expected {expected(unit)}, got {shown!r}")
     number, given = match.groups()
+    if not math.isfinite(float(number)):
+        raise ValueError(f"expected a finite number, got {value!r}")
     try:
         factor, offset = _conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
@@ -144,6 +152,22 @@ def expected(unit: str) -> str:
     spaced = unit.replace("*", " ").replace("**", "^")
     name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
     return f"{name} (such as {example!r})" if example else name
+
+
+def example_unit(unit: str) -> str:
+    """Return a unit that a user would write for a quantity of a SI unit: MPa for Pa."""
+    return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit of the list."""
+    if _NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text):
+        return False
+    try:
+        registry().parse_units(_spelling(text))
+    except Exception:  # whatever its tokens happen to raise
+        return False
+    return True
 
 
 def _times(number: str, factor: float) -> float:
