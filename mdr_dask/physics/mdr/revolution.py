@@ -166,7 +166,7 @@ _ABSCISSA, _WEIGHT = gauss(8)
 
 
 @inlined
-def image_rise(image, start, level, gap):  # type: ignore[no-untyped-def]
+def image_rise(image: Image, start: float, level: float, gap: float) -> float:
     """Return g0(start + gap) - level, with level = g0(start), without cancellation."""
     if image.knots.size == 0:
         n = image.exponent
@@ -186,13 +186,13 @@ def image_rise(image, start, level, gap):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _piece(image, place, derivative):  # type: ignore[no-untyped-def]
+def _piece(image: Image, place: float, derivative: int) -> float:
     """Return the piecewise cubic at a place, or its slope."""
     cell = min(max(np.searchsorted(image.knots, place, side="right") - 1, 0), image.coefficients.shape[1] - 1)
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
-        return ((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell]
-    return (3.0 * k[0, cell] * local + 2.0 * k[1, cell]) * local + k[2, cell]
+        return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
+    return float((3.0 * k[0, cell] * local + 2.0 * k[1, cell]) * local + k[2, cell])
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:

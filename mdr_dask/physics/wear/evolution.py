@@ -97,7 +97,6 @@ class Resolution(NamedTuple):
         """Return a resolution with steps between those of two."""
         return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
 
-
     def rougher(self) -> tuple[Resolution, Resolution]:
         """Return the two rougher resolutions."""
         first, second = self.rough
@@ -129,9 +128,11 @@ class Moment:
 
 
 class Problem(Protocol):
-    """One kind of slip, as the equations of one step; `newton` is the error of their solution over that of a step."""
+    """One kind of slip, as the equations of one step."""
 
-    newton: float
+    @property
+    def newton(self) -> float:
+        """Return the error of the solution of a step's equations over that of the step."""
 
     @property
     def panels(self) -> Panels:

@@ -114,8 +114,8 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Re
 def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
     """Turn the nodal values at one time into a worn contact.
 
-    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is; over the root of r^2 - c^2 it is
-    smooth next to c, before and after the image has jumped there.
+    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is; over the root of r^2 - c^2
+    it is smooth next to c, before and after the image has jumped there.
     """
     profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
     unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
@@ -169,8 +169,8 @@ def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resol
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
     """Solve gross slip at constant force.
 
-    The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps follow
-    the panels' noise.
+    The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps
+    follow the panels' noise.
     """
     panels = resolution.panels_of_a_punch()
     virgin = GrossSlip(profile, panels)

@@ -117,9 +117,7 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray, float]:
-    """Return the length of the steps, for each the four rates of d / eta met in it and what d / eta grew by, and the load
-    of the virgin slip zone over eta.
-    """
+    """Return length of the steps, for each four rates and growth of d / eta, and the load of the virgin slip zone."""
     abscissa, weight = gauss(24)
     cuts = np.array([0.0, 0.02, 0.1, 0.3, 1.0])
     widths = np.diff(cuts)

@@ -114,7 +114,9 @@ class ForcedSlip:
     def move(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
         """Return the problem, and its first moment, in which the border moves."""
         moved = self.plateau_rise(moment.path, self.places(moment.unknowns))
-        return replace(self, border=None), replace(moment, unknowns=np.append(moment.unknowns, moment.border), moved=moved)
+        return replace(self, border=None), replace(
+            moment, unknowns=np.append(moment.unknowns, moment.border), moved=moved
+        )
 
     def stand(self, moment: Pressed) -> tuple[ForcedSlip, Pressed]:
         """Return the problem, and its first moment, in which the border stays where it is."""
@@ -188,7 +190,7 @@ class ForcedSlip:
     def rate(self, unknowns: FloatArray) -> FloatArray:
         """Return p / eta at the nodes."""
         y, width, *_ = self.split(unknowns)
-        return np.asarray(self.panels.outer @ y) / np.sqrt(self.virgin.virgin_width * width)
+        return np.asarray(self.panels.outer @ y / np.sqrt(self.virgin.virgin_width * width))
 
     def _factor(self, unknowns: FloatArray) -> FloatArray:
         """Return sqrt(a^2 - b^2) / r at the nodes."""
@@ -205,7 +207,7 @@ class ForcedSlip:
         return shares
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return s - known - theta (p / eta) s at the nodes, continuity at the edge, the force, and y = 0 at the border."""
+        """Return s - known - theta (p / eta) s at the nodes; then continuity at the edge, force, and y = 0 at b."""
         y, *_ = self.split(unknowns)
         slip, size = self.slip(unknowns), self.panels.nodes.size
         rows = np.zeros(unknowns.size)

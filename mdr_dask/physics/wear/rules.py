@@ -1,8 +1,8 @@
 """The fast rule of the thesis at constant depth and the limiting shape in which it ends, compiled, for any body.
 
 The fast rule (thesis eq. 6.11) in closed form: inside the first contact y = (g - g_c) / eta follows a logistic law,
-outside it g - 1 decays, both with the exponent xi N / a(c). All it needs is how much is left, exp(-xi N / a(c)); the limit
-(thesis eqs. 6.8-6.10) has nothing left. The profile is cut where it would fall below the virgin one.
+outside it g - 1 decays, both with the exponent xi N / a(c). All it needs is how much is left, exp(-xi N / a(c));
+the limit (thesis eqs. 6.8-6.10) has nothing left. The profile is cut where it would fall below the virgin one.
 """
 
 from __future__ import annotations
@@ -224,7 +224,9 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
 
 
 @compiled
-def _narrowed(low, low_value, high, high_value, side, x, value):  # type: ignore[no-untyped-def]
+def _narrowed(
+    low: float, low_value: float, high: float, high_value: float, side: int, x: float, value: float
+) -> tuple[float, float, float, float, int]:
     """Return a bracket of a falling function, its values and its newer end, -1 or 1: false position by Illinois."""
     if value > 0.0:
         return x, value, high, 0.5 * high_value if side == -1 else high_value, -1
@@ -232,7 +234,7 @@ def _narrowed(low, low_value, high, high_value, side, x, value):  # type: ignore
 
 
 @inlined
-def _change(rule, gap):  # type: ignore[no-untyped-def]
+def _change(rule: Rule, gap: float) -> float:
     """Return g - g0 at c + gap."""
     rise = image_rise(rule.image, rule.c, rule.level, gap)
     if rule.c + gap > 1.0:
@@ -243,13 +245,13 @@ def _change(rule, gap):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _changes(rule, places, result):  # type: ignore[no-untyped-def]
+def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
     for k in range(places.size):
         result[k] = _change(rule, max(places[k] - rule.c, 0.0))
 
 
 @compiled
-def _put_cuts(rule, cuts):  # type: ignore[no-untyped-def]
+def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
     if rule.image.knots.size == 0:
@@ -268,7 +270,9 @@ def _put_cuts(rule, cuts):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _scar_integral(rule, radius, moment, cuts, abscissa, weight):  # type: ignore[no-untyped-def]
+def _scar_integral(
+    rule: Rule, radius: float, moment: int, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> float:
     """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx in pieces between the cuts."""
     total = 0.0
     for piece in range(cuts.size):
@@ -289,14 +293,18 @@ def _scar_integral(rule, radius, moment, cuts, abscissa, weight):  # type: ignor
 
 
 @compiled
-def _heights(rule, radii, cuts, abscissa, weight, result):  # type: ignore[no-untyped-def]
+def _heights(
+    rule: Rule, radii: FloatArray, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray, result: FloatArray
+) -> None:
     """Put f - f0 at radii beyond c."""
     for k in range(radii.size):
         result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, cuts, abscissa, weight)
 
 
 @compiled
-def _scar_radius(rule, low, high, cuts, abscissa, weight):  # type: ignore[no-untyped-def]
+def _scar_radius(
+    rule: Rule, low: float, high: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> float:
     """Return the root of the scar's integral between 1 and a radius, or that radius if there is none."""
     low_value = _scar_integral(rule, low, 0, cuts, abscissa, weight)
     high_value = _scar_integral(rule, high, 0, cuts, abscissa, weight)
@@ -315,7 +323,7 @@ def _scar_radius(rule, low, high, cuts, abscissa, weight):  # type: ignore[no-un
 
 
 @compiled
-def _limit_radius(rule, largest, cuts, abscissa, weight):  # type: ignore[no-untyped-def]
+def _limit_radius(rule: Rule, largest: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray) -> float:
     """Return a(c) of a rule with nothing left, NaN if it lies beyond the largest radius."""
     _put_cuts(rule, cuts)
     low, high = 1.0, min(1.5, largest)
@@ -327,7 +335,9 @@ def _limit_radius(rule, largest, cuts, abscissa, weight):  # type: ignore[no-unt
 
 
 @compiled
-def _numbers(rule, limit, cuts, abscissa, weight):  # type: ignore[no-untyped-def]
+def _numbers(
+    rule: Rule, limit: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> tuple[float, float, float]:
     """Return scar radius, volume and normal force; put the cuts."""
     _put_cuts(rule, cuts)
     radius = limit if rule.rest == 0.0 else _scar_radius(rule, 1.0, limit, cuts, abscissa, weight)
@@ -335,7 +345,13 @@ def _numbers(rule, limit, cuts, abscissa, weight):  # type: ignore[no-untyped-de
     load, worn = 0.0, 0.0
     for k in range(abscissa.size):
         x = rule.c * abscissa[k] ** 4  # smooths a power at the axis
-        load += weight[k] * 4.0 * rule.c * abscissa[k] ** 3 * (rule.eta - image_rise(rule.image, rule.c, rule.level, x - rule.c))
+        load += (
+            weight[k]
+            * 4.0
+            * rule.c
+            * abscissa[k] ** 3
+            * (rule.eta - image_rise(rule.image, rule.c, rule.level, x - rule.c))
+        )
     for piece in range(4):
         width = cuts[piece + 1] - cuts[piece]
         for k in range(abscissa.size):
@@ -346,7 +362,15 @@ def _numbers(rule, limit, cuts, abscissa, weight):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _limits(n, c, no_table, cuts, abscissa, weight, result):  # type: ignore[no-untyped-def]
+def _limits(
+    n: FloatArray,
+    c: FloatArray,
+    no_table: Image,
+    cuts: FloatArray,
+    abscissa: FloatArray,
+    weight: FloatArray,
+    result: FloatArray,
+) -> None:
     for case in range(n.size):
         rule = _power_rule(no_table, n[case], c[case], 0.0)
         radius = _limit_radius(rule, np.inf, cuts, abscissa, weight)
@@ -354,7 +378,18 @@ def _limits(n, c, no_table, cuts, abscissa, weight, result):  # type: ignore[no-
 
 
 @compiled
-def _fasts(n, c, cycles, xi, limit, no_table, cuts, abscissa, weight, result):  # type: ignore[no-untyped-def]
+def _fasts(
+    n: FloatArray,
+    c: FloatArray,
+    cycles: FloatArray,
+    xi: FloatArray,
+    limit: FloatArray,
+    no_table: Image,
+    cuts: FloatArray,
+    abscissa: FloatArray,
+    weight: FloatArray,
+    result: FloatArray,
+) -> None:
     for case in range(n.size):
         rest = max(math.exp(-xi[case] * cycles[case] / limit[case]), SETTINGS.least)
         rule = _power_rule(no_table, n[case], c[case], rest)
@@ -362,6 +397,6 @@ def _fasts(n, c, cycles, xi, limit, no_table, cuts, abscissa, weight, result):  
 
 
 @compiled
-def _power_rule(no_table, exponent, c, rest):  # type: ignore[no-untyped-def]
+def _power_rule(no_table: Image, exponent: float, c: float, rest: float) -> Rule:
     image = Image(exponent, no_table.knots, no_table.coefficients)
     return Rule(image, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)

@@ -1,7 +1,7 @@
 """Partial slip at constant depth, and gross slip, as the equations of one step for `evolution.march`.
 
-Nodes lie at r^2 = c^2 + width z, with the panels' z from 0 to 1 and the width a^2 - c^2. The unknown of the edge is that
-width over the virgin one, so that contacts next to full stick are as well determined as any.
+Nodes lie at r^2 = c^2 + width z, with the panels' z from 0 to 1 and the width a^2 - c^2. The unknown of the edge is
+that width over the virgin one, so that contacts next to full stick are as well determined as any.
 """
 
 from __future__ import annotations
@@ -64,16 +64,17 @@ class FixedBorder(ABC):
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
     ) -> Moment:
-        """Return the moment that a solved step ends in: what was known and what the step added, free of cancellation."""
+        """Return the moment that a solved step ends in, from what was known and what the step added."""
         gathered = known + theta * self.rate(unknowns)
         gathered[-1] = 0.0
         return Moment(time, unknowns, gathered)
 
 
 class LogTable(NamedTuple):
-    """The slip of the virgin body, s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx, as ln s0 over ln(r^2 - c^2).
+    """The slip of the virgin body, ln s0 as a function of ln(r^2 - c^2).
 
-    `coefficients` are those of a cubic spline from `first` on, `step` apart.
+    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients are those of a cubic spline from
+    `first` on, `step` apart.
     """
 
     first: float
@@ -147,7 +148,7 @@ class PartialSlip(FixedBorder):
     def rate(self, unknowns: FloatArray) -> FloatArray:
         """Return p / eta at the nodes."""
         y, _ = self.image(unknowns)
-        return np.asarray(self.panels.outer @ y) / np.sqrt(self.width(unknowns))
+        return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
@@ -218,7 +219,7 @@ class GrossSlip(FixedBorder):
 
     def rate(self, unknowns: FloatArray) -> FloatArray:
         """Return p at the nodes."""
-        return np.asarray(self.panels.outer @ self.image(unknowns)[0]) / np.sqrt(self.width(unknowns))
+        return np.asarray(self.panels.outer @ self.image(unknowns)[0] / np.sqrt(self.width(unknowns)))
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return f at the nodes."""
