@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from pydantic import ValidationError
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
@@ -49,7 +50,10 @@ def _fit(
     found: dict[str, dict[str, float | str]] = {}
     meanings: dict[str, tuple[str, str]] = {}
     for series, dataset in groups.items():
-        parameters = FrettingWear.model_validate(json.loads(dataset.attrs["parameters"]))
+        try:
+            parameters = FrettingWear.model_validate(json.loads(dataset.attrs["parameters"]))
+        except ValidationError:
+            raise FitError("the store was made with parameters of an older version; run its campaign again") from None
         if parameters.measured is None:
             continue
         name, start, meaning = describe(parameters)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MODELS = ("fretting_wear",)
-_LINES = {"exact": "--", "fast": "-", "literal": "-.", "limit": ":"}
+_LINES = {"exact": "--", "fast": "-", "limit": ":"}
 _MOST_PANELS = 12
 
 
@@ -43,9 +43,9 @@ def development(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw f(r) and g(x) by all methods at every stick radius (figures 6.2 and 6.3)."""
-    chosen = {name: data for name, data in groups.items() if data.sizes.get("method", 0) > 1 and "worn_profile" in data}
+    chosen = {name: data for name, data in groups.items() if data.sizes.get("wear_rule", 0) > 1 and "worn_profile" in data}
     if not chosen:
-        raise DataError("no series varies the method and holds worn_profile; see campaigns/fretting2014.yaml")
+        raise DataError("no series varies the wear_rule and holds worn_profile; see campaigns/fretting2014.yaml")
     rows = [(name, data, at) for name, data in chosen.items() for at in _places(data, "stick_radius")][:_MOST_PANELS]
     figure = _figure(10.0, 2.9 * len(rows))
     panels = figure.subplots(len(rows), 2, squeeze=False)
@@ -160,14 +160,14 @@ def _places(data: xr.Dataset, name: str) -> list[float]:
 def _at(data: xr.DataArray, name: str, value: float) -> xr.DataArray:
     """Choose a value of an axis, if it is one, and the first entry of every axis that a panel cannot show."""
     chosen = data.sel({name: value}) if name in data.dims else data
-    rest = {dim: 0 for dim in chosen.dims if dim not in {"method", "cycles", "radius", "position"}}
+    rest = {dim: 0 for dim in chosen.dims if dim not in {"wear_rule", "cycles", "radius", "position"}}
     return chosen.isel(rest)
 
 
 def _methods(axes: Axes, curves: xr.DataArray, place: xr.DataArray) -> None:
     """Draw all methods and cycles: exact dashed, fast full, the limit dotted."""
     cycles = np.ravel(curves.cycles)
-    for method in np.ravel(curves.method):
+    for method in np.ravel(curves.wear_rule):
         numbers = range(cycles.size if str(method) != "limit" else 1)
         for number in numbers:
             curve = _method(curves, str(method))
@@ -178,7 +178,7 @@ def _methods(axes: Axes, curves: xr.DataArray, place: xr.DataArray) -> None:
 
 
 def _method(curves: xr.DataArray, name: str) -> xr.DataArray:
-    return curves.isel(method=[str(method) for method in curves.method.values].index(name))
+    return curves.isel(wear_rule=[str(method) for method in curves.wear_rule.values].index(name))
 
 
 def _limit(
@@ -187,7 +187,7 @@ def _limit(
     """Add the limit of the same stick radius, dotted, from any series that holds it."""
     stick = data.stick_radius.isel({dim: at for dim, at in chosen.items() if dim in data.stick_radius.dims})
     for other in groups.values():
-        if "method" not in other.dims or "limit" not in [str(m) for m in other.method.values]:
+        if "wear_rule" not in other.dims or "limit" not in [str(m) for m in other.wear_rule.values]:
             continue
         near = [value for value in _places(other, "stick_radius") if abs(value - float(stick)) < 1e-9]
         if near:

@@ -197,7 +197,7 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
     def slope(x: FloatArray) -> FloatArray:
         start = profile.rise(np.maximum(x - c, 0.0), c) / eta
         left = start + (1.0 - start) * rest
-        inside = np.where(left > 0.0, rest / np.maximum(left, 1e-300) ** 2, 0.0) - 1.0
+        inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0) - 1.0
         return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
 
     def height(r: FloatArray) -> FloatArray:
