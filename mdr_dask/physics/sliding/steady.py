@@ -34,6 +34,7 @@ Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
+SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -214,6 +215,9 @@ def _states(
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
+        # drag is force times slope
+        if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
+            status[k] = Outcome.DEPTH_NOT_FOUND
 
 
 def steady_sliding(
@@ -269,11 +273,12 @@ def _solved(
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
     """Solve the cases that are numbers, measured in cells."""
-    good = valid(deborah, loads)
+    n = line.enter.size
+    with np.errstate(over="ignore"):
+        good = valid(deborah * n, loads * n)
     good &= bool(np.all(np.isfinite(line.height)) and np.all(np.isfinite(line.enter)))
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, Outcome.INVALID, np.int8)
-    n = line.enter.size
     if np.any(good):
         results[:, good], status[good] = solve(good, deborah[good] * n, loads[good] * n)
     results[:, status != Outcome.CONVERGED] = np.nan
