@@ -113,6 +113,8 @@ def _prediction(parameters: FrettingWear, rule: str) -> tuple[Callable[[float], 
     if "volume" in columns:
         unit, cycles = length**2 * depth, columns["cycles"] * float(numbers.advance[0, 0])
         worn = cycles > 0.0
+        if not np.any(worn):
+            raise FitError("the measurements do not depend on the factor: no row has cycles")
         curve = law.volumes()
         data = Measured(columns["volume"][worn] / unit, None if errors is None else errors[worn] / unit)
         return lambda factor: curve(factor * cycles[worn]), data, cycles[worn]

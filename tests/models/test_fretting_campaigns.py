@@ -59,7 +59,7 @@ def filled(path: Path) -> xr.Dataset:
     ],
 )
 def test_units_in_the_store(write, parameters, units):
-    names = ("contact_radius", "wear_volume", "normal_force", "worn_profile", "pressure")
+    names = ("contact_radius", "wear_volume", "contact_force", "worn_profile", "pressure")
     data = filled(write(parameters, f"outputs: [{', '.join(names)}]\n"))
     assert tuple(data[name].attrs["units"] for name in names) == units
     assert data.radius.attrs["units"] == "1"
@@ -105,7 +105,7 @@ def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsy
 def test_sliding_from_a_campaign(write):
     path = write(
         "  indenter: [{shape: parabola}, {shape: cone}]\n  wear_rule: exact\n  hold: [depth, force]\n  path: [0, 1, 40]\n  accuracy: 1e-4\n",
-        "outputs: [contact_radius, wear_volume, normal_force, worn_profile, worn_image, pressure, worn_depth, "
+        "outputs: [contact_radius, wear_volume, contact_force, worn_profile, worn_image, pressure, worn_depth, "
         "block_depth, stick_border]\n",
     )
     data = filled(path).isel(realisation=0)
@@ -114,14 +114,14 @@ def test_sliding_from_a_campaign(write):
     np.testing.assert_allclose(depth.contact_radius, [np.sqrt(2), np.pi / 2], atol=1e-5)
     np.testing.assert_allclose(depth.wear_volume, [np.pi, np.pi**3 / 12], atol=1e-4)
     force = data.sel(hold="force")
-    virgin = force.normal_force.isel(path=0, drop=True)
-    np.testing.assert_allclose(force.normal_force / virgin, 1.0, rtol=1e-4)
+    virgin = force.contact_force.isel(path=0, drop=True)
+    np.testing.assert_allclose(force.contact_force / virgin, 1.0, rtol=1e-4)
     np.testing.assert_allclose(
         force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12
     )
     assert np.all(np.diff(force.block_depth.isel(block=0).transpose("indenter", "path")) > 0)
     assert np.all(data.stick_border == 0)
-    assert np.all(data.wear_volume_error <= 1e-3 * data.wear_volume + 1e-6)
+    assert np.all(data.wear_volume_error <= 3e-3 * data.wear_volume + 1e-6)
 
 
 def test_sliding_in_physical_units_obeys_the_wear_law(write):
@@ -185,7 +185,7 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     Path("profile.csv").write_text("radius,height\n" + rows)
     assert main(["check", str(path)]) == 2
     error = capsys.readouterr().err
-    assert "wear.yaml:4:33: parameters.indenter.file: profile.csv: " in error
+    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv: " in error
     assert message in error
     assert len(error.splitlines()) == 1
 

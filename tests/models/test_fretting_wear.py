@@ -20,7 +20,7 @@ STEEL = {
     "wear_coefficient": 1e-4,
     "cycles": 1e5,
 }
-SCALARS = ("contact_radius", "wear_volume", "wear_volume_error", "normal_force", "stick_border")
+SCALARS = ("contact_radius", "wear_volume", "wear_volume_error", "contact_force", "stick_border")
 
 
 def run(parameters, columns=None, outputs=SCALARS, realisations=(0,), seed=1):
@@ -71,7 +71,7 @@ def test_dimensional_case_is_the_dimensionless_one_in_its_units():
     N = 1e5 * 4 * 1e-6 * 1e-4 * E / (a0 * 2e9)
     worn = exact(PowerProfile(2.0), c, [N], 1e-3)[0]
     assert result.values["wear_volume"][0, 0] == pytest.approx(worn.wear_volume * a0**2 * d0, rel=1e-8)
-    assert result.values["normal_force"][0, 0] == pytest.approx(worn.normal_force * E * a0 * d0, rel=1e-8)
+    assert result.values["contact_force"][0, 0] == pytest.approx(worn.normal_force * E * a0 * d0, rel=1e-8)
     assert result.values["stick_border"][0, 0] == pytest.approx(c * a0, rel=1e-10)
 
 
@@ -83,7 +83,7 @@ def test_virgin_force_is_the_load_for_every_indenter():
     ):
         settings = {**STEEL, "indenter": indenter, "cycles": 0.0, "amplitude": 1e-9}
         result = run(FrettingWear(**settings))
-        assert result.values["normal_force"][0, 0] == pytest.approx(50.0, rel=1e-6)
+        assert result.values["contact_force"][0, 0] == pytest.approx(50.0, rel=1e-6)
         assert result.values["wear_volume"][0, 0] == 0.0
 
 
@@ -119,13 +119,13 @@ def test_gross_slip_is_a_message_and_nothing_else_fails():
 
 def test_constant_force():
     """Every rule keeps the force; depth and border grow; the limit comes last."""
-    names = ("normal_force", "block_depth", "stick_border", "wear_volume", "worn_profile", "worn_image", "pressure")
+    names = ("contact_force", "block_depth", "stick_border", "wear_volume", "worn_profile", "worn_image", "pressure")
     found = {}
     for rule in ("fast", "exact", "limit"):
         parameters = FrettingWear(stick_radius=0.5, cycles=0.3, wear_rule=rule, hold="force", cells=60, points=21)
         result = run(parameters, outputs=names)
         assert result.status[0, 0] == Status.DONE
-        assert result.values["normal_force"][0, 0] == pytest.approx(4 / 3, rel=1e-3)
+        assert result.values["contact_force"][0, 0] == pytest.approx(4 / 3, rel=1e-3)
         assert np.all(np.isfinite(result.values["worn_profile"]))
         found[rule] = {name: float(np.ravel(result.values[name][0, 0])[0]) for name in names}
     for name, tolerance in (("block_depth", 2e-3), ("stick_border", 5e-3)):
@@ -155,7 +155,9 @@ def table(tmp_path, rows):
 
     path = tmp_path / "profile.csv"
     path.write_text("radius,height\n" + "\n".join(f"{r!r},{f!r}" for r, f in rows))
-    return Table(shape="table", file=DataFile(name=path.name, path=str(path), sha256=sha256(path.read_bytes()).hexdigest()))
+    return Table(
+        shape="table", file=DataFile(name=path.name, path=str(path), sha256=sha256(path.read_bytes()).hexdigest())
+    )
 
 
 def table_case(shape, **changes):
@@ -168,7 +170,7 @@ def test_table_of_a_ball(tmp_path):
     shape = table(tmp_path, [(x, x**2 / 0.02) for x in r])
     measured = table_case(shape)
     smooth = run(FrettingWear(**{**STEEL, "normal_force": None, "depth": 4.7e-6}))
-    for name in ("wear_volume", "contact_radius", "normal_force"):
+    for name in ("wear_volume", "contact_radius", "contact_force"):
         assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
 
 
@@ -198,14 +200,18 @@ def test_bad_parameters(changes, message):
 @pytest.mark.parametrize("exponent", [0.5, 2.0, 20.0])
 @pytest.mark.parametrize("cycles", [1e-9, 1e4])
 def test_extremes_of_the_fast_rule(exponent, c, cycles):
-    result = run(FrettingWear(indenter=Power(shape="power", exponent=exponent), stick_radius=c, cycles=cycles))
+    result = run(
+        FrettingWear(
+            indenter=Power(shape="power", exponent=exponent), wear_rule="fast", stick_radius=c, cycles=cycles
+        )
+    )
     assert result.status[0, 0] == Status.DONE
     assert 0 <= result.values["wear_volume"][0, 0] < 10
     assert result.values["contact_radius"][0, 0] >= 1
 
 
 def test_distinct_and_seconds_are_cheap_estimates():
-    block = Block(FrettingWear(stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS)
+    block = Block(FrettingWear(wear_rule="fast", stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS)
     assert MODEL.distinct is not None
     assert MODEL.distinct(block) == 3
     assert MODEL.seconds(block) > 0

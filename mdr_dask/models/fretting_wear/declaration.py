@@ -100,6 +100,7 @@ class FrettingWear(Parameters):
         "modulus": "write contact_modulus",
         "curvature_radius": "write indenter: {shape: parabola, radius: ...}",
         "angle": "write indenter: {shape: cone, angle: ...}",
+        "block_normal_force": "write block_contact_force",
         "discretisation_error": "every output comes with its own error, such as wear_volume_error",
     }
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
@@ -213,7 +214,7 @@ def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, d
 OUTPUTS = (
     _output("contact_radius", "m", "radius of the wear scar (a0 = 1 in a dimensionless campaign)", default=True),
     _output("wear_volume", "m^3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)", default=True),
-    _output("normal_force", "N", "normal force (E* d0 a0 = 1 in a dimensionless campaign)", default=True),
+    _output("contact_force", "N", "normal force on the worn contact (E* d0 a0 = 1 in a dimensionless campaign)", default=True),
     _output("stick_border", "m", "stick radius (a0 = 1 in a dimensionless campaign)"),
     _output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)"),
     _output("worn_profile", "m", "worn profile f(r), from the virgin apex", ("radius",)),
@@ -222,7 +223,7 @@ OUTPUTS = (
     _output("block_contact_radius", "m", "contact radius after every block of load", ("block",)),
     _output("block_stick_border", "m", "stick radius at the end of every block of load", ("block",)),
     _output("block_depth", "m", "depth at the end of every block of load", ("block",)),
-    _output("block_normal_force", "N", "normal force at the end of every block of load", ("block",)),
+    _output("block_contact_force", "N", "normal force at the end of every block of load", ("block",)),
     _output("block_wear_volume", "m^3", "worn volume after every block of load", ("block",)),
     _output("block_worn_profile", "m", "worn profile after every block of load", ("block", "radius")),
 )

@@ -30,6 +30,8 @@ from mdr_dask.physics.wear.worn import Worn
 
 #: Numbers of the closed forms, which are computed for many cases at once.
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
+#: Outputs whose name in a campaign is not that of a worn contact's number: a parameter has it.
+_RENAMED = {"contact_force": "normal_force"}
 #: Accuracies that are tried in turn where the campaign asks for a relative one: each a quarter of the last.
 _FINEST, _FINER = 1e-5, 0.25
 
@@ -108,7 +110,8 @@ def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int],
 def _plain_name(name: str) -> tuple[str, bool]:
     """Return the output of one contact that an output, or an error, of a campaign is, and whether it is an error."""
     owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
-    return owners.get(name, name).removeprefix("block_"), name in owners
+    plain = owners.get(name, name).removeprefix("block_")
+    return _RENAMED.get(plain, plain), name in owners
 
 
 def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:

@@ -279,6 +279,8 @@ def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time
     known = problem.memory(past, shares)
     near = history[-1 : -order - 2 : -1]
     guess = _lagrange(np.array([m.time for m in near]), time) @ np.array([m.unknowns for m in near])
+    if not problem.holds(guess):
+        guess = past[0].unknowns
     unknowns = newton.solve(guess, theta, known)
     if unknowns is None:
         unknowns = newton.solve(past[0].unknowns, theta, known)

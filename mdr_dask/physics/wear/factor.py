@@ -217,9 +217,8 @@ def fit_factor(predict: Callable[[float], FloatArray], measured: Measured, order
         variance = max(variance, 1.0)
     allowed = cost(best) + float(student.ppf(0.975, data.size - 1)) ** 2 * max(variance, 1e-24)
     low, high = (_crossing(cost, best, end * SETTINGS.reach, allowed) for end in (-1.0, 1.0))
-    spread = measured.deviations(
-        np.full(data.size, np.exp(np.mean(np.log(data))) if measured.relative else np.mean(data))
-    )
+    plain = measured.errors is not None or not measured.relative
+    spread = measured.deviations(np.full(data.size, np.mean(data) if plain else np.exp(np.mean(np.log(data)))))
     explained = 1.0 - float(np.sum(deviations**2) / np.sum(spread**2)) if np.any(spread) else np.nan
     verdict = _verdict(deviations, measured, predict(float(np.exp(SETTINGS.reach))), np.asarray(order, dtype=float))
     if verdict.startswith("no"):
