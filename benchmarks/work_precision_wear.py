@@ -1,7 +1,8 @@
-"""Error against run time of the ways to the worn profile, side by side: ``python -m benchmarks.work_precision_wear``.
+"""Error against run time of the rules of wear, side by side: ``python -m benchmarks.work_precision_wear``.
 
 The case is figure 6.2's (parabola, c = 0.455 a0) at N = 2 and N = 8; errors are the largest difference of f from the
-exact evolution at tolerance 1e-6, over 400 radii from 0 to 1.4 a0, in d0. Times are processor times. ``--figure FILE`` draws the table.
+exact evolution at accuracy 1e-5, over 400 radii from 0 to 1.4 a0, in d0. Times are processor times. ``--figure FILE``
+draws the table.
 """
 
 from __future__ import annotations

@@ -201,9 +201,7 @@ def test_bad_parameters(changes, message):
 @pytest.mark.parametrize("cycles", [1e-9, 1e4])
 def test_extremes_of_the_fast_rule(exponent, c, cycles):
     result = run(
-        FrettingWear(
-            indenter=Power(shape="power", exponent=exponent), wear_rule="fast", stick_radius=c, cycles=cycles
-        )
+        FrettingWear(indenter=Power(shape="power", exponent=exponent), wear_rule="fast", stick_radius=c, cycles=cycles)
     )
     assert result.status[0, 0] == Status.DONE
     assert 0 <= result.values["wear_volume"][0, 0] < 10
@@ -211,7 +209,9 @@ def test_extremes_of_the_fast_rule(exponent, c, cycles):
 
 
 def test_distinct_and_seconds_are_cheap_estimates():
-    block = Block(FrettingWear(wear_rule="fast", stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS)
+    block = Block(
+        FrettingWear(wear_rule="fast", stick_radius=0.5), {"cycles": np.arange(6.0) // 2}, 6, (0,), 1, SCALARS
+    )
     assert MODEL.distinct is not None
     assert MODEL.distinct(block) == 3
     assert MODEL.seconds(block) > 0

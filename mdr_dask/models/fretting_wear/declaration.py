@@ -214,7 +214,12 @@ def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, d
 OUTPUTS = (
     _output("contact_radius", "m", "radius of the wear scar (a0 = 1 in a dimensionless campaign)", default=True),
     _output("wear_volume", "m^3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)", default=True),
-    _output("contact_force", "N", "normal force on the worn contact (E* d0 a0 = 1 in a dimensionless campaign)", default=True),
+    _output(
+        "contact_force",
+        "N",
+        "normal force on the worn contact (E* d0 a0 = 1 in a dimensionless campaign)",
+        default=True,
+    ),
     _output("stick_border", "m", "stick radius (a0 = 1 in a dimensionless campaign)"),
     _output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)"),
     _output("worn_profile", "m", "worn profile f(r), from the virgin apex", ("radius",)),

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from references.literal_wear import literal
 
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.uniform_grid import uniform_grid
 from mdr_dask.physics.wear.exact import exact
 from mdr_dask.physics.wear.history import LoadBlock, history
-from references.literal_wear import literal
 
 PARABOLA = PowerProfile(2.0)
 RADII = np.linspace(0.0, 1.5, 201)
@@ -82,7 +82,7 @@ def test_smaller_amplitude_after_a_larger_one_leaves_the_old_border_alone():
         PARABOLA, [LoadBlock(3.0, 0.8, depth=1.0), LoadBlock(3.0, 0.2, depth=1.0)], cells=100, reach=1.6
     )
     assert second.stick_border > first.stick_border
-    stuck = RADII[RADII < first.stick_border - 0.02]
+    stuck = RADII[first.stick_border - 0.02 > RADII]
     np.testing.assert_array_equal(first.height(stuck), second.height(stuck))
 
 

@@ -7,7 +7,6 @@ from scipy.optimize import brentq
 
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import forward_transform, power_factor
-
 from mdr_dask.physics.wear import rules as wear
 
 PARABOLA, CONE = PowerProfile(2.0), PowerProfile(1.0)

@@ -6,7 +6,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
-
 from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced_rule import fast_forced
