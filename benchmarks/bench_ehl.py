@@ -10,7 +10,7 @@ from mdr_dask.models.base import Block
 from mdr_dask.models.ehl_line import MODEL, EhlLineParameters
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve
-from mdr_dask.physics.lubrication.newton import solve_linear
+from mdr_dask.physics.outcome import Outcome
 
 E_STAR = 115.385e9
 CASES = {
@@ -25,35 +25,20 @@ CASES = {
 def test_film_to_a_thousandth(benchmark, name):
     case = line_contact(*CASES[name], E_STAR)
     found = benchmark(solve, case, 1e-3)
-    assert found.status == 0
+    assert found.outcome == Outcome.CONVERGED
     assert found.error <= 1e-3
 
 
-def test_film_to_a_hundred_thousandth(benchmark):
+def test_film_to_a_ten_thousandth(benchmark):
     case = line_contact(*CASES["checked"], E_STAR)
-    found = benchmark.pedantic(solve, (case, 3e-5), rounds=3, warmup_rounds=1)
-    assert found.error <= 3e-5
+    found = benchmark.pedantic(solve, (case, 1e-4), rounds=3, warmup_rounds=1)
+    assert found.error <= 1e-4
 
 
 @pytest.mark.parametrize("count", [161, 321, 641])
 def test_influence_matrix(benchmark, count):
     nodes = np.linspace(-4, 2, count)
     assert benchmark(influence_matrix, nodes, nodes).shape == (count, count)
-
-
-@pytest.mark.parametrize("solver", ["own", "lapack"])
-@pytest.mark.parametrize("order", [161, 321])
-def test_linear_solver(benchmark, order, solver):
-    random = np.random.default_rng(0)
-    A, b = random.normal(size=(order, order)), random.normal(size=order)
-
-    def own():
-        x = b.copy()
-        assert solve_linear(A.copy(), x, order)
-        return x
-
-    x = benchmark(own if solver == "own" else lambda: np.linalg.solve(A, b))
-    assert np.max(np.abs(A @ x - b)) < 1e-9
 
 
 def test_block_of_25_loads_and_speeds(benchmark):

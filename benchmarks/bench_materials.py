@@ -7,20 +7,24 @@ from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.solids import prony, recovery
 from mdr_dask.physics.superposition.master_curve import superpose
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
 
 LENGTH, POINTS = 0.02, 4000
 
 
 def line():
     amplitude = 5e-7 * roughness.amplitudes(POINTS // 16, 0.7)
-    return roughness.line(amplitude, roughness.phases(1, 0, POINTS // 16), POINTS), LENGTH / POINTS
+    return periodic_line(roughness.line(amplitude, roughness.phases(1, 0, POINTS // 16), POINTS), None)
 
 
 @pytest.mark.parametrize("arms", [1, 5, 15, 50])
 @pytest.mark.parametrize("force", [0.01, 1.0, 100.0])
 def test_solve(benchmark, arms, force):
-    solid = prony(1e7, np.full(arms, 1e8 / arms), np.geomspace(1e-6, 1e-1, arms) if arms > 1 else [1e-3])
-    state = benchmark(steady_viscoelastic_sliding, *line(), solid, 0.1, force)
+    pace = 0.1 / LENGTH
+    solid = prony(
+        1.0, np.full(arms, 10 / arms), (np.geomspace(1e-6, 1e-1, arms) if arms > 1 else np.array([1e-3])) * pace
+    )
+    state = benchmark(steady_viscoelastic_sliding, line(), solid, force / (4e7 * LENGTH))
     assert state.status == 0
 
 

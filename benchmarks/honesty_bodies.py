@@ -19,7 +19,7 @@ from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
 
-OUTPUTS = ("friction_coefficient", "discretisation_error")
+OUTPUTS = ("friction_coefficient", "friction_coefficient_error")
 POINTS = (100, 400, 1600)
 ROUNDING = 1e-9
 
@@ -76,7 +76,14 @@ def measured_case(generator, shape, path):
         "noise": generator.standard_normal(count),
     }[shape]
     heights = (heights - heights.mean()) / max(float(heights.std()), 1e-3)
-    np.savetxt(path, np.column_stack([np.arange(count) / count, heights]), delimiter=",", fmt="%.17g")
+    np.savetxt(
+        path,
+        np.column_stack([np.arange(count) / count, heights]),
+        delimiter=",",
+        header="x [m],z [m]",
+        comments="",
+        fmt="%.17g",
+    )
     profile = ProfileFile.model_validate({"file": str(path)})
     return SlidingFriction(profile=profile, **random_series(generator), normal_force=10 ** generator.uniform(-3, 3))
 
@@ -84,7 +91,8 @@ def measured_case(generator, shape, path):
 def solve(case, realisation, accuracy=None, **changes):
     block = Block(case.model_copy(update=changes), {}, 1, (realisation,), 1, OUTPUTS, accuracy)
     result = MODEL.compute(block)
-    return tuple(result.values[name].item() for name in OUTPUTS)
+    friction, error = (result.values[name].item() for name in OUTPUTS)
+    return friction, error / friction
 
 
 def judge(found, exact):

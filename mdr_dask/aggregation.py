@@ -1,4 +1,8 @@
-"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own."""
+"""Reductions over realisations: mean, scatter, quantiles and intervals, each as a variable of its own.
+
+An output may have a companion with its discretisation errors. Both errors of a mean are kept apart, as
+``standard_error`` (scatter of the realisations) and ``grid_error``, and joined in its interval.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +13,23 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
+
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-CONFIDENCE = 0.95
-RESAMPLES = 1000
 #: Results that one step of the bootstrap holds in memory.
 _STEP = 2**22
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """A reduction over ``realisation`` as data: its name, what it means, how it is computed."""
+    """A reduction over ``realisation`` as data: its name, what it means, how it is computed.
+
+    `compute` takes an output and its companion with errors, or None; it returns None where it needs what is not there.
+    """
 
     name: str
     meaning: str
-    compute: Callable[[xr.DataArray], xr.DataArray]
+    compute: Callable[[xr.DataArray, xr.DataArray | None], xr.DataArray | None]
 
 
 def count(array: xr.DataArray) -> xr.DataArray:
@@ -48,6 +55,41 @@ def standard_error(array: xr.DataArray) -> xr.DataArray:
     """Return the standard deviation of the mean; NaN below two realisations."""
     number = count(array)
     return standard_deviation(array) / number.where(number > 0) ** 0.5
+
+
+def grid_error(error: xr.DataArray) -> xr.DataArray:
+    """Return the discretisation error of the mean: that of one realisation, for errors of a grid need not cancel."""
+    return mean(abs(error))
+
+
+def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
+    """Return the bootstrap interval of the mean, with the discretisation error added to either side.
+
+    Returns
+    -------
+    DataArray
+        With the dimension ``bound`` (``low``, ``high``) in place of ``realisation`` (`mdr_dask.bootstrap.interval`).
+    """
+    count = array.sizes["realisation"]
+    if error is not None:
+        array = xr.concat([array.drop_vars("realisation", errors="ignore"), grid_error(error)], "realisation")
+    bounds = _reduce(array, _interval, {"count": count}, "bound", 2)
+    return bounds.assign_coords(bound=np.array(["low", "high"], dtype=object))
+
+
+def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the ends of intervals from realisations along the last axis, and perhaps their error behind them."""
+    flat = values.reshape(-1, values.shape[-1])
+    bounds = np.full((len(flat), 2), np.nan)
+    step = max(1, _STEP // bootstrap.RESAMPLES)
+    for start in range(0, len(flat), step):
+        rows = flat[start : start + step].T
+        stack = bootstrap.means(rows[:count])
+        error = np.nan_to_num(rows[count:])
+        stack = np.concatenate([stack, stack[0] + error, stack[0] - error])
+        number = np.isfinite(rows[:count]).sum(axis=0)
+        bounds[start : start + step] = np.transpose(bootstrap.interval(stack, number))
+    return bounds.reshape(*values.shape[:-1], 2)
 
 
 def quantiles(array: xr.DataArray) -> xr.DataArray:
@@ -82,65 +124,26 @@ def _quantiles(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(low + (position - below) * (high - low))
 
 
-def bootstrap_interval(array: xr.DataArray, seed: int = 0) -> xr.DataArray:
-    """Return the percentile bootstrap interval of the mean.
-
-    Parameters
-    ----------
-    array : DataArray
-        With a dimension ``realisation``; NaN where a case failed.
-    seed : int
-        Seed of the resampling. Every case is resampled alike, so that differences between cases keep the pairing that
-        common random numbers give them.
-
-    Returns
-    -------
-    DataArray
-        With the dimension ``bound`` (``low``, ``high``) instead of ``realisation``, at the confidence `CONFIDENCE`;
-        deviations are stretched by sqrt(n / (n - 1)) and by Student's t over the normal quantile, without which small
-        ensembles are covered too rarely.
-    """
-    return _reduce(array, _bootstrap, {"seed": seed}, "bound", 2).assign_coords(
-        bound=np.array(["low", "high"], dtype=object)
-    )
-
-
-def _bootstrap(values: NDArray[np.float64], seed: int) -> NDArray[np.float64]:
-    number = values.shape[-1]
-    draws = np.random.Generator(np.random.Philox(seed)).multinomial(number, np.full(number, 1 / number), RESAMPLES)
-    weights = draws.T.astype(float)
-    flat = values.reshape(-1, number)
-    bounds = np.full((len(flat), 2), np.nan)
-    step = max(1, _STEP // RESAMPLES)
-    for start in range(0, len(flat), step):
-        bounds[start : start + step] = _bootstrap_rows(flat[start : start + step], weights)
-    return bounds.reshape(*values.shape[:-1], 2)
-
-
-def _bootstrap_rows(rows: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    from scipy.special import ndtri, stdtrit
-
-    valid = np.isfinite(rows)
-    number = valid.sum(axis=1)
-    spare = np.maximum(number - 1, 1)
-    mean = np.where(valid, rows, 0.0).sum(axis=1) / np.maximum(number, 1)
-    deviations = np.where(valid, rows - mean[:, None], 0.0) @ weights
-    drawn = valid.astype(float) @ weights
-    low, high = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
-    stretch = np.sqrt(number / spare) * stdtrit(spare, high) / ndtri(high)
-    shifts = np.quantile(deviations / np.maximum(drawn, 1.0), [low, high], axis=1).T
-    return np.where(number[:, None] > 1, mean[:, None] + stretch[:, None] * shifts, np.nan)
-
-
 STATISTICS = (
-    Statistic("mean", "mean over realisations", mean),
-    Statistic("standard_deviation", "standard deviation over realisations", standard_deviation),
-    Statistic("standard_error", "standard error of the mean over realisations", standard_error),
-    Statistic("quantile", "quantiles over realisations", quantiles),
-    Statistic("interval", "95 % bootstrap interval of the mean over realisations", bootstrap_interval),
-    Statistic("count", "number of realisations that succeeded", count),
+    Statistic("mean", "mean over realisations", lambda array, _: mean(array)),
+    Statistic("standard_deviation", "standard deviation over realisations", lambda array, _: standard_deviation(array)),
+    Statistic("standard_error", "standard error of the mean over realisations", lambda array, _: standard_error(array)),
+    Statistic(
+        "grid_error",
+        "discretisation error of the mean",
+        lambda _, error: None if error is None else grid_error(error),
+    ),
+    Statistic("quantile", "quantiles over realisations", lambda array, _: quantiles(array)),
+    Statistic("interval", "95 % interval of the mean over realisations, discretisation included", interval),
+    Statistic("count", "number of realisations that succeeded", lambda array, _: count(array)),
 )
 NAMES = tuple(statistic.name for statistic in STATISTICS)
+
+
+def companion(dataset: xr.Dataset, output: str) -> xr.DataArray | None:
+    """Return the discretisation errors of an output, as its ``ancillary_variables`` name them; None without any."""
+    name = dataset[output].attrs.get("ancillary_variables")
+    return dataset[name] if name in dataset.data_vars else None
 
 
 def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Dataset:
@@ -156,15 +159,21 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     Returns
     -------
     Dataset
-        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs.
+        A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs;
+        ``<output>_grid_error`` where the output has a companion with errors.
     """
     wanted = [statistic for statistic in STATISTICS if statistic.name in statistics]
     reduced = {}
-    for name, array in dataset.data_vars.items():
-        if name == "status" or "realisation" not in array.dims:
+    errors = {name: companion(dataset, name) for name in map(str, dataset.data_vars)}
+    aside = {"status", *(str(error.name) for error in errors.values() if error is not None)}
+    for name, error in errors.items():
+        array = dataset[name]
+        if name in aside or "realisation" not in array.dims:
             continue
         for statistic in wanted:
-            result = statistic.compute(array)
+            result = statistic.compute(array, error)
+            if result is None:
+                continue
             units = "1" if statistic.name == "count" else array.attrs.get("units", "1")
             meaning = f"{array.attrs.get('long_name', name)}, {statistic.meaning}"
             reduced[f"{name}_{statistic.name}"] = result.assign_attrs(units=units, long_name=meaning)

@@ -1,6 +1,9 @@
-"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home."""
+"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home; and hints in messages."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 
 class MdrDaskError(Exception):
@@ -12,6 +15,10 @@ class CampaignError(MdrDaskError):
 
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.args)
+
+
+class ModelError(MdrDaskError):
+    """A model that is not there, or cannot be loaded."""
 
 
 class StoreError(MdrDaskError):
@@ -32,3 +39,14 @@ class DataError(MdrDaskError):
 
 class FitError(MdrDaskError):
     """A law that cannot be fitted to the data given."""
+
+
+def did_you_mean(word: Any, known: Sequence[str]) -> str:
+    """Return a hint in parentheses, with a leading blank: the nearest known word, or all of them if they are few."""
+    from difflib import get_close_matches
+
+    folded = {name.casefold(): name for name in known}
+    near = get_close_matches(str(word).casefold(), list(folded), n=1)
+    if near:
+        return f" (did you mean {folded[near[0]]!r}?)"
+    return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""

@@ -239,6 +239,7 @@ def templates(
 
 def _outputs(campaign: Campaign, series: Series, model: Model[Any]) -> tuple[Output, ...]:
     units = model.units(series.parameters)
+    units = units | {companion.name: units[name] for name, companion in model.companions.items() if name in units}
     wanted = [model.output(name) for name in campaign.outputs]
     return tuple(replace(output, unit=units.get(output.name, output.unit)) for output in wanted)
 

@@ -38,3 +38,8 @@ def store(axes, realisations=8, outputs=("friction_coefficient", "contact_fracti
     fixed |= {f"indenter_{key}": value for key, value in fixed.pop("indenter").items()}
     coords |= {k: v for k, v in fixed.items() if k not in coords and isinstance(v, int | float)}
     return xr.Dataset(data, coords, {"parameters": json.dumps(parameters.model_dump())})
+
+
+def relative_error(values):
+    """Return the estimated error of the friction over it."""
+    return values["friction_coefficient_error"] / values["friction_coefficient"]

@@ -53,3 +53,19 @@ def test_the_bootstrap_interval_covers_the_truth_as_often_as_it_says(number):
     interval = aggregate(xr.Dataset({"y": array}), ["interval"]).y_interval
     covered = float(((interval.sel(bound="low") <= 1.0) & (interval.sel(bound="high") >= 1.0)).mean())
     assert covered == pytest.approx(0.95, abs=0.01 + 4 * np.sqrt(0.95 * 0.05 / 2000))
+
+
+def test_grid_errors_stand_apart_from_scatter_and_are_joined_in_the_interval(dataset):
+    plain = aggregate(dataset)
+    assert "force_grid_error" not in plain
+    error = xr.full_like(dataset.force, -0.5).where(dataset.force.notnull()).assign_attrs(units="N")
+    known = dataset.assign(force_error=error)
+    known["force"] = known.force.assign_attrs(ancillary_variables="force_error")
+    reduced = aggregate(known)
+    assert "force_error_mean" not in reduced
+    assert reduced.force_grid_error.attrs["units"] == "N"
+    first, without = reduced.isel(load=0), plain.isel(load=0)
+    assert first.force_grid_error == 0.5
+    assert first.force_standard_error == without.force_standard_error
+    half, scatter = (abs(each.force_interval - each.force_mean) for each in (first, without))
+    np.testing.assert_allclose(half, scatter + 0.5)

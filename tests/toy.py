@@ -46,7 +46,9 @@ def compute(block: Block[ToyParameters]) -> Result:
     y = (slope * position)[:, None] + block.column("noise")[:, None] * noise * position[:, None]
     failed = np.broadcast_to((position > block.parameters.fail_above)[:, None], y.shape)
     status = np.where(failed, Status.FAILED, Status.DONE).astype(np.int8)
-    values = {"height": np.where(failed, np.nan, y), "trace": np.where(failed, np.nan, y)[..., None] * np.arange(3.0)}
+    height = np.where(failed, np.nan, y)
+    values = {"height": height, "trace": height[..., None] * np.arange(3.0)}
+    values |= {"width": 2 * height, "width_error": 0.01 * abs(height)}
     messages = {(int(i), int(j)): "position above fail_above" for i, j in zip(*np.nonzero(failed), strict=True)}
     return Result({name: values[name] for name in block.outputs}, status, messages, solves=y.size)
 
@@ -59,6 +61,7 @@ MODEL = Model(
     outputs=(
         Output("height", "m", "height of the line"),
         Output("trace", "m", "multiples of the height", ("multiple",), default=False),
+        Output("width", "m", "width of the line", default=False, has_error=True),
     ),
     compute=compute,
     seconds=lambda block: 1e-6 * block.cases * len(block.realisations),

@@ -6,7 +6,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from mdr_dask.campaign.document import parse, read_text
-from mdr_dask.campaign.problems import Problems, did_you_mean, shown
+from mdr_dask.campaign.problems import Problems, shown
+from mdr_dask.errors import did_you_mean
 
 _EXPECTED = {"class": "a class such as dask_jobqueue.SLURMCluster", "arguments": "a mapping", "scale": "a mapping"}
 

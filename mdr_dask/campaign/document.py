@@ -19,6 +19,8 @@ from mdr_dask.errors import CampaignError
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50
 _LARGEST = 1_000_000
+_TOO_DEEP = "nested too deeply, or refers to itself"
+_MOST_DIGITS = 300
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 
@@ -97,6 +99,8 @@ def parse(text: str, source: str, problems: Problems) -> Document:
         before = text[: error.position]
         line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
         problems.add(Place(source, line, column), "", f"not YAML: {str(error).splitlines()[0]}")
+    except RecursionError:
+        problems.add(Place(source, 1, 1), "", _TOO_DEEP)
     else:
         if root is not None:
             with suppress(_EndlessError):
@@ -122,7 +126,7 @@ class _Reader:
     def read(self, node: Node, path: Path) -> Any:
         """Return the plain data of a node and remember its place."""
         if len(path) > _DEEPEST or len(self.document._nodes) > _LARGEST:
-            self.problems.add(self.document._at(node), "", "nested too deeply, or refers to itself")
+            self.problems.add(self.document._at(node), "", _TOO_DEEP)
             raise _EndlessError
         self.document._nodes[path] = node
         if isinstance(node, MappingNode):
@@ -135,7 +139,7 @@ class _Reader:
     def _mapping(self, node: MappingNode, path: Path) -> dict[str, Any]:
         data: dict[str, Any] = {}
         for key_node, value_node in node.value:
-            key = key_node.value if isinstance(key_node, ScalarNode) else _flow(key_node)
+            key = key_node.value if isinstance(key_node, ScalarNode) else "?"
             place = self.document._at(key_node)
             if key_node.tag not in (_TAG + "str", _TAG + "merge"):
                 self.problems.add(place, dotted((*path, key)), "expected a name as key (quote it)")
@@ -154,6 +158,13 @@ class _Reader:
             return None
         if kind == "bool":
             return text.casefold() == "true"
+        if len(text) > _MOST_DIGITS and kind in ("int", "float"):
+            what = f"expected a shorter number, got {len(text)} digits"
+            self.problems.add(self.document._at(node), dotted(path), what)
+            return None
+        if "\0" in text:
+            self.problems.add(self.document._at(node), dotted(path), "expected text without null characters")
+            return None
         if kind == "int":
             return _integer(text.replace("_", ""))
         if kind == "float":

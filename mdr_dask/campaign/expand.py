@@ -15,9 +15,9 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.campaign.spec import CampaignSpec, LatinHypercubeSpec, SobolSpec, TableSpec
-from mdr_dask.campaign.units import to_si
 from mdr_dask.campaign.variation import Origin, Variation
 from mdr_dask.models.base import Model, Parameters
+from mdr_dask.units import to_si
 
 
 def expand(

@@ -11,8 +11,9 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.problems import Path, did_you_mean, shown
-from mdr_dask.campaign.units import expected
+from mdr_dask.campaign.problems import Path, shown
+from mdr_dask.errors import did_you_mean
+from mdr_dask.units import expected
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
 Report = Callable[[Path, bool, str], None]
@@ -112,7 +113,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
     elif first["type"] == "missing":
         report(path, False, _missing(path, kind, data))
     elif first["type"] == "extra_forbidden":
-        report(path, True, f"unknown key{did_you_mean(path[-1], _known(path, kind, data))}")
+        report(path, True, _unknown(path, kind, data))
     else:
         value = value_at(data, path)
         wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
@@ -199,11 +200,20 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
     )
 
 
-def _known(path: Path, kind: type[BaseModel], data: Any) -> list[str]:
+def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Say that the last part of a path is no key: what it is called now, or what it may have been meant to be."""
+    around = _structure_around(path, kind, data)
+    instead = getattr(around, "gone", {}).get(path[-1])
+    if instead:
+        return f"there is no {path[-1]} any more: {instead}"
+    return f"unknown key{did_you_mean(path[-1], list(around.model_fields) if around else [])}"
+
+
+def _structure_around(path: Path, kind: type[BaseModel], data: Any) -> type[BaseModel] | None:
     inner: type[BaseModel] | None = kind
     for depth, part in enumerate(path[:-1]):
         info = inner.model_fields.get(str(part)) if inner else None
         if isinstance(part, int):
             continue
         inner = fields.structure(info, value_at(data, path[: depth + 1])) if info else None
-    return list(inner.model_fields) if inner else []
+    return inner

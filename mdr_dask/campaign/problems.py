@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any
 
 from mdr_dask.errors import CampaignError
@@ -61,15 +60,6 @@ def dotted(path: Iterable[str | int]) -> str:
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
     return text
-
-
-def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, with a leading blank: the nearest known word, or all of them if they are few."""
-    folded = {name.casefold(): name for name in known}
-    near = get_close_matches(str(word).casefold(), list(folded), n=1)
-    if near:
-        return f" (did you mean {folded[near[0]]!r}?)"
-    return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""
 
 
 def shown(value: Any) -> str:

@@ -12,10 +12,11 @@ from mdr_dask.campaign.definition import Campaign, Replication, Series, Toleranc
 from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.messages import report_errors
-from mdr_dask.campaign.problems import Path, Problems, did_you_mean, dotted, shown
+from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
-from mdr_dask.campaign.units import to_si
+from mdr_dask.errors import ModelError, did_you_mean
 from mdr_dask.models.base import Model
+from mdr_dask.units import to_si
 
 
 def load(path: str | FilePath) -> Campaign:
@@ -71,7 +72,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     problems.raise_if_any()
     return Campaign(
         name=spec.name,
-        model=model.name,
+        model=spec.model,
         seed=spec.seed,
         replication=replication,
         series=series,
@@ -103,25 +104,32 @@ def _spec(document: Document, problems: Problems) -> tuple[CampaignSpec, set[str
 
 
 def _model(document: Document, spec: CampaignSpec, problems: Problems) -> Model[Any] | None:
-    if spec.model in models.NAMES:
+    try:
         return models.load(spec.model)
-    problems.add(
-        document.place(("model",)), "model", f"unknown model {spec.model!r}{did_you_mean(spec.model, models.NAMES)}"
-    )
+    except ModelError as error:
+        hint = did_you_mean(spec.model, models.names()) if str(error).startswith("unknown") else ""
+        problems.add(document.place(("model",)), "model", f"{error}{hint}")
     return None
 
 
 def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems: Problems) -> tuple[str, ...]:
-    if spec.outputs is None:
-        return tuple(output.name for output in model.outputs if output.default)
     names = [output.name for output in model.outputs]
-    for index, name in enumerate(spec.outputs):
+    errors = {companion.name: name for name, companion in model.companions.items()}
+    wanted = spec.outputs or [output.name for output in model.outputs if output.default]
+    for index, name in enumerate(spec.outputs or ()):
         path = ("outputs", index)
-        if name not in names:
+        if name in errors:
+            what = f"this error comes with its output: expected {errors[name]!r}, and not errors: false, got {name!r}"
+            problems.add(document.place(path), dotted(path), what)
+        elif name in model.parameters.gone:
+            what = f"there is no {name} any more: {model.parameters.gone[name]}"
+            problems.add(document.place(path), dotted(path), what)
+        elif name not in names:
             problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")
-        elif name in spec.outputs[:index]:
+        elif name in wanted[:index]:
             problems.add(document.place(path), dotted(path), f"this output is given twice: {name}")
-    return tuple(name for name in names if name in spec.outputs)
+    kept = [name for name in names if name in wanted]
+    return model.with_companions(kept) if spec.errors else tuple(kept)
 
 
 def _replication(
@@ -135,6 +143,7 @@ def _replication(
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
         problems.add(document.place(path), dotted(path), what)
     until = {}
+    outputs = tuple(name for name in outputs if name in {output.name for output in model.outputs})
     for name, tolerance in wanted.until.items():
         path = ("realisations", "until", name)
         if name not in outputs:

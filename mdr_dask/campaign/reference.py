@@ -14,8 +14,8 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.campaign.units import DEFINITIONS
 from mdr_dask.models.base import DataFile, Model, unit_of
+from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\
 # The campaign file
@@ -96,6 +96,7 @@ def output_rows(model: Model[Any]) -> list[dict[str, str]]:
             "unit": output.unit,
             "dimensions": ", ".join(output.dims),
             "default": "yes" if output.default else "no",
+            "error": f"`{output.error.name}`" if output.has_error else "",
             "meaning": output.long_name,
         }
         for output in model.outputs

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import csv
+import errno
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from mdr_dask.campaign import fields
-from mdr_dask.campaign.problems import Place, Problems, did_you_mean, dotted
+from mdr_dask.campaign.problems import Place, Problems, dotted
 from mdr_dask.campaign.spec import LatinHypercubeSpec, SobolSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
+from mdr_dask.errors import did_you_mean
 from mdr_dask.models.base import Parameters
+from mdr_dask.tables import Cell, Sheet, TableError, read_sheet
 
-_HEADING = re.compile(r"\s*(?P<path>[A-Za-z_][\w.]*)\s*(?:\[(?P<unit>[^\]]*)\])?\s*\Z")
+_PATH = re.compile(r"[A-Za-z_][\w.]*\Z")
 _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brackets, such as velocity [mm/s]"
 
 
@@ -70,44 +72,44 @@ def tabled(
     problems : Problems
         Receives what is wrong with the file: unknown columns, units, missing cells.
     """
+    path = Path(directory, name)
     try:
-        text = Path(directory, name).read_text(encoding="utf-8-sig")
+        if path.exists() and not path.is_file():
+            raise OSError(errno.EINVAL, "no regular file")
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8"
-        problems.add(origin.place, origin.name, f"cannot read {Path(directory, name)}: {reason}")
+        problems.add(origin.place, origin.name, f"cannot read {path}: {reason}")
         return None
-    reader = csv.reader(text.splitlines())
-    rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    if len(rows) < 2:
-        problems.add(Place(name, 1, 1), "", "expected a line of headings and at least one line of values")
+    try:
+        sheet = read_sheet(text, name, numeric=False)
+    except TableError as error:
+        for line, column, what in error.problems:
+            problems.add(Place(name, line, column), "", what)
         return None
-    headings = [_heading(cell, _place(name, rows[0], index)) for index, cell in enumerate(rows[0][1])]
-    malformed = [(place, _NOT_A_HEADING) for path, _, place in headings if not path]
-    malformed += [(Place(name, line, 1), f"expected {len(headings)} values as in line {rows[0][0]}, got {len(row)}")
-                  for line, row in rows[1:] if len(row) != len(headings)]  # fmt: skip
-    for place, what in malformed:
-        problems.add(place, "", what)
-    if malformed:
+    malformed = [cell for cell in sheet.names if not _PATH.match(cell.text)]
+    for cell in malformed:
+        problems.add(_place(name, cell), "", _NOT_A_HEADING)
+    if not sheet.names:
+        problems.add(Place(name, 1, 1), "", _NOT_A_HEADING)
+    if malformed or not sheet.names:
         return None
-    columns = [
-        Variation(path, Origin(dotted(path), place), tuple(_cell(name, row, index, path, unit) for row in rows[1:]))
-        for index, (path, unit, place) in enumerate(headings)
-    ]
+    columns = [_column(name, sheet, index) for index in range(len(sheet.names))]
     return tuple(columns) if _are_sound(columns, parameters, data, problems) else None
 
 
-def _heading(cell: str, place: Place) -> tuple[tuple[str, ...], str, Place]:
-    match = _HEADING.match(cell)
-    return (tuple(match["path"].split(".")), (match["unit"] or "").strip(), place) if match else ((), "", place)
+def _column(name: str, sheet: Sheet, index: int) -> Variation:
+    heading, unit = sheet.names[index], sheet.units[index]
+    path = tuple(heading.text.split("."))
+    items = [
+        Item(_value(cell.text, unit), cell.text, Origin(dotted(path), _place(name, cell)))
+        for cell in (row[index] for row in sheet.rows)
+    ]
+    return Variation(path, Origin(dotted(path), _place(name, heading)), tuple(items))
 
 
-def _place(name: str, row: tuple[int, list[str]], index: int) -> Place:
-    return Place(name, row[0], 1 + sum(len(cell) + 1 for cell in row[1][:index]))
-
-
-def _cell(name: str, row: tuple[int, list[str]], index: int, path: tuple[str, ...], unit: str) -> Item:
-    text = row[1][index].strip()
-    return Item(_value(text, unit), text, Origin(dotted(path), _place(name, row, index)))
+def _place(name: str, cell: Cell) -> Place:
+    return Place(name, cell.line, cell.column)
 
 
 def _value(text: str, unit: str) -> Any:

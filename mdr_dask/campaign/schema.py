@@ -12,6 +12,8 @@ from mdr_dask.models.base import Model, Parameters
 
 Schema = dict[str, Any]
 
+#: A model of the user's own, ``package.module:NAME``.
+_OWN_MODEL = r"^[A-Za-z_][\w.]*:[A-Za-z_][\w.]*$"
 #: Numbers with units are told from names only; units are checked when the file is read.
 _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": "a number with its unit"}
 _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
@@ -26,11 +28,11 @@ def json_schema() -> Schema:
     root = _readable(CampaignSpec.model_json_schema())
     definitions = {**root.pop("$defs"), **_ranges()}
     choices = []
-    for name in models.NAMES:
+    for name in models.names():
         model = models.load(name)
         definitions[name] = parameters_schema(model.parameters, f"#/$defs/{name}/$defs/{{model}}")
         choices.append(_choice(model))
-    root["properties"]["model"] |= {"enum": list(models.NAMES)}
+    root["properties"]["model"] |= {"anyOf": [{"enum": list(models.names())}, {"pattern": _OWN_MODEL}]}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "mdr_dask campaign",

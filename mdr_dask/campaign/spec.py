@@ -9,10 +9,15 @@ from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from mdr_dask.models.base import Parameters, quantity
 
+_LONGEST_NAME = 100
+
 
 def _usable_as_file_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) or name.endswith("."):
         raise ValueError(f"expected letters, digits, '-', '_' and '.' only, for it names a file, got {name!r}")
+    if len(name) > _LONGEST_NAME or name.endswith((".partial", ".json")):
+        what = f"at most {_LONGEST_NAME} characters" if len(name) > _LONGEST_NAME else "no such ending"
+        raise ValueError(f"expected {what}, for it names a file of the store, got {name[:60]!r}")
     return name
 
 
@@ -112,5 +117,10 @@ class CampaignSpec(Parameters):
     )
     outputs: Annotated[list[str], Field(min_length=1)] | None = Field(
         None, description="arrays that are computed and stored; those marked as default if not given"
+    )
+    errors: bool = Field(
+        True,
+        description="whether each output comes with its estimated discretisation error, <output>_error; false saves "
+        "that work",
     )
     store: StoreSpec = Field(default_factory=StoreSpec, description="where results go")

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
-from mdr_dask.campaign.units import expected, to_si
+from mdr_dask.units import expected, to_si
 
 #: More values than this on one axis are a mistake in the file, not a study.
 MOST_VALUES = 10**6

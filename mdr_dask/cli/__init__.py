@@ -12,9 +12,11 @@ import click
 from mdr_dask.cli.campaigns import check, models, run, schema
 from mdr_dask.cli.figures import figures
 from mdr_dask.cli.master import master_curve
+from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
 from mdr_dask.version import __version__
 
+BROKE = 3
 INTERRUPTED = 130
 
 
@@ -30,7 +32,7 @@ def cli() -> None:
     mdr-dask plot results/quickstart.zarr        draw the figures
 
     Every option can also be set as an environment variable MDR_DASK_<COMMAND>_<OPTION>.
-    Exit codes: 0 all done, 1 ran but some cases failed, 2 not run, 130 interrupted.
+    Exit codes: 0 all done, 1 ran but some cases failed, 2 refused, 3 the program broke, 130 interrupted.
     """
 
 
@@ -54,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
         return INTERRUPTED
     except MdrDaskError as error:
         logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # tasks of Zarr that are given up with it
-        click.echo(str(error), err=True)
+        click.echo(printable(str(error)), err=True)
         return 2
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -62,7 +64,27 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         click.echo(f"{error.filename or 'input or output'}: {error.strerror or error}", err=True)
         return 2
+    except Exception:
+        click.echo(_reported(sys.argv[1:] if arguments is None else arguments), err=True)
+        return BROKE
     return result if isinstance(result, int) else 0
+
+
+def _reported(arguments: list[str]) -> str:
+    """Keep what there is to know of a fault of the program itself in a file, and say so in one sentence."""
+    import platform
+    import tempfile
+    import traceback
+    from importlib.metadata import version
+
+    names = ("numpy", "scipy", "numba", "dask", "distributed", "zarr", "xarray")
+    lines = [f"mdr-dask {' '.join(arguments)}", f"mdr_dask {__version__}, Python {platform.python_version()}"]
+    lines += [platform.platform(), ", ".join(f"{name} {version(name)}" for name in names), "", traceback.format_exc()]
+    descriptor, path = tempfile.mkstemp(prefix="mdr-dask-", suffix=".txt", text=True)
+    with os.fdopen(descriptor, "w") as report:
+        report.write("\n".join(lines))
+    last = traceback.format_exc().strip().splitlines()[-1]
+    return f"a fault of mdr-dask itself, what is in stores is kept: {printable(last)}; please send {path}"
 
 
 def _interrupt(*_: object) -> None:

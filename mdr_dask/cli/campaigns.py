@@ -31,14 +31,16 @@ def models(name: str | None, form: str | None) -> None:
     """
     from mdr_dask import models as room
     from mdr_dask.campaign.reference import output_rows, parameter_rows
+    from mdr_dask.errors import ModelError
 
     if name is None:
-        rows = [{"model": known, "summary": room.load(known).summary} for known in room.NAMES]
+        rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
         _print_left(rows, form)
         return
-    if name not in room.NAMES:
-        raise click.UsageError(f"no model {name!r}; known: {', '.join(room.NAMES)}")
-    model = room.load(name)
+    try:
+        model = room.load(name)
+    except ModelError as error:
+        raise click.UsageError(f"{error}; known: {', '.join(room.names())}") from None
     if form == "json":
         print_json({"model": name, "parameters": parameter_rows(model), "outputs": output_rows(model)})
         return
@@ -129,6 +131,8 @@ def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options:
 
     study = load(campaign)
     url = options["url"] or study.store
+    if url.startswith("memory:"):
+        raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
     if dry_run:
         _print_plan(study, url, form)
         return 0

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
+#: Errors below this part of their mean are rounding.
+ROUNDING = 1e-13
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
@@ -47,9 +49,19 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     cells = [titles, *([_short(row[name]) for name in names] for row in shown)]
     widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
     for line in cells:
-        click.echo("  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True)))
+        click.echo("  ".join(map(_aligned, names, line, widths)).rstrip())
     if len(shown) < len(rows):
         click.echo(f"... {len(rows) - len(shown)} more rows (--limit 0 prints all)", err=True)
+
+
+def _aligned(name: str, cell: str, width: int) -> str:
+    """Return a cell, numbers to the right and the sentence of a fit to the left."""
+    return cell.ljust(width) if name == "law_holds" else cell.rjust(width)
+
+
+def printable(text: str) -> str:
+    """Return a text without control characters, which would speak to the terminal in place of the user."""
+    return "".join(mark if mark.isprintable() or mark == "\n" else repr(mark)[1:-1] for mark in text)
 
 
 def print_json(document: Any) -> None:
@@ -80,12 +92,16 @@ def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
 
 
 def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
-    """Join each mean and its standard error into one column for a reader: ``0.1234 +- 0.0005``."""
+    """Join each mean and its errors into one column for a reader: ``0.1234 +- 0.0005 +- 0.0001``."""
     outputs = [name.removesuffix("_mean") for name in units if name.endswith("_mean")]
-    kept = [name for name in units if name.removesuffix("_mean").removesuffix("_standard_error") not in outputs]
+    of_outputs = {f"{name}_{part}" for name in outputs for part in ("mean", "standard_error", "grid_error")}
+    kept = [name for name in units if name not in of_outputs]
     joined = [
         {name: row[name] for name in kept}
-        | {name: _with_error(row[f"{name}_mean"], row[f"{name}_standard_error"]) for name in outputs}
+        | {
+            name: _with_error(row[f"{name}_mean"], row[f"{name}_standard_error"], row.get(f"{name}_grid_error"))
+            for name in outputs
+        }
         for row in rows
     ]
     return joined, {name: units[name] for name in kept} | {name: units[f"{name}_mean"] for name in outputs}
@@ -107,12 +123,22 @@ def _with_interval(row: Row, name: str) -> str:
     return f"{value:.4g} ({low:.4g}, {high:.4g})"
 
 
-def _with_error(mean: float, error: float) -> str:
-    return f"{mean:.4g} +- {error:.1g}" if math.isfinite(error) else _short(mean)
+def _with_error(mean: float, *errors: float | None) -> str:
+    """Join a mean and its errors; ``-`` for an error that is not known, 0 for rounding noise."""
+    if not any(error is not None and math.isfinite(error) for error in errors):
+        return _short(mean)
+    shown = [_error(error, abs(mean)) for error in errors if error is not None]
+    return " +- ".join([f"{mean:.4g}", *shown])
+
+
+def _error(error: float, size: float) -> str:
+    if not math.isfinite(error):
+        return "-"
+    return f"{error:.1g}" if error > ROUNDING * size else "0"
 
 
 def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 
 def _finite(value: Any) -> Any:

@@ -31,7 +31,10 @@ def outputs(dataset: xr.Dataset, names: tuple[str, ...]) -> xr.Dataset:
             raise click.UsageError(f"no output {name!r} in this store{_meant(name, known)}; known: {', '.join(known)}")
     case_dims = set(dataset["status"].dims)
     kept = list(names) or [name for name in known if set(dataset[name].dims) <= case_dims]
-    return dataset[kept]
+    errors = [
+        dataset[name].attrs["ancillary_variables"] for name in kept if "ancillary_variables" in dataset[name].attrs
+    ]
+    return dataset[list(dict.fromkeys([*kept, *errors]))]
 
 
 def select(dataset: xr.Dataset, selections: tuple[str, ...]) -> xr.Dataset:
@@ -46,6 +49,16 @@ def select(dataset: xr.Dataset, selections: tuple[str, ...]) -> xr.Dataset:
             )
         dataset = _pick(dataset, name, wanted)
     return dataset
+
+
+def select_all(datasets: dict[str, xr.Dataset], selections: tuple[str, ...]) -> dict[str, xr.Dataset]:
+    """Apply selections to every series that varies what is selected; a series that does not stays as it is."""
+    for text in selections:
+        name = text.partition("=")[0]
+        varied = [key for key, data in datasets.items() if name in data.coords and data[name].ndim == 1]
+        for key in varied or list(datasets)[:1]:
+            datasets = datasets | {key: select(datasets[key], (text,))}
+    return datasets
 
 
 def _pick(dataset: xr.Dataset, name: str, wanted: str) -> xr.Dataset:
@@ -73,7 +86,7 @@ def _pick(dataset: xr.Dataset, name: str, wanted: str) -> xr.Dataset:
 
 
 def _number(text: str, unit: str, name: str) -> float:
-    from mdr_dask.campaign.units import to_si
+    from mdr_dask.units import to_si
 
     try:
         return float(text)

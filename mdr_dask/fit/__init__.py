@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.metadata import entry_points
 
 from mdr_dask.fit.base import Fit
 
 #: Modules of this room that hold ``FITS``.
 SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "wear")
 
+#: Entry point group in which other packages offer tuples of `Fit`.
+GROUP = "mdr_dask.fits"
+
 
 def available(model: str) -> dict[str, Fit]:
-    """Return the fits that understand the stores of a model, by name."""
-    fits = (fit for subject in SUBJECTS for fit in import_module(f"mdr_dask.fit.{subject}").FITS)
-    return {fit.name: fit for fit in fits if model in fit.models}
+    """Return the fits for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
+    own = (import_module(f"mdr_dask.fit.{subject}").FITS for subject in SUBJECTS)
+    others = (entry.load() for entry in entry_points(group=GROUP))
+    return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models}

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import xarray as xr
 
+from mdr_dask import bootstrap
+from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import Fit
-from mdr_dask.fit.bootstrap import weights
+from mdr_dask.fit.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
 
 Series = Mapping[str, xr.Dataset]
+Variables = dict[str, xr.Variable]
 
 MODELS = ("sliding_friction",)
-INTERVAL = (0.025, 0.975)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
 FLAT = 0.05  # of the largest friction that still counts as plateau
+TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fit/test_friction_coverage.py chose them
 BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
@@ -56,25 +59,18 @@ def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]
     return data["friction_coefficient"] / slope, xr.DataArray(force), xr.DataArray(velocity)
 
 
-def _resampled(values: FloatArray) -> FloatArray:
-    """Return means over the last axis, realisations: of all of them first, then of bootstrap samples."""
-    drawn = weights(values.shape[-1]).T
-    known = np.isfinite(values)
-    total = np.where(known, values, 0.0) @ drawn
-    number = known @ drawn
-    with np.errstate(invalid="ignore", divide="ignore"):
-        means: FloatArray = np.moveaxis(total / number, -1, 0)
-    return means
+def _interval(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
+    """Return a constant and the ends of its interval."""
+    low, high = bootstrap.interval(stack, count, positive)
+    names = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
+    return {key: xr.Variable((), value, {"units": "1", "long_name": long_name}) for key, value in names.items()}
 
 
-def _interval(name: str, samples: FloatArray, long_name: str, unit: str = "1") -> dict[str, xr.Variable]:
-    """Return a constant and its interval: the first sample is the estimate, the others the bootstrap."""
-    low, high = np.nanquantile(samples[1:], INTERVAL, axis=0)
-    names = {name: samples[0], f"{name}_low": low, f"{name}_high": high}
-    return {key: xr.Variable((), value, {"units": unit, "long_name": long_name}) for key, value in names.items()}
+def _holds(sentence: str) -> Variables:
+    return {"law_holds": xr.Variable((), sentence, LAW_HOLDS)}
 
 
-def _measure(name: str, value: float, long_name: str) -> dict[str, xr.Variable]:
+def _measure(name: str, value: float, long_name: str) -> Variables:
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
 
 
@@ -86,7 +82,7 @@ def _groups(value: xr.DataArray, inner: list[str]) -> Iterator[dict[str, Any]]:
 
 
 def _each(
-    series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], dict[str, xr.Variable]]
+    series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables]
 ) -> xr.Dataset:
     """Fit every point of the dimensions of a series that the fit does not use up."""
     data = next(iter(series.values())).load()
@@ -111,14 +107,44 @@ def _zone_one_axes(data: xr.Dataset) -> list[str]:
     return [*_load_axes(data), *_varying(data, "velocity", "relaxation_time")]
 
 
-def _table(data: xr.Dataset, *columns: xr.DataArray) -> list[FloatArray]:
-    """Flatten friction first, realisations last, and other columns beside it over the cases."""
-    friction, *others = xr.broadcast(*columns)
+class Table(NamedTuple):
+    """Friction over its scale and its error, shape (cases, realisations), and columns of numbers beside them."""
+
+    friction: FloatArray
+    error: FloatArray
+    columns: tuple[FloatArray, ...]
+
+    def stack(self, used: Any = slice(None)) -> FloatArray:
+        """Return the stack of the mean friction of some cases, with their errors."""
+        means = bootstrap.means(self.friction[used].T)
+        if not np.any(self.error[used] > 0):
+            return means
+        known = np.isfinite(self.error[used])
+        error = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        return np.concatenate([means, bootstrap.moved(means[0], error)])
+
+    def count(self, used: Any = slice(None)) -> int:
+        """Return the least number of realisations that any of some cases has."""
+        return int(np.isfinite(self.friction[used]).sum(axis=1).min())
+
+    def mean(self) -> FloatArray:
+        """Return the mean friction of every case; NaN where no realisation has any."""
+        mean: FloatArray = bootstrap.means(self.friction.T)[0]
+        return mean
+
+
+def _table(data: xr.Dataset, scale: xr.DataArray, *columns: xr.DataArray) -> Table:
+    """Flatten the cases, realisations last."""
+    mu = data["friction_coefficient"]
+    error = companion(data, "friction_coefficient")
+    friction, errors, *others = xr.broadcast(mu / scale, (0 * mu if error is None else error) / scale, *columns)
     cases = [dim for dim in friction.dims if dim != "realisation"]
-    shaped = [column.transpose(*cases, "realisation") for column in (friction, *others)]
     count = friction.sizes["realisation"]
-    flat = [np.asarray(column.values, dtype=np.float64).reshape(-1, count) for column in shaped]
-    return [flat[0], *(column[:, 0] for column in flat[1:])]
+    flat = [
+        np.asarray(column.transpose(*cases, "realisation").values, dtype=np.float64).reshape(-1, count)
+        for column in (friction, errors, *others)
+    ]
+    return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
 
 
 def _region_one(rate: FloatArray) -> int | None:
@@ -129,71 +155,147 @@ def _region_one(rate: FloatArray) -> int | None:
     return int(linear[0]) if linear.size else None
 
 
-def _zone_one(data: xr.Dataset) -> dict[str, xr.Variable]:
+def _zone_one(data: xr.Dataset) -> Variables:
     """Fit log (mu / v) over log force in zone 1, at the low end of the velocities."""
-    friction, force, velocity = _table(data, *numbers(data))
-    rate = friction / (np.sqrt(2) * velocity[:, None])
-    points, loads = [], []
-    for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1])]):
-        same = np.flatnonzero(force == load)
+    _, forces, velocities = numbers(data)
+    table = _table(data, spectral_slope(data), forces, velocities)
+    force, velocity = table.columns
+    rate = table.mean() / (np.sqrt(2) * velocity)
+    used = []
+    for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & (rate > 0)]):
+        same = np.flatnonzero((force == load) & (rate > 0))
         same = same[np.argsort(velocity[same])]
-        at = _region_one(np.nanmean(rate[same], axis=1))
+        at = _region_one(rate[same])
         if at is not None:
-            points.append(rate[same[at]])
-            loads.append(load)
-    if len(points) < 3:
+            used.append(same[at])
+    if len(used) < 3:
         raise FitError(
             f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]} and velocities down to region I,"
-            f" got {len(points)}: add lower loads or velocities"
+            f" got {len(used)}: add lower loads or velocities"
         )
-    logs, x = np.log(_resampled(np.array(points))), np.log(loads)
-    slope = (logs - logs.mean(axis=1, keepdims=True)) @ (x - x.mean()) / np.sum((x - x.mean()) ** 2)
-    offset = logs.mean(axis=1) - slope * x.mean()
-    residual = logs[0] - offset[0] - slope[0] * x
+    x, count = np.log(force[used]), table.count(used)
+    design = np.vstack([-x, np.ones(x.size)])
+    found = fitted(
+        lambda logs: logs @ np.linalg.pinv(design),
+        lambda logs, constants: logs - constants @ design,
+        np.log(table.stack(used) / (np.sqrt(2) * velocity[used])),
+        count,
+    )
+    alpha, offset = found.constants.T
+    worst = f"F_N / (G h L) = {np.exp(x[np.argmax(np.abs(found.departures))]):.2g}"
     return {
-        **_interval("alpha", -slope, "exponent of the force in zone 1"),
+        **_interval("alpha", alpha, count, "exponent of the force in zone 1"),
         **_measure("alpha_stated", laws.alpha(float(data["hurst"])), "H / (1 + H)"),
-        **_interval("beta", np.exp(offset), "factor of the law of zone 1"),
-        **_measure("rms_error", float(np.sqrt(np.mean(residual**2))), "rms relative deviation from the law"),
-        **_measure("loads", len(points), "number of loads in zone 1"),
+        **_interval("beta", np.exp(offset), count, "factor of the law of zone 1", positive=True),
+        **_measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
+        **_measure("loads", len(used), "number of loads in zone 1"),
+        **_holds(law_holds(found.departures, found.chance, 2, worst)),
     }
 
 
-def _plateau(data: xr.Dataset) -> dict[str, xr.Variable]:
-    """Take the largest mean friction over the velocities."""
-    friction, _, velocity = _table(data, *numbers(data))
-    means = _resampled(friction)
-    if velocity.size < 3 or not np.any(np.isfinite(means[0])):
+def _plateau(data: xr.Dataset) -> Variables:
+    """Return the top of a parabola through the points about the largest friction, over the logarithm of velocity."""
+    _, _, velocities = numbers(data)
+    table = _table(data, spectral_slope(data), velocities)
+    known = np.flatnonzero(np.isfinite(table.mean()))
+    velocity = table.columns[0][known]
+    if velocity.size < 3:
         raise FitError("expected three velocities or more with friction, for a maximum over them")
-    best = np.nanmax(means, axis=1)
-    at = int(np.nanargmax(means[0]))
-    inside = 0 < np.argsort(np.argsort(velocity))[at] < velocity.size - 1
-    flat = velocity[means[0] > (1 - FLAT) * best[0]]
+    order = np.argsort(velocity)
+    x, count = np.log(velocity[order]), table.count(known)
+    stack = table.stack(known[order])
+    for drop in TOPS:
+        near = _about_the_top(stack[0], drop)
+        top, at, rise, left = _parabola(x[near], stack[:, near])
+        if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
+            continue
+        break
+    smooth = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
+    errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
+    top = np.concatenate([top, errors]) + (smooth - top[0])
+    ends = bootstrap.interval(rise, count)
+    verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])))
+    flat = x[stack[0] > (1 - FLAT) * smooth]
+    found = _interval("plateau", top, count, "largest friction coefficient over rms slope")
+    if verdict.startswith("no:"):
+        found |= {f"plateau_{end}": xr.Variable((), np.nan, found["plateau"].attrs) for end in ("low", "high")}
     return {
-        **_interval("plateau", best, "largest friction coefficient over rms slope"),
-        **_measure("plateau_velocity", float(velocity[at]), "v tau slope / (sqrt 2 h) of the largest friction"),
-        **_measure("decades", float(np.log10(flat.max() / flat.min())), f"decades of velocity within {FLAT:.0%} of it"),
-        **_measure("bracketed", float(inside), "1 if the largest friction is not at an end of the velocities"),
+        **found,
+        **_measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
+        **_measure("plateau_velocity", float(np.exp(at[0])), "v tau slope / (sqrt 2 h) of the largest friction"),
+        **_measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
+        **_holds(verdict),
     }
+
+
+def _smoothed(mean: FloatArray) -> FloatArray:
+    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
+    smooth = mean.copy()
+    for _ in range(2):
+        smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
+    return smooth
+
+
+def _about_the_top(mean: FloatArray, drop: float) -> slice:
+    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+    smooth = _smoothed(mean)
+    at = int(np.argmax(smooth))
+    low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
+    right = at + int(low[0]) if low.size else mean.size
+    low = np.flatnonzero(smooth[:at] <= (1 - drop) * smooth[at])
+    left = int(low[-1]) + 1 if low.size else 0
+    middle = min(max(at, 1), mean.size - 2)
+    return slice(min(left, middle - 1), max(right, middle + 2))
+
+
+def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the top of the parabola through every row, its place, its logarithmic slope there, and what is left."""
+    centre, half = x.mean(), np.ptp(x) / 2
+    u = (x - centre) / half
+    design = np.vstack([np.ones_like(u), u, u**2])
+    constants = rows @ np.linalg.pinv(design)
+    level, tilt, bend = constants.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = np.where(bend < 0, -tilt / (2 * bend), np.copysign(np.inf, tilt))
+    at = np.clip(inside, u.min(), u.max())
+    top = level + tilt * at + bend * at**2
+    return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
+
+
+def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -> str:
+    """Say whether the largest friction is a plateau or top, or lies at an end of the velocities and changes there."""
+    inside = x[0] < at < x[-1] and abs(rise) < 1e-9
+    change = f"d ln mu / d ln v = {rise:.2g} ({ends[0]:.2g}, {ends[1]:.2g})"
+    if inside:
+        return f"yes: friction falls to both sides of v tau slope / (sqrt 2 h) = {np.exp(at):.2g}"
+    if abs(rise) <= FLAT:
+        return f"yes: friction is level at the end of the velocities, {change}"
+    end = "still rises at the largest velocity" if rise > 0 else "still falls at the lowest velocity"
+    if np.isfinite(ends[0]) and ends[0] <= 0 <= ends[1]:
+        return f"not tested: the scatter leaves open whether friction {end}, {change}"
+    return f"no: the plateau is not reached, friction {end}, {change}"
 
 
 def _least_squares(
     model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 30
 ) -> FloatArray:
-    """Fit the data of every sample, shape (samples, points), by damped Gauss-Newton; return (samples, constants)."""
+    """Fit the data of every row, shape (rows, points), by damped Gauss-Newton; return (rows, constants)."""
     constants = np.tile(np.array(start), (data.shape[0], 1))
     for _ in range(steps):
         value = model(constants)
         jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * np.eye(len(start))], axis=-1)
-        normal = np.einsum("spi,spj->sij", jacobian, jacobian) + 1e-12 * np.eye(len(start))
-        gradient = np.einsum("spi,sp->si", jacobian, data - value)
-        constants = constants + np.clip(np.linalg.solve(normal, gradient[..., None])[..., 0], -0.3, 0.3)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian + 1e-12 * np.eye(len(start))
+        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
+        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
+        constants = constants + step
+        if np.abs(step).max() < 1e-9:
+            break
     return constants
 
 
-def _law_error(law: FloatArray, data: FloatArray, suffix: str, which: str) -> dict[str, xr.Variable]:
+def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
     """Return how far a law is from the data, both in units of the plateau sqrt 2 slope."""
-    away = np.abs(law - data)
+    away = np.abs(departures)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     return {
         **_measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
@@ -201,32 +303,46 @@ def _law_error(law: FloatArray, data: FloatArray, suffix: str, which: str) -> di
     }
 
 
-def _interpolation(data: xr.Dataset) -> dict[str, xr.Variable]:
+def _peak(velocity: FloatArray, mean: FloatArray) -> float:
+    """Return the velocity of the largest friction, where region IV begins."""
+    order = np.argsort(velocity)
+    return float(velocity[order][np.argmax(_smoothed(mean[order]))])
+
+
+def _interpolation(data: xr.Dataset) -> Variables:
     """Fit alpha and beta of eq. 3.18 to regions I to III."""
-    friction, force, velocity = _table(data, *numbers(data))
-    mean = np.nanmean(friction, axis=1)
-    peak = {load: velocity[force == load][np.argmax(mean[force == load])] for load in np.unique(force)}
+    _, forces, velocities = numbers(data)
+    table = _table(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
+    force, velocity = table.columns
+    mean = np.nan_to_num(table.mean())
+    peak = {load: _peak(velocity[force == load], mean[force == load]) for load in np.unique(force)}
     used = (force >= LAW_FROM) & (velocity <= np.array([peak[load] for load in force])) & (mean > 0)
     if np.count_nonzero(used) < 5:
         raise FitError(
             f"expected five cases with F_N / (G h L) above {LAW_FROM} below region IV, got {int(used.sum())}"
         )
-    means, force, velocity = _resampled(friction[used]) / np.sqrt(2), force[used], velocity[used]
+    force, velocity, count = force[used], velocity[used], table.count(used)
 
     def model(constants: FloatArray) -> FloatArray:
         law: FloatArray = laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:]))
         return law
 
     hurst = float(data["hurst"])
-    constants = _least_squares(model, (laws.alpha(hurst), np.log(laws.BETA)), means)
-    stated = model(np.array([[laws.alpha(hurst), np.log(laws.BETA)]]))[0]
+    start = (laws.alpha(hurst), float(np.log(laws.BETA)))
+    stack = table.stack(used)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
+    )
+    at = int(np.argmax(np.abs(found.departures)))
+    worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
     return {
-        **_interval("alpha", constants[:, 0], "exponent of the force in the interpolation law"),
+        **_interval("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
         **_measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
-        **_interval("beta", np.exp(constants[:, 1]), "factor of the interpolation law"),
-        **_law_error(model(constants[:1])[0], means[0], "", "constants fitted"),
-        **_law_error(stated, means[0], "_stated", "with H / (1 + H) and 1.6"),
+        **_interval("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
+        **_law_error(found.departures, "", "constants fitted"),
+        **_law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
         **_measure("cases", int(used.sum()), "number of cases fitted"),
+        **_holds(law_holds(found.departures, found.chance, 2, worst)),
     }
 
 
@@ -280,30 +396,41 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     return xr.DataArray(within)
 
 
-def _indenter(data: xr.Dataset) -> dict[str, xr.Variable]:
+def _indenter(data: xr.Dataset) -> Variables:
     """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
     slope = spectral_slope(data)
-    columns = data["friction_coefficient"] / (np.sqrt(2) * slope), indenter_xi(data, slope)
-    friction, xi, within = _table(data, *columns, within_indenter_law(data, slope))
-    used = (within > 0) & np.any(friction > 0, axis=1) & np.isfinite(xi) & (xi > 0)
-    count = _measure("cases", int(used.sum()), "number of cases within the law")
+    table = _table(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
+    xi, within = table.columns
+    known = (table.mean() > 0) & np.isfinite(xi) & (xi > 0)
+    used = (within > 0) & known
+    measured = _measure("cases", int(used.sum()), "number of cases within the law")
     if np.count_nonzero(used) < 3:
         errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
         names = ["exponent", "exponent_low", "exponent_high", *errors]
-        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | count
-    logs, xi = np.log(_resampled(friction[used])), xi[used]
+        reason = (
+            f"not tested: {used.sum()} of {known.sum()} cases within the law, three are needed; in the others the body"
+            f" is steep against the roughness or barely pressed in, or the velocity lies beyond the largest friction"
+        )
+        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | _holds(reason)
+    xi, count = xi[used], table.count(used)
+    logs = np.log(table.stack(used))
 
     def model(constants: FloatArray) -> FloatArray:
         law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 
-    constants = _least_squares(model, (np.log(laws.INDENTER_EXPONENT),), logs)
-    stated = model(np.array([[np.log(laws.INDENTER_EXPONENT)]]))[0]
+    start = (math.log(laws.INDENTER_EXPONENT),)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count
+    )
+    of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
+    worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
     return {
-        **_interval("exponent", np.exp(constants[:, 0]), "exponent of the law of rough indenters"),
-        **_law_error(np.exp(model(constants[:1])[0]), np.exp(logs[0]), "", "exponent fitted"),
-        **_law_error(np.exp(stated), np.exp(logs[0]), "_stated", "exponent 1.5"),
-        **count,
+        **_interval("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
+        **_law_error(of_plateau, "", "exponent fitted"),
+        **_law_error(np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "exponent 1.5"),
+        **measured,
+        **_holds(law_holds(found.departures, found.chance, 1, worst)),
     }
 
 

@@ -14,10 +14,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.units import to_si
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
 from mdr_dask.models.base import DataFile
+from mdr_dask.units import to_si
 
 PROBABILITY = "breakthrough_probability"
 ERROR = "standard_error"

@@ -1,10 +1,17 @@
-"""The models by name; each is imported only when a campaign names it."""
+"""The models by name; each is imported only when a campaign names it.
+
+A model is one of the package (`NAMES`), one that an installed package offers in the entry point group `GROUP`, or any
+object ``package.module:NAME`` of the user's own. Code of one's own runs only because the campaign names it.
+"""
 
 from __future__ import annotations
 
+from functools import lru_cache
 from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from mdr_dask.errors import ModelError
 from mdr_dask.models.base import Model
 
 NAMES: tuple[str, ...] = (
@@ -15,6 +22,14 @@ NAMES: tuple[str, ...] = (
     "mixed_lubrication",
 )
 
+#: Entry point group in which packages offer models.
+GROUP = "mdr_dask.models"
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of all models that are installed: those of the package, then those of others."""
+    return (*NAMES, *(name for name in _offered() if name not in NAMES))
+
 
 def load(name: str) -> Model[Any]:
     """Return the model of that name.
@@ -22,14 +37,38 @@ def load(name: str) -> Model[Any]:
     Parameters
     ----------
     name : str
-        One of `NAMES`; the module ``mdr_dask.models.<name>`` holds it as ``MODEL``.
+        One of `names`, or ``package.module:NAME``.
 
     Raises
     ------
-    KeyError
-        If there is no such model.
+    ModelError
+        If there is no such model, or what is found there is none.
     """
-    if name not in NAMES:
-        raise KeyError(name)
-    model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
-    return model
+    if name in NAMES:
+        model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
+        return model
+    module, colon, _ = name.partition(":")
+    if colon:
+        return _own(name, EntryPoint(name, name, GROUP), module)
+    if name in _offered():
+        return _own(name, _offered()[name], _offered()[name].module)
+    raise ModelError(f"unknown model {name!r}")
+
+
+@lru_cache(maxsize=1)
+def _offered() -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in entry_points(group=GROUP)}
+
+
+def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
+    """Import a model of the user's own; whatever goes wrong there is one sentence."""
+    try:
+        found = entry.load()
+    except ModuleNotFoundError as error:
+        hint = "install its package, or put its folder on PYTHONPATH" if module.startswith(str(error.name)) else error
+        raise ModelError(f"cannot import {module!r} for model {name!r}: {hint}") from None
+    except Exception as error:
+        raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
+    if not isinstance(found, Model):
+        raise ModelError(f"expected {name!r} to be a mdr_dask Model, got {type(found).__name__}")
+    return found

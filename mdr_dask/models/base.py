@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import reduce
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +30,13 @@ class Status(IntEnum):
 
 
 class Parameters(BaseModel):
-    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable."""
+    """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
+
+    `gone` has the parameters and outputs that there once were, and what to write instead of each.
+    """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+    gone: ClassVar[Mapping[str, str]] = {}
 
 
 def _looks_numeric(value: Any) -> bool:
@@ -126,6 +131,21 @@ def canonical(number: ArrayLike) -> Any:
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
+def deferred(module: str, name: str) -> Callable[..., Any]:
+    """Return a function that is imported when it is first called, so that declarations stay light to import.
+
+    Parameters
+    ----------
+    module, name : str
+        Where it is, such as ``"mdr_dask.models.ehl_line.solve"`` and ``"compute"``.
+    """
+
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(module), name)(*arguments)
+
+    return call
+
+
 P = TypeVar("P", bound=Parameters)
 
 
@@ -141,6 +161,9 @@ class Output:
         Dimensions that every single case has (``("radius",)``); their coordinates come from ``Model.coordinates``.
     default : bool
         Whether it is computed when the campaign names no outputs.
+    has_error : bool
+        Whether the solver estimates its discretisation error: then its companion `error` comes with it, unless the
+        campaign says ``errors: false``.
     """
 
     name: str
@@ -148,6 +171,13 @@ class Output:
     long_name: str
     dims: tuple[str, ...] = ()
     default: bool = True
+    has_error: bool = False
+
+    @property
+    def error(self) -> Output:
+        """The companion ``<name>_error``: the estimated absolute discretisation error, in the unit of the output."""
+        meaning = f"estimated absolute discretisation error, {self.long_name}"
+        return Output(f"{self.name}_error", self.unit, meaning, self.dims, self.default)
 
 
 @dataclass(frozen=True)
@@ -176,9 +206,9 @@ class Block(Generic[P]):
     seed : int
         Seed of the campaign.
     outputs : tuple of str
-        Names of the arrays wanted; nothing else need be computed.
+        Names of the arrays wanted, companions with errors among them; nothing else need be computed.
     accuracy : float or None
-        Relative error allowed for the outputs, discretisation and statistics together.
+        Relative discretisation error allowed for every output that has a companion.
     """
 
     parameters: P
@@ -259,7 +289,7 @@ class Model(Generic[P]):
     parameters : type
         Its parameter set.
     outputs : tuple of Output
-        All arrays it can compute. ``status`` is implied.
+        All arrays it can compute. ``status`` is implied, and so are the companions of outputs that have errors.
     compute : callable, Block -> Result
         Pure: the value of a case depends on its parameters, the seed and its realisation, never on its neighbours in
         the block. It does not raise for a case that fails.
@@ -294,6 +324,18 @@ class Model(Generic[P]):
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[P], tuple[str, ...]] = lambda _: ()
 
+    @property
+    def companions(self) -> dict[str, Output]:
+        """The errors of outputs that have one, by the name of their output."""
+        return {output.name: output.error for output in self.outputs if output.has_error}
+
     def output(self, name: str) -> Output:
-        """Return the declared output of that name; KeyError if there is none."""
-        return {output.name: output for output in self.outputs}[name]
+        """Return the output of that name, declared or a companion; KeyError if there is none."""
+        return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
+
+    def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Return names of outputs, each followed by that of its companion where it has one."""
+        companions = self.companions
+        return tuple(
+            each for name in names for each in ((name, companions[name].name) if name in companions else (name,))
+        )

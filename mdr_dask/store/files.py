@@ -91,7 +91,8 @@ def sweep(url: str) -> None:
     if path is not None and path.is_dir():
         with guarded(url, "removing what a killed run left"):
             for leftover in path.rglob("*.partial"):
-                leftover.unlink(missing_ok=True)
+                if leftover.is_file():
+                    leftover.unlink(missing_ok=True)
 
 
 def names(url: str, prefix: str) -> list[str]:
@@ -201,7 +202,10 @@ def lock(url: str) -> Iterator[None]:
         return
     from filelock import FileLock, Timeout
 
-    path = path.resolve()
+    try:
+        path = path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
+        raise StoreError(f"{url}: expected a path: {error}") from None
     holder = path.with_name(f".{path.name}.runner")
     file = path.with_name(f".{path.name}.lock")
     guard = FileLock(file, timeout=0)

@@ -99,6 +99,8 @@ def _arrays_in_memory(template: Template) -> dict[str, bytes]:
     for output in template.outputs:
         dims = (*template.dims, *output.dims)
         attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
+        if output.has_error and output.error in template.outputs:
+            attrs["ancillary_variables"] = output.error.name
         _create_array(group, output.name, template, dims, template.extra_shape(output), "float64", attrs)
     flags: dict[str, Any] = {
         "long_name": "state of the case",
@@ -141,6 +143,7 @@ def _create_coordinate(
         shape=values.shape,
         chunks=(_COORDINATE_CHUNK,) * values.ndim,
         dtype="str" if values.dtype == object else values.dtype,
+        compressors=[ZstdCodec(level=1), Crc32cCodec()],
         dimension_names=dims,
         attributes=attrs,
     )

@@ -52,7 +52,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
     StoreError
         If there is no study of mdr_dask at `url`.
     """
-    return {name: _open_sorted(url, name) for name in series_names(url)}
+    with readable(url):
+        return {name: _open_sorted(url, name) for name in series_names(url)}
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
@@ -60,6 +61,7 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
+    _check_axes(url, dataset)
     for dim in dataset.dims:
         if (
             dim in dataset.indexes
@@ -69,6 +71,14 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
             dataset = dataset.sortby(dim)
     order = [*dataset.attrs["outputs"], "status"]
     return dataset[order]
+
+
+def _check_axes(url: str, dataset: xr.Dataset) -> None:
+    """Compare axes with the attributes, which hold the same numbers: a chunk that is gone would read as zeros."""
+    for axis in dataset.attrs["axes"]:
+        held = dataset[axis["name"]].to_numpy().tolist()
+        if held != (axis["labels"] or axis["values"]):
+            raise StoreError(f"{url}: damaged, the axis {axis['name']} is not the one that was laid out")
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:

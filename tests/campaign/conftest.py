@@ -9,6 +9,7 @@ import pytest
 from pydantic import Field, model_validator
 
 from mdr_dask import models
+from mdr_dask.errors import ModelError
 from mdr_dask.models.base import Model, NamedFile, Output, Parameters, Result, quantity
 
 
@@ -80,8 +81,14 @@ RUBBING = Model(
 )
 
 
+def _load(name):
+    if name != "rubbing":
+        raise ModelError(f"unknown model {name!r}")
+    return RUBBING
+
+
 @pytest.fixture(autouse=True)
 def rubbing(monkeypatch):
     monkeypatch.setattr(models, "NAMES", ("rubbing", "sliding_friction"))
-    monkeypatch.setattr(models, "load", {"rubbing": RUBBING}.__getitem__)
+    monkeypatch.setattr(models, "load", _load)
     return RUBBING

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from mdr_dask.models.base import Parameters, quantity
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.surfaces.shapes import Shape
 
 
 class Plane(Parameters):
@@ -16,8 +19,25 @@ class Plane(Parameters):
 
     shape: Literal["plane"] = "plane"
 
+    def line(self) -> None:
+        """Return what is under the roughness: nothing."""
 
-class Cone(Parameters):
+
+class _PowerLaw(Parameters):
+    """A body of revolution whose height is a power of the radius."""
+
+    def power_law(self) -> tuple[float, float]:
+        """Return coefficient and exponent of the body c r^n."""
+        raise NotImplementedError
+
+    def line(self) -> Shape:
+        """Return the line that acts like the body, by the MDR rule, in metres."""
+        from mdr_dask.physics.surfaces.shapes import PowerLaw
+
+        return PowerLaw.of_body(*self.power_law())
+
+
+class Cone(_PowerLaw):
     """A cone, rough or smooth."""
 
     shape: Literal["cone"]
@@ -28,7 +48,7 @@ class Cone(Parameters):
         return math.tan(self.angle), 1.0
 
 
-class Parabola(Parameters):
+class Parabola(_PowerLaw):
     """A paraboloid, which stands for a sphere."""
 
     shape: Literal["parabola"]
@@ -39,7 +59,7 @@ class Parabola(Parameters):
         return 1 / (2 * self.radius), 2.0
 
 
-class Power(Parameters):
+class Power(_PowerLaw):
     """A body of revolution c r^n."""
 
     shape: Literal["power"]

@@ -1,33 +1,100 @@
 """The elastohydrodynamic film of a line contact, from rigid and isoviscous to elastic and piezoviscous.
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
-``p0 = E' sqrt(W/(2 pi))``. Two numbers decide for Barus and an incompressible liquid: Moes' M and L. A solution of
-:func:`solve` starts from a guess of its own; for dense sweeps see :mod:`mdr_dask.physics.lubrication.lattice`.
+``p0 = E' sqrt(W/(2 pi))``. Two numbers decide for Barus and an incompressible liquid: Moes' M and L. A case is
+solved on nested grids, each of half the spacing of the one before, until what the films tend to is known well enough.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.deformation import film as film_at
-from mdr_dask.physics.lubrication.film_formulas import moes_parameters
-from mdr_dask.physics.lubrication.levels import GridSolution, Levels, minimum, solve_levels
-from mdr_dask.physics.lubrication.newton import CONVERGED, FILM_COLLAPSED, SINGULAR, TOO_MANY_STEPS, Liquid
+from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
+from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
+from mdr_dask.physics.outcome import Outcome
 
 VISCOSITY_LAWS = ("barus", "roelands")
 
-_WHY = {
-    TOO_MANY_STEPS: "the Newton iteration did not settle",
-    SINGULAR: "the Newton equations became singular",
-    FILM_COLLAPSED: "the Newton iteration would have closed the film",
-}
+
+class Attempt(NamedTuple):
+    """A way to the first solution.
+
+    Parameters
+    ----------
+    factor : float
+        On the film that the limiting regimes let expect.
+    starved : float
+        Upper limit of the film over the square of the inlet's distance.
+    clip : float
+        Greatest change of pressure in a step.
+    nodes : int
+        Number of nodes.
+    """
+
+    factor: float
+    starved: float
+    clip: float
+    nodes: int
+
+
+class Settings(NamedTuple):
+    """Numbers of the solver, chosen with ``python -m benchmarks.honesty_ehl`` on seeds kept apart from its tables.
+
+    Parameters
+    ----------
+    attempts : tuple of Attempt
+        Ways to the first solution, in this order, of at most `attempt_steps` steps each.
+    attempt_steps : int
+        Greatest number of steps of an attempt.
+    paces : tuple of Pace
+        Ways from one grid to another, in this order.
+    adapted_nodes, adaptations : int
+        Nodes of the grids that are placed by a solution before grids are compared, and their number.
+    nodes : tuple of int
+        Nodes of the grids that are compared. The last is a cap: its dense equations take some 50 ms a step.
+    lowest_order, highest_order : float
+        Observed orders of convergence between which grids are extrapolated; the scheme is of second order.
+    change : float
+        The error of an extrapolated value over the change of the second-order limit from grid to grid.
+    floor : float
+        Least error over the change of the value itself from grid to grid: what the rupture's place between two nodes
+        makes the minimum film scatter.
+    slowest : float
+        Least ratio of successive changes by which the error of a value that is not extrapolated is bounded.
+    """
+
+    attempts: tuple[Attempt, ...] = (
+        Attempt(1.5, 0.2, 0.12, 121),
+        Attempt(2.5, 0.4, 0.12, 121),
+        Attempt(1.5, 0.1, 0.04, 121),
+        Attempt(4.0, 0.2, 0.05, 121),
+        Attempt(1.5, 0.2, 0.05, 361),
+    )
+    attempt_steps: int = 80
+    paces: tuple[Pace, ...] = (Pace(0.12, 30), Pace(0.05, 80), Pace(0.02, 250))
+    adapted_nodes: int = 121
+    adaptations: int = 2
+    nodes: tuple[int, ...] = (41, 81, 161, 321, 641, 1281)
+    lowest_order: float = 1.5
+    highest_order: float = 2.6
+    change: float = 0.5
+    floor: float = 0.06
+    slowest: float = 1.2
+
+
+SETTINGS = Settings()
 #: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
 _SPIKE = 0.01
+#: Positions between two cells at which the lowest film is looked for.
+_SUBDIVISION = 41
 
 
 class LineContact(NamedTuple):
@@ -118,6 +185,131 @@ def line_contact(
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
 
+class GridSolution(NamedTuple):
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, and the steps taken.
+
+    Between two nodes the pressure is straight and the film sags; :meth:`film_between` goes through the nodes instead.
+    """
+
+    nodes: FloatArray
+    pressure: FloatArray
+    film: FloatArray
+    central: float
+    steps: int
+
+    def film_between(self, positions: FloatArray) -> FloatArray:
+        """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
+        film = _cubic(self.nodes, self.film, positions)
+        behind = positions > self.nodes[-1]
+        film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
+        return np.where(positions < self.nodes[0], np.nan, film)
+
+    def pressure_between(self, positions: FloatArray) -> FloatArray:
+        """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
+        inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
+        return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
+
+    @property
+    def central_film(self) -> float:
+        """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
+        return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
+
+    @property
+    def minimum(self) -> tuple[float, float]:
+        """Position and height of the lowest film, between the nodes around the lowest one."""
+        i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
+        positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
+        heights = _cubic(self.nodes, self.film, positions)
+        k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
+        left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
+        if not right > left:
+            return float(positions[k]), float(heights[k])
+        offset = -(left + right) / (2 * (right - left))  # the vertex of a parabola
+        width = positions[1] - positions[0]
+        return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
+
+    @property
+    def spike(self) -> tuple[float, float]:
+        """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
+        P = self.pressure
+        peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
+        if peaks.size < 2:
+            return float("nan"), float("nan")
+        last = peaks[-1]
+        if P[last] - P[peaks[-2] : last].min() < _SPIKE * P.max():
+            return float("nan"), float("nan")
+        return float(self.nodes[last]), float(P[last])
+
+    @property
+    def rupture(self) -> float:
+        """Where the film ends, from the pressure's last two positive values: it goes out like a square."""
+        last = int(np.flatnonzero(self.pressure)[-1])
+        (x1, x2), (P1, P2) = self.nodes[last - 1 : last + 1], self.pressure[last - 1 : last + 1]
+        ratio = np.sqrt(P1 / P2)
+        end = (ratio * x2 - x1) / (ratio - 1) if ratio > 1 else np.inf
+        return float(min(end, self.nodes[min(last + 1, self.nodes.size - 1)]))
+
+
+def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the cubic through the two nodes before and the two behind each position (Lagrange)."""
+    first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
+    x = nodes[first[:, None] + np.arange(4)]
+    total = np.zeros(positions.size)
+    for k in range(4):
+        others = [m for m in range(4) if m != k]
+        weight = np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
+        total += weight * values[first + k]
+    return total
+
+
+class Estimate(NamedTuple):
+    """What values on nested grids tend to, its estimated absolute error, and the order of convergence observed.
+
+    Each is a number or an array; the order is NaN where the values do not approach anything steadily.
+    """
+
+    value: FloatArray
+    error: FloatArray
+    order: FloatArray
+
+    def scaled(self, factor: float) -> Estimate:
+        """Return the estimate in another unit."""
+        return Estimate(self.value * factor, self.error * factor, self.order)
+
+
+def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
+    """Return what values on grids of halved spacing tend to.
+
+    Where the changes from grid to grid shrink at about second order, the limit is Richardson's, to third order, and the
+    error is a share of what the second-order limit still changed by. Elsewhere the limit is the finest value, and the
+    error its last change or, where changes shrink slowly, the sum of those to come.
+
+    Parameters
+    ----------
+    values : array, shape (k, ...)
+        From the coarsest grid to the finest, at least three.
+    settings : Settings
+        The orders that are trusted, and the shares.
+
+    Returns
+    -------
+    Estimate
+        Elementwise; an error is infinite where a coarser grid has no value.
+    """
+    coarse, middle, fine = np.asarray(values[-3:], dtype=np.float64)
+    before, last = middle - coarse, fine - middle
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where((last == 0) & np.isfinite(before), 4.0, before / last)
+        order = np.where(ratio > 0, np.log2(np.abs(ratio)), np.nan)
+    limit, earlier = fine + last / 3, middle + before / 3
+    trusted = np.maximum(settings.change * np.abs(limit - earlier), settings.floor * np.abs(last))
+    slow = np.maximum(np.abs(ratio), settings.slowest)
+    is_trusted = (order >= settings.lowest_order) & (order <= settings.highest_order)
+    value = np.where(is_trusted, limit + (limit - earlier) / 7, fine)
+    error = np.where(is_trusted, trusted, np.abs(last) * np.maximum(1.0, 1 / (slow - 1)))
+    return Estimate(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
+
+
 @dataclass(frozen=True)
 class LineSolution:
     """The film of a line contact in Hertz units.
@@ -126,92 +318,113 @@ class LineSolution:
     ----------
     case : LineContact
         What was solved.
-    status : int
-        CONVERGED (0), or what stopped the iteration on the grid that failed.
+    outcome : Outcome
+        CONVERGED, or what stopped the iteration on the grid that failed.
     reason : str
-        One sentence if it failed or missed the accuracy, else empty.
-    fine, coarse : GridSolution
-        On the finest grid and on the one before, of double spacing; empty if it failed.
-    central_film, minimum_film : float
-        In ``a^2/R``, extrapolated over the grids to second order.
-    minimum_position : float
-        Of the minimum film, in half widths.
-    error : float
-        Estimated relative error of the worse of the two films.
-    order : float
-        Observed order of convergence of the central film; NaN if fewer than three grids were solved.
-    load_error : float
-        Relative deviation of the integral of the pressure from the load.
-    spike_position, spike_pressure : float
-        Place and height of the pressure spike, NaN if there is none. The height does not converge with Barus' law.
-    rupture_position : float
-        Where the film ends, in half widths.
+        One sentence if no film was found, else empty.
+    grids : tuple of GridSolution
+        The last three grids, the finest last; empty if no film was found.
+    central_film, minimum_film : Estimate
+        In ``a^2/R``; NaN if no film was found.
     steps : int
         Newton steps on all grids together.
     """
 
     case: LineContact
-    status: int
+    outcome: Outcome
     reason: str
-    fine: GridSolution
-    coarse: GridSolution
-    central_film: float
-    minimum_film: float
-    minimum_position: float
-    error: float
-    order: float
-    load_error: float
-    spike_position: float
-    spike_pressure: float
-    rupture_position: float
+    grids: tuple[GridSolution, ...]
+    central_film: Estimate
+    minimum_film: Estimate
     steps: int
 
     @property
-    def nodes(self) -> FloatArray:
-        """Nodes of the finest grid in half widths, shape (n,)."""
-        return self.fine.nodes
+    def finest(self) -> GridSolution:
+        """The solution on the finest grid."""
+        return self.grids[-1]
 
     @property
-    def pressure(self) -> FloatArray:
-        """Pressure there in p0, shape (n,)."""
-        return self.fine.pressure
+    def error(self) -> float:
+        """Estimated relative error of the worse of the two films."""
+        return float(max(film.error / film.value for film in (self.central_film, self.minimum_film)))
 
     @property
-    def film(self) -> FloatArray:
-        """Film there in ``a^2/R``, shape (n,)."""
-        return self.fine.film
+    def load_error(self) -> float:
+        """Relative deviation of the pressure's integral from the load."""
+        return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
-    def film_at(self, positions: FloatArray) -> FloatArray:
-        """Return the film at any positions in half widths, from the deformation by the pressure found."""
-        return film_at(np.asarray(positions, dtype=np.float64), self.nodes, self.pressure, self.fine.central)
-
-    def pressure_at(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in p0 at any positions in half widths; zero outside the film."""
-        return np.interp(positions, self.nodes, self.pressure, left=0.0, right=0.0)
+    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Estimate:
+        """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
+        return extrapolate(np.array([reading(grid) for grid in self.grids]))
 
 
-def _spike(state: GridSolution) -> tuple[float, float]:
-    """Return position and height of a second pressure maximum behind the first, NaN twice if there is none."""
-    P = state.pressure
-    peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
-    if peaks.size < 2:
-        return float("nan"), float("nan")
-    last = peaks[-1]
-    if P[last] - P[peaks[-2] : last].min() < _SPIKE * P.max():
-        return float("nan"), float("nan")
-    return float(state.nodes[last]), float(P[last])
+def expected_film(M: float, L: float) -> float:
+    """Return the film in ``a^2/R`` that the four limiting regimes let expect; good for a first guess."""
+    rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
+    return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
 
 
-def _rupture(state: GridSolution) -> float:
-    """Return where the film ends, from the pressure's last two positive values: it goes out like a square."""
-    last = int(np.flatnonzero(state.pressure)[-1])
-    (x1, x2), (P1, P2) = state.nodes[last - 1 : last + 1], state.pressure[last - 1 : last + 1]
-    ratio = np.sqrt(P1 / P2)
-    end = (ratio * x2 - x1) / (ratio - 1) if ratio > 1 else np.inf
-    return float(min(end, state.nodes[min(last + 1, state.nodes.size - 1)]))
+def _solve_on(
+    case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, paces: tuple[Pace, ...]
+) -> tuple[Outcome, GridSolution]:
+    """Solve on one grid from a guess of the pressure at its nodes, at the first pace that converges."""
+    grid, total = Grid.of(nodes), 0
+    guess = pressure.copy()
+    guess[0] = guess[-1] = 0.0
+    # a guess that leaves no film has no Newton step
+    lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
+    for pace in paces:
+        found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
+        total += found.steps
+        if found.outcome == Outcome.CONVERGED:
+            break
+    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total)
 
 
-def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
+def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
+    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
+    reach = float(np.sqrt(2 * central))
+    width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
+    return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
+
+
+def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution]:
+    """Return the solution on a first grid, by the first of the known ways that leads there."""
+    for attempt in settings.attempts:
+        guess = attempt.factor * expected_film(case.M, case.L)
+        inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
+        guess = min(guess, attempt.starved * inlet**2)
+        nodes = grids.first_grid(guess, inlet, attempt.nodes)
+        pace = Pace(attempt.clip, settings.attempt_steps)
+        outcome, state = _solve_on(case, nodes, _first_pressure(nodes, guess), guess, (pace,))
+        if outcome == Outcome.CONVERGED:
+            break
+    return outcome, state
+
+
+def _refined(
+    case: LineContact, state: GridSolution, source: GridSolution, count: int, paces: tuple[Pace, ...]
+) -> tuple[Outcome, GridSolution]:
+    """Solve on `count` nodes placed as the solution `source` asks for, starting from `state`."""
+    density = grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
+    nodes = grids.sample(source.nodes, density, count)
+    guess = np.interp(nodes, state.nodes, state.pressure)
+    return _solve_on(case, nodes, guess, state.central, paces)
+
+
+def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
+    """Return the solution that places the nodes of the grids compared, and the steps that it took."""
+    outcome, state = _first_solution(case, settings)
+    steps = state.steps
+    for _ in range(settings.adaptations if outcome == Outcome.CONVERGED else 0):
+        adapted_outcome, adapted = _refined(case, state, state, settings.adapted_nodes, settings.paces)
+        steps += adapted.steps
+        if adapted_outcome == Outcome.CONVERGED:
+            state = adapted
+    return outcome, state, steps
+
+
+def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
     """Return the film and pressure of a lubricated line contact.
 
     Parameters
@@ -219,50 +432,47 @@ def solve(case: LineContact, accuracy: float = 1e-3) -> LineSolution:
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-        Relative error allowed for the central and the minimum film; the grid is halved until the estimate meets it.
+        Relative error allowed for the central and the minimum film; the grid is halved until the estimates meet it.
+    settings : Settings
+        Numbers of the solver.
 
     Returns
     -------
     LineSolution
-        With ``status`` other than zero and a reason if no solution was found; with a reason too if the finest grid
-        allowed (10241 nodes) or the finest one that converged misses the accuracy.
+        With an outcome other than CONVERGED and a reason if no film was found. Its `error` may exceed the accuracy: on
+        the finest grid allowed, or the finest one that converged.
     """
-    return solution(case, solve_levels(case, accuracy), accuracy)
+    outcome, source, steps = _adapted_solution(case, settings)
+    failure, state = (outcome, source), source
+    solved: list[GridSolution] = []
+    for count in settings.nodes if outcome == Outcome.CONVERGED else ():
+        outcome, finer = _refined(case, state, source, count, settings.paces)
+        steps += finer.steps
+        if outcome == Outcome.CONVERGED:
+            state = finer
+            solved.append(finer)
+            if len(solved) > 2 and _solution(case, solved, steps).error <= accuracy:
+                break
+        else:
+            failure = outcome, finer
+            if solved:
+                break  # a grid before the first solution is too coarse for this film
+    if len(solved) < 3:
+        return _no_solution(case, *failure, steps)
+    return _solution(case, solved, steps)
 
 
-def solution(case: LineContact, levels: Levels, accuracy: float) -> LineSolution:
-    """Return what the grids of a case gave as a solution, with the reason if they failed or missed the accuracy."""
-    nan, state = float("nan"), levels.fine
-    if levels.status != CONVERGED:
-        none = GridSolution(np.empty(0), np.empty(0), np.empty(0), nan, 0)
-        why = f"{_WHY[levels.status]} on {state.nodes.size} nodes"
-        reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why}"
-        return LineSolution(
-            case, levels.status, reason, none, none, nan, nan, nan, nan, nan, nan, nan, nan, nan, levels.steps
-        )
-    changes = np.diff(levels.films[-3:, 0])
-    change = changes[0] / changes[1] if changes.size == 2 and changes[1] != 0 else nan
-    spike_position, spike_pressure = _spike(state)
-    reason = ""
-    if levels.error > accuracy:
-        reason = (
-            f"the estimated error of the film is {levels.error:.1e} on {state.nodes.size} nodes, "
-            f"{accuracy:.1e} was asked for"
-        )
-    return LineSolution(
-        case=case,
-        status=CONVERGED,
-        reason=reason,
-        fine=state,
-        coarse=levels.coarse,
-        central_film=float(levels.limit[0]),
-        minimum_film=float(levels.limit[1]),
-        minimum_position=minimum(state)[0],
-        error=levels.error,
-        order=float(np.log2(change)) if change > 0 else nan,
-        load_error=abs(float(np.trapezoid(state.pressure, state.nodes)) / (np.pi / 2) - 1),
-        spike_position=spike_position,
-        spike_pressure=spike_pressure,
-        rupture_position=_rupture(state),
-        steps=levels.steps,
-    )
+def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
+    """Return what the last three grids tend to."""
+    last = tuple(solved[-3:])
+    central = extrapolate(np.array([grid.central_film for grid in last]))
+    minimum = extrapolate(np.array([grid.minimum[1] for grid in last]))
+    return LineSolution(case, Outcome.CONVERGED, "", last, central, minimum, steps)
+
+
+def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution, steps: int) -> LineSolution:
+    """Return a solution without a film, and why there is none."""
+    none = Estimate(*(np.array(np.nan),) * 3)
+    why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
+    reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"
+    return LineSolution(case, outcome, reason, (), none, none, steps)

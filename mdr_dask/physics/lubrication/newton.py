@@ -19,14 +19,63 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-
-#: What became of an iteration: values of the status that `newton` returns, and that it has not ended.
-CONVERGED, TOO_MANY_STEPS, SINGULAR, FILM_COLLAPSED, UNDER_WAY = range(5)
+from mdr_dask.physics.linear import factorise
+from mdr_dask.physics.lubrication.deformation import influence_matrix
+from mdr_dask.physics.outcome import Outcome
 
 #: Share of the quadratic (QUICK) face value in the second-order upwind Couette flux; the rest is linear from upstream.
 _QUADRATIC = 1.0 / 3.0
 #: A step may close at most this share of the film at any node.
 _FILM_SHARE = 0.8
+#: Least share of a step that is worth taking.
+_LEAST_SHARE = 1e-9
+
+
+class Grid(NamedTuple):
+    """Nodes in half widths, their trapezoidal weights, and the influence of their pressures on the film there.
+
+    The influence is that of :func:`mdr_dask.physics.lubrication.deformation.influence_matrix`, shape (n, n).
+    """
+
+    nodes: FloatArray
+    weights: FloatArray
+    influence: FloatArray
+
+    @classmethod
+    def of(cls, nodes: FloatArray) -> Grid:
+        """Return the grid of ascending nodes."""
+        weights = np.zeros_like(nodes)
+        weights[:-1] += np.diff(nodes) / 2
+        weights[1:] += np.diff(nodes) / 2
+        return cls(nodes, weights, influence_matrix(nodes, nodes))
+
+
+class Pace(NamedTuple):
+    """How an iteration goes.
+
+    Parameters
+    ----------
+    clip : float
+        Greatest change of a pressure in one step, in units of the greatest pressure.
+    most : int
+        Greatest number of steps.
+    tolerance : float
+        Relative size of the last step.
+    """
+
+    clip: float
+    most: int
+    tolerance: float = 1e-8
+
+
+class Iterate(NamedTuple):
+    """Where an iteration ended: outcome, steps, pressure and film at the nodes, film at ``X = 0``."""
+
+    outcome: Outcome
+    steps: int
+    pressure: FloatArray
+    central: float
+    film: FloatArray
 
 
 class Liquid(NamedTuple):
@@ -153,10 +202,12 @@ def balance(
 
 
 @njit(nogil=True, cache=True)
-def _jacobian_row(i: int, matrix: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray) -> None:
+def _fill_jacobian_row(
+    i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
+) -> None:
     """Fill the derivative of the balance of volume i by every pressure, through the film too."""
     c0, c1, c2, c3 = by_film[i]
-    far, near, own, next_ = matrix[max(i - 2, 0)], matrix[i - 1], matrix[i], matrix[i + 1]
+    far, near, own, next_ = influence[max(i - 2, 0)], influence[i - 1], influence[i], influence[i + 1]
     for j in range(row.size):
         row[j] = c0 * far[j] + c1 * near[j] + c2 * own[j] + c3 * next_[j]
     for k in range(4):
@@ -165,238 +216,148 @@ def _jacobian_row(i: int, matrix: FloatArray, by_pressure: FloatArray, by_film: 
 
 
 @njit(nogil=True, cache=True)
-def _fill_active(P: FloatArray, R: FloatArray, scale: FloatArray, active: NDArray[np.int64]) -> int:
-    """List the inner nodes that carry pressure, ``P + R/scale > 0``; return their number."""
+def _fill_active(
+    influence: FloatArray,
+    P: FloatArray,
+    R: FloatArray,
+    by_pressure: FloatArray,
+    by_film: FloatArray,
+    active: NDArray[np.int64],
+) -> int:
+    """List the inner nodes that carry pressure, ``P + R/d > 0`` with d the size of their own derivative; count them."""
     count = 0
     for i in range(1, P.size - 1):
-        if P[i] + R[i] / scale[i] > 0.0:
+        size = abs(by_pressure[i, 2])
+        for k in range(4):
+            size += abs(by_film[i, k] * influence[max(i - 2 + k, 0), i])
+        if P[i] + R[i] / size > 0.0:
             active[count] = i
             count += 1
     return count
 
 
 @njit(nogil=True, cache=True)
-def solve_linear(A: FloatArray, b: FloatArray, n: int) -> bool:
-    """Solve ``A x = b`` of order n in place by LU with partial pivoting; False if A is singular.
-
-    Written out, and not LAPACK's, because a threaded BLAS gives other last bits with another number of threads.
-    """
-    for first in range(0, n, 4):
-        last = min(first + 4, n)
-        for k in range(first, last):
-            if not _eliminate_column(A, b, n, k, last):
-                return False
-        if last == n:
-            break
-        for k in range(first + 1, last):
-            for m in range(first, k):
-                factor, upper, lower = A[k, m], A[m], A[k]
-                for j in range(last, n):
-                    lower[j] -= factor * upper[j]
-        u0, u1, u2, u3 = A[first], A[first + 1], A[first + 2], A[first + 3]
-        for i in range(last, n):
-            row = A[i]
-            f0, f1, f2, f3 = row[first], row[first + 1], row[first + 2], row[first + 3]
-            for j in range(last, n):
-                row[j] -= f0 * u0[j] + f1 * u1[j] + f2 * u2[j] + f3 * u3[j]
-    for i in range(n - 1, -1, -1):
-        total = b[i]
-        for j in range(i + 1, n):
-            total -= A[i, j] * b[j]
-        b[i] = total / A[i, i]
-    return True
-
-
-@njit(nogil=True, cache=True)
-def _eliminate_column(A: FloatArray, b: FloatArray, n: int, k: int, last: int) -> bool:
-    """Pivot and eliminate column k, updating only the columns before `last` and the right side."""
-    pivot, largest = k, abs(A[k, k])
-    for i in range(k + 1, n):
-        if abs(A[i, k]) > largest:
-            pivot, largest = i, abs(A[i, k])
-    if not largest > 0.0:
-        return False
-    if pivot != k:
-        for j in range(n):
-            A[k, j], A[pivot, j] = A[pivot, j], A[k, j]
-        b[k], b[pivot] = b[pivot], b[k]
-    for i in range(k + 1, n):
-        factor = A[i, k] / A[k, k]
-        A[i, k] = factor
-        for j in range(k + 1, last):
-            A[i, j] -= factor * A[k, j]
-        b[i] -= factor * b[k]
-    return True
-
-
-@njit(nogil=True, cache=True)
-def nodal_film(nodes: FloatArray, matrix: FloatArray, P: FloatArray, central: float, H: FloatArray) -> None:
-    """Fill the film H at the nodes, given their matrix, the pressure and the film at ``X = 0``."""
-    for i in range(P.size):
-        total = central + 0.5 * nodes[i] ** 2
-        for j in range(P.size):
-            total += matrix[i, j] * P[j]
-        H[i] = total
-
-
-@njit(nogil=True, cache=True)
-def _fill_film_step(matrix: FloatArray, step: FloatArray, central: float, film_step: FloatArray) -> None:
-    """Fill the change of the film at the nodes by a step of the pressures and of the film at ``X = 0``."""
-    for i in range(step.size):
-        change = central
-        for j in range(step.size):
-            change += matrix[i, j] * step[j]
-        film_step[i] = change
-
-
-@njit(nogil=True, cache=True)
-def _step_length(film_step: FloatArray, P: FloatArray, H: FloatArray, step: FloatArray, clip: float) -> float:
-    """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
-    largest = np.max(np.abs(step))
-    share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
-    for i in range(P.size):
-        if film_step[i] < 0.0:
-            share = min(share, -_FILM_SHARE * H[i] / film_step[i])
-    return share
-
-
-@njit(nogil=True, cache=True)
-def _is_settled(P: FloatArray, step: FloatArray, central: float, change: float, tolerance: float) -> bool:
-    """Return whether a step changes pressure and central film by less than the tolerance."""
-    return bool(np.max(np.abs(step)) < tolerance * np.max(P) and abs(change) < tolerance * central)
-
-
-@njit(nogil=True, cache=True)
-def take_step(
-    P: FloatArray,
-    central: float,
-    H: FloatArray,
-    step: FloatArray,
-    change: float,
-    film_step: FloatArray,
-    clip: float,
-    tolerance: float,
-) -> tuple[int, float]:
-    """Change P and `central` by as much of a Newton step as the film allows; return the status and the new `central`.
-
-    CONVERGED, or UNDER_WAY, or FILM_COLLAPSED where hardly anything of the step is allowed, and P is left alone.
-    """
-    share = _step_length(film_step, P, H, step, clip)
-    if not share > 1e-9:
-        return FILM_COLLAPSED, central
-    done = share == 1.0 and _is_settled(P, step, central, change, tolerance)
-    for i in range(P.size):
-        P[i] = max(0.0, P[i] + share * step[i])
-    return (CONVERGED if done else UNDER_WAY), central + share * change
-
-
-@njit(nogil=True, cache=True)
-def outcome(status: int, central: float, H: FloatArray) -> int:
-    """Return the status of :func:`take_step`, or FILM_COLLAPSED where the step has left no film."""
-    return FILM_COLLAPSED if status == UNDER_WAY and not (central > 0.0 and np.min(H) > 0.0) else status
-
-
-@njit(nogil=True, cache=True)
-def _linear_system(
+def _fill_equations(
+    grid: Grid,
     P: FloatArray,
     R: FloatArray,
     active: NDArray[np.int64],
-    count: int,
-    matrix: FloatArray,
-    weights: FloatArray,
     by_pressure: FloatArray,
     by_film: FloatArray,
     A: FloatArray,
     b: FloatArray,
-    row: FloatArray,
 ) -> None:
     """Fill the Newton equations of the active pressures and the central film; the other pressures go to zero."""
-    released = P.copy()
+    count = active.size
+    released, row = P.copy(), np.empty(P.size)
     for k in range(count):
         released[active[k]] = 0.0
     for k in range(count):
         i = active[k]
-        _jacobian_row(i, matrix, by_pressure, by_film, row)
-        line = A[k]
+        _fill_jacobian_row(i, grid.influence, by_pressure, by_film, row)
         for m in range(count):
-            line[m] = row[active[m]]
-        line[count] = np.sum(by_film[i])
+            A[k, m] = row[active[m]]
+        A[k, count] = np.sum(by_film[i])
         b[k] = -R[i]
         for j in range(P.size):
             b[k] += row[j] * released[j]
     b[count] = 0.5 * np.pi
     for j in range(P.size):
-        b[count] += weights[j] * (released[j] - P[j])
+        b[count] += grid.weights[j] * (released[j] - P[j])
     for m in range(count):
-        A[count, m] = weights[active[m]]
+        A[count, m] = grid.weights[active[m]]
     A[count, count] = 0.0
 
 
 @njit(nogil=True, cache=True)
-def newton(
-    nodes: FloatArray,
-    matrix: FloatArray,
-    weights: FloatArray,
-    liquid: Liquid,
-    K: float,
-    P: FloatArray,
-    central: float,
-    clip: float,
-    tolerance: float,
-    most: int,
-) -> tuple[int, int, float, FloatArray]:
-    """Solve for the pressure on one grid, in place.
+def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
+    """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
+    for i in range(P.size):
+        total = central + 0.5 * grid.nodes[i] ** 2
+        for j in range(P.size):
+            total += grid.influence[i, j] * P[j]
+        H[i] = total
+
+
+@njit(nogil=True, cache=True)
+def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
+    """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
+    largest = np.max(np.abs(step))
+    share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
+    for i in range(P.size):
+        film_step = change
+        for j in range(P.size):
+            film_step += grid.influence[i, j] * step[j]
+        if film_step < 0.0:
+            share = min(share, -_FILM_SHARE * H[i] / film_step)
+    return share
+
+
+@njit(nogil=True, cache=True)
+def _take_step(
+    grid: Grid, pace: Pace, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
+) -> tuple[int, float]:
+    """Change P, H and the film at ``X = 0`` by as much of a Newton step as the film allows; return outcome and film."""
+    share = _step_length(grid, P, H, step, change, pace.clip)
+    if not share > _LEAST_SHARE:
+        return Outcome.FILM_COLLAPSED, central
+    settled = np.max(np.abs(step)) < pace.tolerance * np.max(P) and abs(change) < pace.tolerance * central
+    for i in range(P.size):
+        P[i] = max(0.0, P[i] + share * step[i])
+    central += share * change
+    _fill_film(grid, P, central, H)
+    if share == 1.0 and settled:
+        return Outcome.CONVERGED, central
+    return (Outcome.UNDER_WAY if central > 0.0 and np.min(H) > 0.0 else Outcome.FILM_COLLAPSED), central
+
+
+def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
+    """Return the film at the nodes, given the pressure there and the film at ``X = 0``."""
+    H = np.empty_like(P)
+    _fill_film(grid, P, central, H)
+    return H
+
+
+def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: float, pace: Pace) -> Iterate:
+    """Solve for the pressure on one grid.
 
     Parameters
     ----------
-    nodes, weights : array, shape (n,)
-        Ascending nodes in half widths and their trapezoidal weights.
-    matrix : array, shape (n, n)
-        Of :func:`mdr_dask.physics.lubrication.deformation.influence_matrix` at the nodes.
+    grid : Grid
+        Nodes and their influence on each other.
     liquid : Liquid
         Its laws.
     K : float
         ``(3 pi^2/4) U/W^2``.
-    P : array, shape (n,)
-        Guess of the pressure on entry, the solution on return; zero at both ends, never negative.
+    guess : array, shape (n,)
+        Guess of the pressure; zero at both ends, never negative.
     central : float
-        Guess of the film at ``X = 0``, positive with P everywhere.
-    clip : float
-        Greatest change of a pressure in one step, in units of the greatest pressure.
-    tolerance : float
-        Relative size of the last step.
-    most : int
-        Greatest number of steps.
+        Guess of the film at ``X = 0``, positive with the pressure everywhere.
+    pace : Pace
+        How far a step may go, and how many there may be.
 
     Returns
     -------
-    status, steps, central, H
-        One of CONVERGED, TOO_MANY_STEPS, SINGULAR, FILM_COLLAPSED; steps done; films at ``X = 0`` and at the nodes.
+    Iterate
+        The outcome is CONVERGED, TOO_MANY_STEPS, SINGULAR or FILM_COLLAPSED.
     """
-    n = P.size
-    state, R, H, step, row, scale = (np.empty((4, n)), np.empty(n), np.empty(n), np.zeros(n), np.empty(n), np.ones(n))
-    by_pressure, by_film = np.empty((n, 4)), np.empty((n, 4))
-    A, b, active = np.empty((n, n)), np.empty(n), np.empty(n, np.int64)
-    nodal_film(nodes, matrix, P, central, H)
-    for steps in range(1, most + 1):
-        balance(nodes, liquid, K, P, H, state, R, by_pressure, by_film)
-        for i in range(1, n - 1):
-            scale[i] = abs(by_pressure[i, 2])
-            for k in range(4):
-                scale[i] += abs(by_film[i, k] * matrix[max(i - 2 + k, 0), i])
-        count = _fill_active(P, R, scale, active)
-        _linear_system(P, R, active, count, matrix, weights, by_pressure, by_film, A, b, row)
-        if not solve_linear(A, b, count + 1):
-            return SINGULAR, steps, central, H
-        for i in range(n):
-            step[i] = -P[i]
-        for k in range(count):
-            step[active[k]] = b[k]
-        change = b[count]
-        _fill_film_step(matrix, step, change, row)
-        status, central = take_step(P, central, H, step, change, row, clip, tolerance)
-        nodal_film(nodes, matrix, P, central, H)
-        status = outcome(status, central, H)
-        if status != UNDER_WAY:
-            return status, steps, central, H
-    return TOO_MANY_STEPS, most, central, H
+    n = guess.size
+    P, H = guess.copy(), film_on(grid, guess, central)
+    state, R, by_pressure, by_film = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
+    listed, room = np.empty(n, np.int64), np.empty(n * n)
+    for steps in range(1, pace.most + 1):
+        balance(grid.nodes, liquid, K, P, H, state, R, by_pressure, by_film)
+        active = listed[: _fill_active(grid.influence, P, R, by_pressure, by_film, listed)]
+        order = active.size + 1
+        A, b = room[: order * order].reshape(order, order), np.empty(order)
+        _fill_equations(grid, P, R, active, by_pressure, by_film, A, b)
+        factors = factorise(A)
+        if factors is None:
+            return Iterate(Outcome.SINGULAR, steps, P, central, H)
+        solution = factors.solve(b)
+        step = -P
+        step[active] = solution[:-1]
+        outcome, central = _take_step(grid, pace, P, central, H, step, solution[-1])
+        if outcome != Outcome.UNDER_WAY:
+            return Iterate(Outcome(outcome), steps, P, central, H)
+    return Iterate(Outcome.TOO_MANY_STEPS, pace.most, P, central, H)

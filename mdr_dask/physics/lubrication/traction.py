@@ -6,35 +6,14 @@ sliding; heat and shear thinning, which lower the film and the traction, are lef
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.lubrication.levels import GridSolution
-from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution
+from mdr_dask.physics.lubrication.line_contact import GridSolution, LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
 #: Largest exponent of a viscosity ratio that is evaluated; a Newtonian liquid that thick has no meaning any more.
 _LARGEST_EXPONENT = 600.0
-
-
-class Traction(NamedTuple):
-    """Friction forces over the load.
-
-    Parameters
-    ----------
-    sliding : float
-        Integral of the shear stress at mid-film over the load.
-    sliding_error : float
-        Its change from the coarser grid to the finer one.
-    rolling : float
-        Integral of ``(h/2) dp/dx`` over the load: what rolling costs each surface.
-    """
-
-    sliding: float
-    sliding_error: float
-    rolling: float
 
 
 def shear_stress(
@@ -66,25 +45,15 @@ def shear_stress(
     return newtonian if eyring_stress is None else eyring_stress * np.arcsinh(newtonian / eyring_stress)
 
 
-def traction(solution: LineSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None = None) -> Traction:
-    """Return the friction coefficients of a solved line contact.
+def sliding_coefficient(
+    case: LineContact, grid: GridSolution, W: float, slide_roll_ratio: float, eyring_stress: float | None
+) -> float:
+    """Return the integral of the shear stress at mid-film over the load; parameters of :func:`shear_stress`."""
+    stress = shear_stress(case, grid, W, slide_roll_ratio, eyring_stress)
+    return float(2 / np.pi * np.trapezoid(stress, grid.nodes))
 
-    Parameters
-    ----------
-    solution : LineSolution
-        A solution with status zero.
-    W, slide_roll_ratio, eyring_stress
-        As for :func:`shear_stress`.
 
-    Returns
-    -------
-    Traction
-        With Barus' law and a Newtonian liquid the error says how far the pressure spike decides.
-    """
-    fine, coarse = (
-        2 / np.pi * np.trapezoid(shear_stress(solution.case, grid, W, slide_roll_ratio, eyring_stress), grid.nodes)
-        for grid in (solution.fine, solution.coarse)
-    )
-    film = (solution.film[1:] + solution.film[:-1]) / 2
-    rolling = 2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(solution.pressure))
-    return Traction(float(fine), float(abs(fine - coarse)), float(rolling))
+def rolling_coefficient(grid: GridSolution, W: float) -> float:
+    """Return the integral of ``(h/2) dp/dx`` over the load: what rolling costs each surface."""
+    film = (grid.film[1:] + grid.film[:-1]) / 2
+    return float(2 / np.pi * np.sqrt(8 * W / np.pi) * np.sum(film / 2 * np.diff(grid.pressure)))

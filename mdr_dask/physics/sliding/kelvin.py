@@ -1,21 +1,23 @@
-"""One sweep along a profile of cubic cells: a Kelvin foundation in its stationary state at a given depth.
+"""One sweep along a line of cubic cells: a Kelvin foundation in its stationary state at a given depth.
 
-Everything here is measured in cells: a cell has length 1, a slope is the rise over one cell, ``reach`` is v tau / dx.
-Heights point into the elastomer and are measured from the highest point of the profile, so that the penetration is
-w = depth + height with depth > 0. In contact u = w, free u decays as exp(-s / reach). By the envelope theorem
+Everything here is measured in cells: a cell has length 1, a slope is the rise over one cell, ``deborah`` is v tau / dx.
+Heights point into the elastomer and are measured from the highest point of the line, so that the penetration is
+w = depth + height with depth > 0. In contact u = w, free u decays as exp(-s / deborah). By the envelope theorem
 du/d(depth) is 1 in contact and decays with u in free flight, whatever the touching and leaving points do.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.surfaces.cubic_line import BLOCK, NONE, Cells, cubic, summit
+from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
+BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
 TINY = 1e-290
 CLOSE = 1e-8  # a Newton step after which the next one is below rounding
 ITERATIONS = 80
@@ -25,25 +27,42 @@ DISPLACEMENT, STIFFNESS, DRAG, DRAG_RATE, LENGTH, STRETCH, OUTSIDE = range(7)
 SUMS = 7
 
 
+class Blocks(NamedTuple):
+    """The highest point of every `BLOCK` cells, and the integrals over them."""
+
+    peak: FloatArray
+    mean: FloatArray
+    stretch: FloatArray
+
+
+def blocks_of(cells: Cells) -> Blocks:
+    """Return the blocks of a line; the cells that do not fill the last one are in none."""
+    blocks = (cells.mean.size - 1) // BLOCK
+    peak, mean, stretch = (
+        column[: blocks * BLOCK].reshape(blocks, BLOCK) for column in (cells.peak, cells.mean, cells.stretch)
+    )
+    return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
+
+
 @njit(nogil=True, cache=True)
-def _barrier(
+def write_barriers(
     height: FloatArray,
     enter: FloatArray,
     leave: FloatArray,
-    reach: float,
+    deborah: float,
     block: int,
     barriers: FloatArray,
     block_barriers: FloatArray,
 ) -> None:
-    """Write the depth that keeps each whole cell of a block pressed, w + reach w' > 0, and their maximum."""
+    """Write the depth that keeps each whole cell of a block pressed, w + deborah w' > 0, and their maximum."""
     every = -np.inf
     for i in range(block * BLOCK, min((block + 1) * BLOCK, barriers.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
-        first = -(h0 + reach * a)
-        last = -(height[i + 1] + reach * leave[i])
+        first = -(h0 + deborah * a)
+        last = -(height[i + 1] + deborah * leave[i])
         highest = first if first > last else last
         # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
-        q, r = a + 2 * reach * b, b + 3 * reach * c
+        q, r = a + 2 * deborah * b, b + 3 * deborah * c
         x = summit(-q, -r, -c)
         if x < 1:
             inside = first - x * (q + x * (r + x * c))
@@ -54,7 +73,7 @@ def _barrier(
 
 
 @njit(nogil=True, cache=True)
-def _lost(x: float) -> float:
+def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
     if x > 1 / 32:
         return -math.expm1(-x)
@@ -62,10 +81,10 @@ def _lost(x: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _leaving(w0: float, a: float, b: float, c: float, reach: float, start: float) -> float:
-    """Return where w + reach w' falls through 0 first between start and 1, or `NONE`."""
+def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
+    """Return where w + deborah w' falls through 0 first between start and 1, or `NONE`."""
     # the force is a cubic itself, cut into its monotone pieces
-    p, q, r = w0 + reach * a, a + 2 * reach * b, b + 3 * reach * c
+    p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
     low, force = start, p + start * (q + start * (r + start * c))
     discriminant = r * r - 3 * c * q
     root = math.sqrt(discriminant) if discriminant > 0 else 0.0
@@ -103,20 +122,20 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
 
 @njit(nogil=True, cache=True)
 def _touching(
-    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, high: float
+    w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, high: float
 ) -> float:
-    """Return where w rises to u exp(-(x - start) / reach) between low and high, where it is known to be above."""
-    if w0 + low * (a + low * (b + low * c)) >= u - u * _lost((low - start) / reach):
+    """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
+    if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
     first, end, x = low, high, high
     for _ in range(ITERATIONS):
-        free = u - u * _lost((x - start) / reach)
+        free = u - u * _decayed((x - start) / deborah)
         gap = w0 + x * (a + x * (b + x * c)) - free
         if gap > 0:
             high = x
         else:
             low = x
-        slope = a + x * (2 * b + x * 3 * c) + free / reach
+        slope = a + x * (2 * b + x * 3 * c) + free / deborah
         step = x - gap / slope if slope > 0 else low
         if abs(step - x) < CLOSE:
             return min(max(step, first), end)
@@ -126,20 +145,20 @@ def _touching(
 
 @njit(nogil=True, cache=True)
 def _touch(
-    w0: float, a: float, b: float, c: float, reach: float, u: float, start: float, low: float, stop: float
+    w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, stop: float
 ) -> float:
     """Return where from low to stop an element that is free from start on, with u there, touches first, or `NONE`.
 
-    The lead of the profile, (w - u_free) exp(x / reach), rises while the force w + reach w' is positive.
+    The lead of the line, (w - u_free) exp(x / deborah), rises while the force w + deborah w' is positive.
     """
     for _ in range(3):
-        force = w0 + low * (a + low * (b + low * c)) + reach * (a + low * (2 * b + low * 3 * c))
-        first = low if force > 0 else _leaving(-w0, -a, -b, -c, reach, low)
+        force = w0 + low * (a + low * (b + low * c)) + deborah * (a + low * (2 * b + low * 3 * c))
+        first = low if force > 0 else leaving(-w0, -a, -b, -c, deborah, low)
         if first >= stop:
             return NONE
-        high = min(_leaving(w0, a, b, c, reach, first), stop)
-        if w0 + high * (a + high * (b + high * c)) > u - u * _lost((high - start) / reach):
-            return _touching(w0, a, b, c, reach, u, start, first, high)
+        high = min(leaving(w0, a, b, c, deborah, first), stop)
+        if w0 + high * (a + high * (b + high * c)) > u - u * _decayed((high - start) / deborah):
+            return _touching(w0, a, b, c, deborah, u, start, first, high)
         if high >= stop:
             return NONE
         low = high + CLOSE
@@ -162,15 +181,15 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
 
 
 @njit(nogil=True, cache=True)
-def _landed(u: float, flown: float, reach: float, slope: float) -> tuple[float, float, float, float]:
+def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
 
-    Over a flight from u the integral of u is reach times what u loses, and the drag is half of what u^2 loses; the
-    derivative of the drag has a part from the point of touching, where the profile has that slope.
+    Over a flight from u the integral of u is deborah times what u loses, and the drag is half of what u^2 loses; the
+    derivative of the drag has a part from the point of touching, where the line has that slope.
     """
-    lost = _lost(flown / reach) if u > 0 else 1.0
-    memory = reach * lost
-    return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / reach + slope)
+    lost = _decayed(flown / deborah) if u > 0 else 1.0
+    memory = deborah * lost
+    return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / deborah + slope)
 
 
 @njit(nogil=True, cache=True, inline="always")
@@ -193,25 +212,35 @@ def _flown_over(
 
 @njit(nogil=True, cache=True)
 def sweep(
-    cells: Cells, barriers: FloatArray, block_barriers: FloatArray, reach: float, depth: float, sums: FloatArray
-) -> None:
-    """Follow an element once along the profile.
+    cells: Cells,
+    every: Blocks,
+    barriers: FloatArray,
+    block_barriers: FloatArray,
+    deborah: float,
+    depth: float,
+    sums: FloatArray,
+    touches: FloatArray,
+    leaves: FloatArray,
+) -> int:
+    """Follow an element once along the line; return how many patches it touches.
 
     Parameters
     ----------
-    cells : Cells
-        The profile.
+    cells, every : Cells, Blocks
+        The line, and its blocks.
     barriers, block_barriers : array, shape (n,), (n // BLOCK + 1,)
-        Depths that keep cells and blocks pressed at this reach, as far as sweeps at it have needed them: those of
+        Depths that keep cells and blocks pressed at this Deborah number, as far as sweeps have needed them: those of
         blocks that are NaN, all of them at first, are written here when an element in contact comes there.
-    reach : float
+    deborah : float
         v tau in cells.
     depth : float
         Penetration of the highest point.
     sums : array, shape (SUMS,)
         Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
-        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a profile
+        depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a line
         that is not periodic.
+    touches, leaves : array, shape (m,)
+        Written, as far as there is room: where each patch begins and ends, in cells.
     """
     # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
     height, enter, leave, peak, mean, stretches = (
@@ -222,11 +251,13 @@ def sweep(
         cells.mean,
         cells.stretch,
     )
-    block_peak, block_mean, block_stretch = cells.block_peak, cells.block_mean, cells.block_stretch
+    block_peak, block_mean, block_stretch = every.peak, every.mean, every.stretch
     n, blocks, start = mean.size - 1, block_peak.size, cells.start
-    decay, block_decay = np.exp(-1 / reach), np.exp(-BLOCK / reach)
+    decay, block_decay = np.exp(-1 / deborah), np.exp(-BLOCK / deborah)
     area = rate = drag = drag_rate = length = stretch = 0.0
-    i, x, contact = 0, start, cells.periodic
+    i, x, contact, patches = 0, start, cells.periodic, 0
+    if contact and touches.size > 0:
+        touches[0] = start
     # displacement where the contact was left and at the start of this cell; place of leaving
     u = free = left = 0.0
     # the turn ends in a part of a cell that repeats the first, at the highest point again
@@ -235,7 +266,7 @@ def sweep(
         if contact and x == 0:
             while i < n:
                 if math.isnan(block_barriers[i // BLOCK]):
-                    _barrier(height, enter, leave, reach, i // BLOCK, barriers, block_barriers)
+                    write_barriers(height, enter, leave, deborah, i // BLOCK, barriers, block_barriers)
                 if not barriers[i] < depth:
                     break
                 if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
@@ -258,8 +289,8 @@ def sweep(
         visits = 0
         while True:
             if contact:
-                pressed = w0 + x * (c1 + x * (c2 + x * c3)) + reach * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
-                place = _leaving(w0, c1, c2, c3, reach, x) if pressed else x
+                pressed = w0 + x * (c1 + x * (c2 + x * c3)) + deborah * (c1 + x * (2 * c2 + x * 3 * c3)) > 0
+                place = leaving(w0, c1, c2, c3, deborah, x) if pressed else x
                 end = min(place, stop)
                 part, part_stretch = _pressed(w0, c1, c2, c3, x, end)
                 area += part
@@ -269,28 +300,54 @@ def sweep(
                 if place >= stop:
                     break
                 contact, left, x = False, i + place, place
+                if patches < leaves.size:
+                    leaves[patches] = left
+                patches += 1
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
             # a force that is a cubic falls through 0 twice at most
             low = x + CLOSE if visits > 0 else x
-            touch = _touch(w0, c1, c2, c3, reach, free, x, low, stop) if visits < 2 and low < stop else NONE
+            touch = _touch(w0, c1, c2, c3, deborah, free, x, low, stop) if visits < 2 and low < stop else NONE
             if touch > stop:
-                free -= free * _lost((stop - x) / reach)
+                free -= free * _decayed((stop - x) / deborah)
                 break
-            flight = _landed(u, i + touch - left, reach, c1 + touch * (2 * c2 + touch * 3 * c3))
+            flight = _landed(u, i + touch - left, deborah, c1 + touch * (2 * c2 + touch * 3 * c3))
             area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
             contact, x = True, touch
+            if patches < touches.size:
+                touches[patches] = i + touch
         x = 0.0
         i += 1
     # the last flight: to the highest point, or without end
     if not contact:
         flown = n + start - left if cells.periodic else np.inf
         slope = enter[n] if cells.periodic and start == 0 else 0.0
-        flight = _landed(u, flown, reach, slope)
+        flight = _landed(u, flown, deborah, slope)
         area, rate, drag, drag_rate = area + flight[0], rate + flight[1], drag + flight[2], drag_rate + flight[3]
     sums[DISPLACEMENT] = area
     sums[STIFFNESS] = rate + length
-    sums[DRAG] = drag + reach * stretch
+    sums[DRAG] = drag + deborah * stretch
     sums[DRAG_RATE] = drag_rate
     sums[LENGTH] = length
     sums[STRETCH] = stretch
     sums[OUTSIDE] = 0.0 if cells.periodic or not (contact or depth + height[0] > 0) else 1.0
+    if not (cells.periodic or contact):
+        return patches
+    # a turn ends on the highest point, which an element that is still free touches at that very point
+    if patches < leaves.size:
+        touches[patches], leaves[patches] = touches[patches] if contact else n + start, n + start
+    return patches + 1
+
+
+@njit(nogil=True, cache=True)
+def patches_at(
+    cells: Cells, every: Blocks, deborah: float, depth: float, sums: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where each patch of the stationary state at a depth begins and ends, and write its sums; see `sweep`."""
+    n = cells.mean.size - 1
+    barriers, block_barriers = np.empty(n), np.full(n // BLOCK + 1, np.nan)
+    touches, leaves = np.empty(n // 8 + 2), np.empty(n // 8 + 2)
+    count = sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+    if count > touches.size:
+        touches, leaves = np.empty(count), np.empty(count)
+        sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+    return touches[:count], leaves[:count]

@@ -1,8 +1,9 @@
-"""Direct steady sliding of a viscoelastic Kelvin foundation over a profile, at prescribed load."""
+"""Direct steady sliding of a viscoelastic Kelvin foundation over a line, at prescribed load."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,8 +12,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.kelvin import (
+    BLOCK,
     DISPLACEMENT,
     DRAG,
     DRAG_RATE,
@@ -21,20 +24,17 @@ from mdr_dask.physics.sliding.kelvin import (
     STIFFNESS,
     STRETCH,
     SUMS,
+    Blocks,
+    blocks_of,
     sweep,
 )
-from mdr_dask.physics.surfaces.cubic_line import BLOCK, Cells, Profile, cut, indented_line, periodic_line
+from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
-CONVERGED, NOT_CONVERGED, OUTSIDE_LINE, INVALID = 0, 1, 2, 3
-MESSAGES = {
-    NOT_CONVERGED: "the depth for the load was not found in {iterations} sweeps",
-    OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
-    INVALID: "load, velocity and profile must be finite, the load and v tau positive",
-}
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
+SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -53,7 +53,7 @@ class Steady:
     contact_slope : array
         rms slope of the profile over the contact.
     status : int8 array
-        `CONVERGED` or a key of `MESSAGES`.
+        Values of `Outcome`.
     """
 
     drag: FloatArray
@@ -77,12 +77,12 @@ class Steady:
 def unsolved(cases: int) -> Steady:
     """Return what is known of cases before they are solved."""
     nothing = np.full(cases, np.nan)
-    return Steady(nothing, nothing, nothing, nothing, np.full(cases, INVALID, np.int8))
+    return Steady(nothing, nothing, nothing, nothing, np.full(cases, Outcome.INVALID, np.int8))
 
 
-def valid(reaches: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
+def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
     """Return which cases are numbers above zero."""
-    good: NDArray[np.bool_] = np.isfinite(reaches) & np.isfinite(loads) & (reaches > 0) & (loads > 0)
+    good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
     return good
 
 
@@ -122,9 +122,10 @@ def _guess(trail: FloatArray, load: float) -> float:
 @njit(nogil=True, cache=True)
 def _solve(
     cells: Cells,
+    blocks: Blocks,
     barriers: FloatArray,
     block_barriers: FloatArray,
-    reach: float,
+    deborah: float,
     load: float,
     trail: FloatArray,
     sums: FloatArray,
@@ -135,11 +136,11 @@ def _solve(
     depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
     and so the answer does not depend on the `trail` that the search follows.
     """
-    low, high = 0.0, np.inf
+    low, high, unwritten = 0.0, np.inf, np.empty(0)
     depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        sweep(cells, barriers, block_barriers, reach, depth, sums)
+        sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
@@ -170,188 +171,160 @@ def _solve(
 @njit(nogil=True, cache=True)
 def _states(
     cells: Cells,
-    reaches: FloatArray,
+    blocks: Blocks,
+    deborahs: FloatArray,
     loads: FloatArray,
     guesses: FloatArray,
     close: float,
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve the cases of one profile, ordered by reach and load; see `Steady` for the columns of the results.
+    """Solve the cases of one line, ordered by Deborah number and load; see `Steady` for the columns of the results.
 
     The search for a depth follows that of the case before, or starts from its guess where that is a number. Where the
     tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
     """
     n = cells.mean.size - 1
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK + 1)
-    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
-    reach = -1.0
+    sums, trail, first, unwritten = np.empty(SUMS), np.zeros(4), np.zeros(4), np.empty(0)
+    deborah = -1.0
     first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
     for k in range(loads.size):
-        starts = reaches[k] != reach
+        starts = deborahs[k] != deborah
         if starts:
-            reach = reaches[k]
+            deborah = deborahs[k]
             block_barriers[:] = np.nan
             trail[:] = first
         depth, converged = guesses[k], False
         if guesses[k] > 0:
             trail[:] = math.log(guesses[k]), math.log(loads[k]), 0.7, 0.0
             if close > 0:
-                sweep(cells, barriers, block_barriers, reach, depth, sums)
+                sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
         if not converged:
-            depth, converged = _solve(cells, barriers, block_barriers, reach, loads[k], trail, sums)
+            depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
         if not converged:
-            status[k] = NOT_CONVERGED
+            status[k] = Outcome.DEPTH_NOT_FOUND
             trail[:] = first
             continue
         if starts:
             first[:] = trail
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
-        status[k] = OUTSIDE_LINE if sums[OUTSIDE] > 0 else CONVERGED
+        status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
+        # drag is force times slope
+        if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
+            status[k] = Outcome.DEPTH_NOT_FOUND
 
 
 def steady_sliding(
-    height: FloatArray,
-    slope: FloatArray | None,
-    reaches: FloatArray,
+    line: CubicLine,
+    deborah: FloatArray,
     loads: FloatArray,
-    scheme: Scheme = "hermite",
-    contact: bool = True,
     guesses: FloatArray | None = None,
     close: float = 0.0,
 ) -> Steady:
-    """Return the steady states of a Kelvin foundation sliding over a periodic line.
+    """Return the steady states of a Kelvin foundation that slides over a line, by exact sweeps over its cells.
 
     Parameters
     ----------
-    height : array, shape (n,)
-        Heights at equidistant nodes, positive into the elastomer, which moves along the line in the order of the nodes.
-    slope : array, shape (n,), or None
-        Derivative of the height by position over the length of the line at the nodes; needed by ``"hermite"`` only.
-    reaches : array, shape (cases,)
+    line : CubicLine
+        From :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line` or `indented_line`; the body moves along it in
+        the order of the nodes.
+    deborah : array, shape (cases,)
         v tau / L.
     loads : array, shape (cases,)
         F_N / (4 G L), the mean displacement, in the unit of height.
-    scheme : {"hermite", "piecewise_linear", "backward_euler"}
-        Exact sweep over cubic cells or over straight ones, or the papers' time steps.
-    contact : bool
-        Whether fraction and slope of the contact are wanted where they cost extra.
     guesses : array, shape (cases,), optional
-        Depths to start the exact sweeps from; the answer does not depend on them while `close` is 0.
+        Depths to start the search from; the answer does not depend on them while `close` is 0.
     close : float
         Relative change of a guess that its tangent is trusted with instead of a search: for comparisons only.
 
     Returns
     -------
     Steady
-        With ``mu = drag / (load L)``, height and length L in the same unit.
-
-    Raises
-    ------
-    ValueError
-        If the scheme needs slopes that are not given.
+        With ``mu = drag / (load L)``, height and length L in the same unit; `Outcome.OUTSIDE_LINE` where an end of a
+        line that is not periodic is in contact.
     """
-    profile = periodic_line(height, _needed(slope, scheme))
-    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
+    start = np.full(loads.size, np.nan) if guesses is None else guesses
+    return _solved(line, deborah, loads, lambda good, de, load: _swept(line, de, load, start[good], close))
 
 
-def steady_indenter(
-    height: FloatArray,
-    slope: FloatArray | None,
-    coefficient: float,
-    exponent: float,
-    reaches: FloatArray,
-    loads: FloatArray,
-    scheme: Scheme = "hermite",
-    contact: bool = True,
-    guesses: FloatArray | None = None,
-    close: float = 0.0,
-) -> Steady:
-    """Return the steady states of a Kelvin foundation under a rough line -c |x|^n + h(x) that it enters undeformed.
+def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
+    """Return the steady states by the papers' time steps of one cell, from the heights at the nodes alone.
 
     Parameters
     ----------
-    height, slope : array, shape (n + 1,)
-        The roughness h, both ends included, and its derivative as in :func:`steady_sliding`.
-    coefficient, exponent : float
-        c > 0 and n >= 1 of the line, x in units of its length from its middle node n // 2.
-    reaches, loads, scheme, contact, guesses, close
+    line, deborah, loads
         As in :func:`steady_sliding`.
-
-    Returns
-    -------
-    Steady
-        With status `OUTSIDE_LINE` where an end of the line is in contact.
+    contact : bool
+        Whether fraction and slope of the contact are wanted, which cost extra.
     """
-    profile = indented_line(height, _needed(slope, scheme), coefficient, exponent)
-    return _steady(profile, reaches, loads, scheme, contact, guesses, close)
+    return _solved(line, deborah, loads, lambda _, de, load: _stepped(line, de, load, contact))
 
 
-def _needed(slope: FloatArray | None, scheme: Scheme) -> FloatArray | None:
-    """Return the slopes for a scheme that uses them."""
-    if scheme != "hermite":
-        return None
-    if slope is None:
-        raise ValueError("expected slopes at the nodes for the scheme 'hermite', got None")
-    return slope
-
-
-def _steady(
-    profile: Profile,
-    reaches: FloatArray,
+def _solved(
+    line: CubicLine,
+    deborah: FloatArray,
     loads: FloatArray,
-    scheme: Scheme,
-    contact: bool,
-    guesses: FloatArray | None,
-    close: float,
+    solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
-    """Solve the cases that are numbers."""
-    good = valid(reaches, loads)
-    good &= bool(np.all(np.isfinite(profile.height)) and np.all(np.isfinite(profile.enter)))
+    """Solve the cases that are numbers, measured in cells."""
+    n = line.enter.size
+    with np.errstate(over="ignore"):
+        good = valid(deborah * n, loads * n)
+    good &= bool(np.all(np.isfinite(line.height)) and np.all(np.isfinite(line.enter)))
     results = np.full((4, loads.size), np.nan)
-    status = np.full(loads.size, INVALID, np.int8)
-    n = profile.enter.size
-    if np.any(good) and scheme == "backward_euler":
-        results[:, good], status[good] = _stepped(profile, reaches[good] * n, loads[good] * n, contact)
-    elif np.any(good):
-        start = np.full(int(good.sum()), np.nan) if guesses is None else guesses[good]
-        results[:, good], status[good] = _swept(profile, reaches[good] * n, loads[good] * n, start, close)
-    results[:, status != CONVERGED] = np.nan
+    status = np.full(loads.size, Outcome.INVALID, np.int8)
+    if np.any(good):
+        results[:, good], status[good] = solve(good, deborah[good] * n, loads[good] * n)
+    results[:, status != Outcome.CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
 def _swept(
-    profile: Profile, reaches: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
+    line: CubicLine, deborah: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by sweeps over cells; reaches in cells, loads over 4 G dx."""
-    cells, top = cut(profile)
-    order = np.lexsort((loads, reaches))
+    """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
+    cells = cut(line)
+    order = np.lexsort((loads, deborah))
     ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
-    _states(cells, reaches[order], loads[order], guesses[order] + top, close, ordered, ordered_status)
+    _states(
+        cells,
+        blocks_of(cells),
+        deborah[order],
+        loads[order],
+        guesses[order] + cells.top,
+        close,
+        ordered,
+        ordered_status,
+    )
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
-    results[:, 1] -= top
+    results[:, 1] -= cells.top
     return results.T, status
 
 
 def _stepped(
-    profile: Profile, reaches: FloatArray, loads: FloatArray, contact: bool
+    line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool
 ) -> tuple[FloatArray, NDArray[np.int8]]:
-    """Solve by time steps of one cell; reaches in cells, loads over 4 G dx."""
-    highest, n = int(np.argmax(profile.height)), profile.enter.size
-    top = profile.height[highest]
-    below = (np.roll(profile.height, -1 - highest) if profile.periodic else profile.height) - top
+    """Solve by time steps of one cell; Deborah numbers in cells, loads over 4 G dx."""
+    n = line.enter.size
+    nodes = line.height[:n] if line.periodic else line.height
+    highest = int(np.argmax(nodes))
+    top = nodes[highest]
+    below = (np.roll(nodes, -1 - highest) if line.periodic else nodes) - top
     results = np.full((4, loads.size), np.nan)
-    depths, results[0], outside = backward_euler.solve(below, profile.periodic, reaches, loads)
+    depths, results[0], outside = backward_euler.solve(below, line.periodic, deborah, loads)
     results[1] = depths - top
     if contact:
-        backward_euler.contact(below, profile.periodic, reaches, depths, results[2], results[3])
+        backward_euler.contact(below, line.periodic, deborah, depths, results[2], results[3])
         results[2] /= n
         results[3] *= n
-    status = np.where(np.isnan(results[0]), NOT_CONVERGED, np.where(outside, OUTSIDE_LINE, CONVERGED))
+    status = np.where(
+        np.isnan(results[0]), Outcome.DEPTH_NOT_FOUND, np.where(outside, Outcome.OUTSIDE_LINE, Outcome.CONVERGED)
+    )
     return results, status.astype(np.int8)

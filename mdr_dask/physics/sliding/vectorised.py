@@ -14,8 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, halved, nodes, summit, weights
-from mdr_dask.physics.sliding.steady import CONVERGED, NOT_CONVERGED, Steady
+from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEPTH,
     LANES,
@@ -252,7 +253,7 @@ def extrapolated(coarse: Sampled, fine: Sampled) -> tuple[Steady, Change]:
         drag = fine.drag + EXTRAPOLATED * (fine.drag - coarse.drag)
         change = np.abs(fine.drag / coarse.drag - 1), np.abs(fine.contact_fraction / coarse.contact_fraction - 1)
     good = np.isfinite(change[0]) & (drag > 0)
-    status = np.where(good, CONVERGED, NOT_CONVERGED).astype(np.int8)
+    status = np.where(good, Outcome.CONVERGED, Outcome.DEPTH_NOT_FOUND).astype(np.int8)
     known = (fine.depth, fine.contact_fraction, fine.contact_slope)
     depth, fraction, slope = (np.where(good, column, np.nan) for column in known)
     known_change = Change(*(np.where(good & np.isfinite(part), part, np.inf) for part in change))

@@ -3,46 +3,42 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.sliding.steady import CONVERGED, NOT_CONVERGED, OUTSIDE_LINE
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.viscoelastic_newton import solve_sliding, static_depth
+from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
 from mdr_dask.physics.solids import LinearSolid, recovery
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
-TOLERANCE = 1e-11
-"""Last step of Newton's method, relative to the depth: far below any discretisation error, above rounding."""
 
-SHORTEST_REACH = 1e-9
-"""Arms that relax within this part of a cell count as a dashpot, which is an arm of a tenth of it.
+class Settings(NamedTuple):
+    """What was tuned, with ``python -m benchmarks.honesty_bodies`` on seeds other than those of docs/benchmarks.md."""
 
-The error is of that relative size.
-"""
+    tolerance: float = 1e-11  # last step of Newton's method, of the depth: above rounding
+    shortest: float = 1e-9  # of a cell: arms that relax within count as a dashpot, which is an arm of a tenth of it
+    balance: float = 1e-3  # largest relative difference of the load carried, which counts as error: rounding mostly
+    resolved: float = 0.5  # largest relative change of a number between two grids that is extrapolated
+    hardly: float = 1.5  # cells in contact below which the change between two grids is a part of the error only
+    cells_of_a_peak: int = 16  # cells in contact for every peak of the line whose errors are independent
+    safety: float = 2.4
+    # of the last change of drag, depth, contact fraction and slope, which their errors are never below
+    by_chance: tuple[float, ...] = (0.03, 0.03, 0.15, 0.15)
+    of_before: float = 0.15  # of the change before, which the last one is never taken for less than
+    of_others: tuple[float, ...] = (0.02, 0.0, 0.04, 0.04)  # of the largest relative change of the four
+    of_a_cell: tuple[float, ...] = (0.0, 0.0, 0.2, 0.1)  # over cells in contact: edges move within their cells
+    near_a_node: int = 16  # cells in contact below which the height of the highest peak between nodes counts in full
 
-BALANCE = 1e-3
-"""Largest relative difference between the load carried and the load wanted, which counts as error.
 
-It is rounding but for contacts far shorter than a cell, whose ends are known to 1e-13 of the line.
-"""
-
-RESOLVED = 0.5
-"""Largest relative change of a number between two grids that is extrapolated."""
-
-HARDLY = 1.5
-"""Cells in contact below which the change between two grids is a part of the error only, which is their share of it."""
-
-CELLS_OF_A_PEAK = 16
-"""Cells in contact for every peak of the line beyond which their errors are not independent."""
-
-BY_CHANCE = 0.03
-"""Part of the last change between grids that the estimate is never below: three grids may agree by chance."""
+SETTINGS = Settings()
 
 GRIDS = (1, 2, 4)
-"""Every point, every second and every fourth: extrapolation and its error estimate."""
+"""Every node, every second and every fourth: extrapolation and its error estimate."""
 
-SAFETY = 2.4
-"""Of the error estimate; see docs/materials.md for how honest it is."""
+DRAG, DEPTH, FRACTION, SLOPE = range(4)
 
 
 @dataclass(frozen=True)
@@ -51,39 +47,24 @@ class ViscoelasticSteady:
 
     Parameters
     ----------
-    friction_coefficient : float
-        F_x / F_N, positive when it resists.
-    depth : float
-        Penetration of the mean line (of z = 0 for an indenter), m.
-    contact_fraction : float
-        Length in contact over length of the line.
-    contact_slope : float
-        rms slope of the line over the contact.
-    error : float
-        Estimated relative error of the friction coefficient.
-    status : int
-        `CONVERGED`, `NOT_CONVERGED` or `OUTSIDE_LINE`, with messages in `steady.MESSAGES`.
+    values : array, shape (4,)
+        F_x / (4 G_inf) in the unit of height squared, penetration of the mean line (of z = 0 under an indenter), length
+        in contact over length of the line, rms slope of the line over the contact: the columns of a `Steady`.
+    errors : array, shape (4,)
+        Their estimated absolute discretisation errors.
+    status : Outcome
+        How it ended.
     sweeps : int
         Sweeps of the finest line.
     """
 
-    friction_coefficient: float
-    depth: float
-    contact_fraction: float
-    contact_slope: float
-    error: float
-    status: int
+    values: FloatArray
+    errors: FloatArray
+    status: Outcome
     sweeps: int
 
 
-def steady_viscoelastic_sliding(
-    height: FloatArray,
-    spacing: float,
-    solid: LinearSolid,
-    velocity: float,
-    normal_force: float,
-    periodic: bool = True,
-) -> ViscoelasticSteady:
+def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
     """Return the steady state of a foundation of independent elements that slides along a line.
 
     An element that has travelled s along the line is pressed by ``w(s) = d + h(s)``; in contact u = w, free f = 0, with
@@ -91,46 +72,40 @@ def steady_viscoelastic_sliding(
 
     Parameters
     ----------
-    height : array, shape (points,)
-        Heights h, m, positive into the elastomer, in the order in which an element meets them. A multiple of four
-        points
-        if `periodic`, one more otherwise, so that every fourth point spans the same line.
-    spacing : float
-        Distance of points, m.
+    line : CubicLine
+        Its nodes: the line is straight between them here. The number of cells is a multiple of four, so that every
+        fourth node spans the same line.
     solid : LinearSolid
-        The material.
-    velocity, normal_force : float
-        v, m/s, and F_N, N; positive.
-    periodic : bool
-        Whether the line closes; otherwise elements enter undeformed at its first point.
+        The material, its times in units of L / v: Deborah numbers of its arms.
+    load : float
+        F_N / (4 G_inf L), in the unit of height.
 
     Raises
     ------
     ValueError
-        If a number is not finite or not positive, or the number of points is not one of those allowed.
+        If a number is not finite or not positive, or the number of cells is not one of those allowed.
 
     Notes
     -----
-    The line is straight between points and swept exactly; the result is extrapolated from the same line with every
-    second
-    point. The answer depends on nothing but the arguments: the coarsest grid starts from the statics.
+    The line is swept exactly; the result is extrapolated from the same line with every second node. The answer depends
+    on nothing but the arguments: the coarsest grid starts from the statics.
     """
-    heights = np.asarray(height, dtype=np.float64)
-    _check(heights, spacing, velocity, normal_force, periodic)
+    _check(line, load)
+    cells = line.enter.size
+    heights = line.height[:cells] if line.periodic else line.height
     top = int(np.argmax(heights))
     below = heights - heights[top]
-    below = np.append(np.roll(below, -top), 0.0) if periodic else below
-    load = _Load.of(solid, velocity, normal_force, spacing)
+    below = np.append(np.roll(below, -top), 0.0) if line.periodic else below
+    travelling = _Load.of(solid, load, 1 / cells)
     solutions: list[_Solution] = []
     for step in reversed(GRIDS):
         start = solutions[-1].start if solutions else None
-        found = _solve(below[::step], step, load, periodic, start)
-        if found.status == NOT_CONVERGED and start is not None:
-            found = _solve(below[::step], step, load, periodic, None)
+        found = _solve(below[::step], step, travelling, line.periodic, start)
+        if found.status == Outcome.DEPTH_NOT_FOUND and start is not None:
+            found = _solve(below[::step], step, travelling, line.periodic, None)
         solutions.append(found)
-    mean = float(heights.mean()) if periodic else 0.0
-    peaks = int(np.count_nonzero((below[1:-1] > below[:-2]) & (below[1:-1] >= below[2:]))) + 1
-    return _extrapolated(solutions, mean - float(heights[top]), below.size - 1, peaks)
+    mean = float(heights.mean()) if line.periodic else 0.0
+    return _extrapolated(solutions, _Top.of(below, mean - float(heights[top]), line.periodic))
 
 
 @dataclass(frozen=True)
@@ -139,26 +114,22 @@ class _Load:
 
     cell: float
     strain_area: float
-    moduli: FloatArray
-    reach: FloatArray
-    times: FloatArray
-    stretch_of: FloatArray
-    amplitude_of: FloatArray
+    solid: Travelling
 
     @classmethod
-    def of(cls, solid: LinearSolid, velocity: float, normal_force: float, cell: float) -> _Load:
+    def of(cls, solid: LinearSolid, load: float, cell: float) -> _Load:
         """Measure a solid in cells and static moduli; arms much shorter than a cell and the dashpot are one arm."""
         static = solid.static_modulus
-        fast = solid.times < SHORTEST_REACH * cell / velocity
-        moduli, reach = solid.moduli[~fast] / static, solid.times[~fast] * velocity / cell
+        fast = solid.times < SETTINGS.shortest * cell
+        moduli, deborah = solid.moduli[~fast] / static, solid.times[~fast] / cell
         viscosity = (solid.viscosity + solid.moduli[fast] @ solid.times[fast]) / static
         if viscosity > 0:
-            shortest = SHORTEST_REACH / 10
-            moduli = np.append(viscosity * velocity / cell / shortest, moduli)
-            reach = np.append(shortest, reach)
-        modes = recovery(moduli, reach)
-        area = normal_force / (4 * static * cell)
-        return cls(cell, area, moduli, reach, modes.times, modes.stretch.T.copy(), modes.amplitude.T.copy())
+            shortest = SETTINGS.shortest / 10
+            moduli = np.append(viscosity / cell / shortest, moduli)
+            deborah = np.append(shortest, deborah)
+        modes = recovery(moduli, deborah)
+        columns = modes.stretch.T.copy(), modes.amplitude.T.copy()
+        return cls(cell, load / cell, Travelling(moduli, deborah, modes.times, *columns))
 
 
 @dataclass(frozen=True)
@@ -166,7 +137,7 @@ class _Solution:
     values: FloatArray
     start: FloatArray
     imbalance: float
-    status: int
+    status: Outcome
     sweeps: int
 
 
@@ -177,53 +148,81 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     if start is None or not np.all(np.isfinite(start)):
         inner = profile[:-1] if periodic else profile
         depth = static_depth(inner, strain_area)
-        start = np.append(np.full(load.moduli.size, depth - strain_area / inner.size), depth)
+        start = np.append(np.full(load.solid.moduli.size, depth - strain_area / inner.size), depth)
     unknown, totals = start.copy(), np.empty(6)
-    arms = load.moduli, load.reach / step, load.times / step, load.stretch_of, load.amplitude_of
-    converged, sweeps, inside = solve_sliding(profile, strain_area, periodic, *arms, TOLERANCE, unknown, totals)
+    solid = load.solid._replace(deborah=load.solid.deborah / step, times=load.solid.times / step)
+    converged, sweeps, inside = solve_sliding(
+        profile, strain_area, periodic, solid, SETTINGS.tolerance, unknown, totals
+    )
     imbalance = abs(float(totals[1]) / strain_area - 1)
-    status = OUTSIDE_LINE if not inside else CONVERGED if converged and imbalance < BALANCE else NOT_CONVERGED
+    good = converged and imbalance < SETTINGS.balance
+    status = Outcome.CONVERGED if good else Outcome.DEPTH_NOT_FOUND
+    status = status if inside else Outcome.OUTSIDE_LINE
     slope = np.sqrt(totals[4] / totals[3]) / cell if totals[3] > 0 else 0.0
-    values = np.array([totals[2] / strain_area / cell, unknown[-1], totals[3] / (profile.size - 1), slope])
+    values = np.array([totals[2], unknown[-1], totals[3] / (profile.size - 1), slope])
     return _Solution(values, unknown, imbalance, status, sweeps)
 
 
-def _extrapolated(solutions: list[_Solution], mean: float, cells: int, peaks: int) -> ViscoelasticSteady:
+class _Top(NamedTuple):
+    """Cells and peaks of a line, its mean from the highest node, and by how much the peak there rises over it."""
+
+    cells: int
+    peaks: int
+    mean: float
+    rise: float
+
+    @classmethod
+    def of(cls, below: FloatArray, mean: float, periodic: bool) -> _Top:
+        """Return them from heights below the highest node, at which a periodic line begins and ends."""
+        peaks = int(np.count_nonzero((below[1:-1] > below[:-2]) & (below[1:-1] >= below[2:]))) + 1
+        top = int(np.argmax(below))
+        before, after = below[top - 1 if top or not periodic else -2], below[min(top + 1, below.size - 1)]
+        bend = -(before + after)
+        rise = float((after - before) ** 2 / (8 * bend)) if bend > 0 else 0.0  # of the parabola through three nodes
+        return cls(below.size - 1, peaks, mean, rise)
+
+
+def _extrapolated(solutions: list[_Solution], top: _Top) -> ViscoelasticSteady:
     """Extrapolate the two finest grids by their second order; the coarsest tells how well that works.
 
-    The error is estimated by a geometric mean of the last change of the extrapolation, counted twice, and of the last
-    change of the grids, since the former may be small by accident. It falls with the number of cells in contact, whose
-    errors are independent. Where hardly a cell is in contact the friction halves with the cells, and the exact one may
-    lie far below.
+    An error is estimated by a geometric mean of the last change of the extrapolation, counted twice, and of the last
+    change of the grids, since the former may be small by accident. That of the drag falls with the number of cells in
+    contact, whose errors are independent. One number may agree on three grids by chance, hardly all four. Where hardly
+    a cell is in contact numbers halve with the cells, and the exact ones may lie far below. All grids share the highest
+    node: by how much a peak rises over it they do not see.
     """
+    settings = SETTINGS
     coarsest, coarse, fine = solutions
-    if any(solution.status != CONVERGED for solution in solutions):
-        status = fine.status if fine.status != CONVERGED else NOT_CONVERGED
-        return ViscoelasticSteady(np.nan, np.nan, np.nan, np.nan, np.nan, status, fine.sweeps)
-    correction = (fine.values - coarse.values) / 3
-    before = coarse.values + (coarse.values - coarsest.values) / 3
-    resolved = 3 * np.abs(correction) <= RESOLVED * np.abs(fine.values)
-    values = np.where(resolved, fine.values + correction, fine.values)
-    change, touching = 3 * float(abs(correction[0])), float(fine.values[2]) * cells
-    if touching < 1 or (touching < HARDLY and not resolved[0]):
-        change = change * HARDLY / touching if touching > 0 else np.inf
-    elif resolved[0]:
-        independent = min(touching, CELLS_OF_A_PEAK * peaks)
-        extrapolated = SAFETY * float(np.cbrt((values[0] - before[0]) ** 2 * change) / independent**0.25)
-        change = max(extrapolated, BY_CHANCE * change)
-    friction, depth, fraction, slope = (float(value) for value in values)
-    error = change / abs(friction) if friction else change
-    fraction = min(max(fraction, 0.0), 1.0)
-    return ViscoelasticSteady(friction, depth + mean, fraction, slope, error + fine.imbalance, fine.status, fine.sweeps)
+    if any(solution.status != Outcome.CONVERGED for solution in solutions):
+        status = fine.status if fine.status != Outcome.CONVERGED else Outcome.DEPTH_NOT_FOUND
+        return ViscoelasticSteady(np.full(4, np.nan), np.full(4, np.nan), status, fine.sweeps)
+    size, touching = np.abs(fine.values), float(fine.values[FRACTION]) * top.cells
+    change, before = np.abs(fine.values - coarse.values), np.abs(coarse.values - coarsest.values)
+    resolved = change <= settings.resolved * size
+    values = np.where(resolved, fine.values + (fine.values - coarse.values) / 3, fine.values)
+    if touching < 1 or (touching < settings.hardly and not resolved[DRAG]):
+        errors = change * (settings.hardly / touching if touching > 0 else np.inf)
+    else:
+        again = np.abs(values - (coarse.values + (coarse.values - coarsest.values) / 3))
+        change = np.maximum(change, settings.of_before * before)
+        estimate = settings.safety * np.cbrt(again**2 * change)
+        estimate[DRAG] /= min(touching, settings.cells_of_a_peak * top.peaks) ** 0.25
+        others = np.max(change[size > 0] / size[size > 0], initial=0.0) * np.array(settings.of_others)
+        least = np.maximum(others, np.array(settings.of_a_cell) / touching) * size
+        estimate = np.maximum(np.maximum(estimate, np.array(settings.by_chance) * change), least)
+        errors = np.where(resolved, estimate, change)
+    errors[DEPTH] += top.rise * min(1.0, settings.near_a_node / touching if touching > 0 else 1.0)
+    errors += fine.imbalance * np.abs(values)
+    values[DEPTH] += top.mean
+    values[FRACTION] = min(max(values[FRACTION], 0.0), 1.0)
+    return ViscoelasticSteady(values, errors, fine.status, fine.sweeps)
 
 
-def _check(heights: FloatArray, spacing: float, velocity: float, normal_force: float, periodic: bool) -> None:
-    if heights.ndim != 1 or not np.all(np.isfinite(heights)):
-        raise ValueError("the heights must be one row of finite numbers")
-    cells = heights.size if periodic else heights.size - 1
+def _check(line: CubicLine, load: float) -> None:
+    if not np.all(np.isfinite(line.height)):
+        raise ValueError("the heights must be finite")
+    cells = line.enter.size
     if cells < 8 or cells % GRIDS[-1]:
-        wanted = "a multiple of four points" if periodic else "one point more than a multiple of four"
-        raise ValueError(f"a line needs {wanted} and at least eight cells, got {heights.size} points")
-    for name, value in (("spacing", spacing), ("velocity", velocity), ("normal force", normal_force)):
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"the {name} must be positive and finite, got {value!r}")
+        raise ValueError(f"a line needs a multiple of four cells and at least eight, got {cells}")
+    if not (np.isfinite(load) and load > 0):
+        raise ValueError(f"the load must be positive and finite, got {load!r}")

@@ -1,37 +1,37 @@
-"""Profiles that an elastomer slides over, and how they are cut into the cells of a sweep."""
+"""The line that the solvers take: cubic cells between equidistant nodes, and its cells counted from the highest point.
+
+Lengths are in cells and slopes are rises over a cell. Heights, in any unit, point into the elastomer.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.surfaces import shapes as indenter
+from mdr_dask.physics.surfaces import shapes
 
-BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
 NONE = 2.0  # a position in a cell that is not there
 STEEPEST_RISE = 4 / 27  # of a cubic over its ends, of the slopes there
 
 
-@dataclass(frozen=True)
-class Profile:
-    """A profile at equidistant nodes, n cells, unit of length free.
+class CubicLine(NamedTuple):
+    """A line of n cubic cells between n + 1 equidistant nodes, in the order in which an element meets them.
 
     Parameters
     ----------
-    height : array, shape (n,) if periodic, else (n + 1,)
-        Heights at the nodes, into the elastomer.
+    height : array, shape (n + 1,)
+        Heights at the nodes; a periodic line repeats the first at the end.
     enter, leave : array, shape (n,)
-        Rise over one cell at the slope of its start and of its end.
+        Slopes at the start and the end of each cell; they differ across a node where the line has a kink.
     periodic : bool
-        Whether the last cell ends at the first node.
+        Whether the line closes; if not, elements enter undeformed at its first node.
     smooth : bool
-        Whether the slopes of a periodic line are continuous, so that the integral of their square is summed by Euler
-        and Maclaurin: exact over the whole line if that is resolved.
+        Whether slopes of a periodic line are continuous, so that the integral of their square is summed by Euler and
+        Maclaurin: exact over the whole line if that is resolved.
     """
 
     height: FloatArray
@@ -41,7 +41,7 @@ class Profile:
     smooth: bool
 
 
-def periodic_line(height: FloatArray, slope: FloatArray | None) -> Profile:
+def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     """Return a periodic line of cubic cells, or of straight ones where there are no slopes.
 
     Parameters
@@ -50,53 +50,54 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> Profile:
     slope : array, shape (n,), or None
         Derivative of the height by position over the length of the line.
     """
+    height = np.append(height, height[0])
     if slope is None:
-        rise = np.roll(height, -1) - height
-        return Profile(height, rise, rise, True, False)
-    rise = slope / height.size
-    return Profile(height, rise, np.roll(rise, -1), True, True)
+        rise = np.diff(height)
+        return CubicLine(height, rise, rise, True, False)
+    rise = slope / slope.size
+    return CubicLine(height, rise, np.roll(rise, -1), True, True)
 
 
-def indented_line(height: FloatArray, slope: FloatArray | None, coefficient: float, exponent: float) -> Profile:
-    """Return a rough indenter h(x) - c |x|^n of cubic cells, or of straight ones where there are no slopes.
+def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Shape) -> CubicLine:
+    """Return the line of a rough indenter, of cubic cells or of straight ones where there are no slopes.
 
     Parameters
     ----------
-    height : array, shape (n + 1,)
-        The roughness h at the nodes, both ends included.
-    slope : array, shape (n + 1,), or None
-        Derivative of the roughness by position over the length of the line.
-    coefficient, exponent : float
-        c and n >= 1; x is measured from node n // 2 in units of the length of the line.
+    height, slope
+        The roughness, periodic, as in :func:`periodic_line`.
+    body : Shape
+        What is under the roughness, its tip at node n // 2, in units of the length of the line and of the heights.
     """
-    n = height.size - 1
-    smooth, left, right = indenter.shape((np.arange(n + 1) - n // 2) / n, coefficient, exponent)
-    height = height + smooth
+    n = height.size
+    smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
+    height = np.append(height, height[0]) + smooth
     if slope is None:
         rise = np.diff(height)
-        return Profile(height, rise, rise, False, False)
-    return Profile(height, (slope + right)[:-1] / n, (slope + left)[1:] / n, False, False)
+        return CubicLine(height, rise, rise, False, False)
+    enter, leave = slope + right[:-1], np.roll(slope, -1) + left[1:]
+    return CubicLine(height, enter / n, leave / n, False, False)
 
 
 class Cells(NamedTuple):
-    """A profile cut into n cubic cells, with one more at the end that repeats the first.
+    """The n cells of a line, a periodic one from its highest point on, with one more at the end that repeats the first.
 
     Parameters
     ----------
     height : array, shape (n + 2,)
-        Heights at the nodes, below the highest point of the profile: never positive.
+        Heights at the nodes, below the highest point of the line: never positive, so that a light contact loses no
+        digits.
     enter, leave : array, shape (n + 1,)
-        Slopes at the start and the end of each cell; they differ across a node where the profile has a kink.
+        Slopes at the start and the end of each cell.
     peak : array, shape (n + 1,)
         Highest point of each cell.
     mean, stretch : array, shape (n + 1,)
         Integrals of the height and of the slope squared over each cell.
-    block_peak, block_mean, block_stretch : array, shape (n // BLOCK,)
-        Their maximum and sums over `BLOCK` cells.
     start : float
-        Where in cell 0 (and cell n) a turn of a periodic profile begins and ends: its highest point.
+        Where in cell 0 (and cell n) a turn of a periodic line begins and ends: its highest point.
+    top : float
+        The height of that point in the line.
     periodic : bool
-        Whether the profile closes on itself; if not, elements enter undeformed at cell 0.
+        Whether the line closes on itself; if not, elements enter undeformed at cell 0.
     """
 
     height: FloatArray
@@ -105,10 +106,8 @@ class Cells(NamedTuple):
     peak: FloatArray
     mean: FloatArray
     stretch: FloatArray
-    block_peak: FloatArray
-    block_mean: FloatArray
-    block_stretch: FloatArray
     start: float
+    top: float
     periodic: bool
 
 
@@ -150,35 +149,26 @@ def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[Fl
     return peaks, best, place
 
 
-def cut(profile: Profile) -> tuple[Cells, float]:
-    """Cut a profile into the cells of a sweep, and return the height of its highest point beside them."""
-    enter, leave, n = profile.enter, profile.leave, profile.enter.size
-    nodes = np.append(profile.height, profile.height[0]) if profile.periodic else profile.height
+def cut(line: CubicLine) -> Cells:
+    """Cut a line into its cells, a periodic one at its highest point."""
+    nodes, enter, leave, n = line.height, line.enter, line.leave, line.enter.size
     peaks, best, place = _peaks(nodes, enter, leave)
     top = float(peaks[best])
     mean, stretch = _integrals(nodes, enter, leave, top)
-    if profile.smooth:
+    if line.smooth:
         stretch = _resummed(stretch, enter, best)
-    first = best if profile.periodic else 0
+    first = best if line.periodic else 0
     height, enter, leave, peaks, mean, stretch = (
         _closed(array, first) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
     )
-    after = height[:2] if profile.periodic else np.full(2, nodes[-1] - top)
-    blocks = n // BLOCK
-    whole = blocks * BLOCK
-    return Cells(
-        np.append(height[:n], after),
-        enter,
-        leave,
-        peaks,
-        mean,
-        stretch,
-        peaks[:whole].reshape(blocks, BLOCK).max(axis=1),
-        mean[:whole].reshape(blocks, BLOCK).sum(axis=1),
-        stretch[:whole].reshape(blocks, BLOCK).sum(axis=1),
-        place if profile.periodic else 0.0,
-        profile.periodic,
-    ), top
+    after = height[:2] if line.periodic else np.full(2, nodes[-1] - top)
+    height = np.append(height[:n], after)
+    return Cells(height, enter, leave, peaks, mean, stretch, place if line.periodic else 0.0, top, line.periodic)
+
+
+def running(integrals: FloatArray) -> FloatArray:
+    """Return the integral up to every node from those over the cells, shape (cells + 1,)."""
+    return np.concatenate([[0.0], np.cumsum(integrals)])
 
 
 @njit(nogil=True, cache=True)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.physics.surfaces.waves import series, waves_of
 
 Detrend = Literal["none", "mean", "line", "parabola"]
 
@@ -128,22 +129,16 @@ def resampled(height: FloatArray, points: int) -> FloatArray:
 
     Waves beyond the Nyquist wavelength of fewer points are left out.
     """
-    waves = np.fft.rfft(height)
-    kept = min(waves.size, points // 2 + 1)
-    new = np.zeros(points // 2 + 1, dtype=np.complex128)
-    new[:kept] = waves[:kept]
-    if height.size % 2 == 0 and points > height.size:
-        new[height.size // 2] *= 0.5
-    return np.asarray(np.fft.irfft(new, points) * (points / height.size), dtype=np.float64)
+    waves, mean = waves_of(height), height.mean()
+    return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)
 
 
 def spectral_derivative(height: FloatArray, length: float) -> FloatArray:
-    """Return the slope dz/dx of a periodic line at its points, exact for its Fourier series."""
-    waves = np.fft.rfft(height)
-    q = 2j * np.pi * np.arange(waves.size) / length
-    if height.size % 2 == 0:
-        q[-1] = 0
-    return np.asarray(np.fft.irfft(q * waves, height.size), dtype=np.float64)
+    """Return the slope dz/dx of a periodic line at its points, exact for its Fourier series.
+
+    The wave of two points is at its crests there, so that its slope does not show.
+    """
+    return waves_of(height).slopes(height.size) / length
 
 
 def rms_height(height: FloatArray) -> float:
@@ -152,8 +147,8 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of a periodic line."""
-    return float(np.sqrt(np.mean(spectral_derivative(height, length) ** 2)))
+    """Return the spectral rms slope of the periodic line through samples, down to the wave of two points."""
+    return waves_of(height).rms_slope() / length
 
 
 def power_spectrum(height: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:

@@ -8,9 +8,9 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import fft
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
 
@@ -135,14 +135,7 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
 
 def turned_line(amplitude: FloatArray, turned: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
     """Return the line of :func:`line` from exp(i phi_k), as :func:`turns` gives them."""
-    modes = int(amplitude.size)
-    if nodes < 2 * modes:
-        raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
-    spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
-    np.multiply(0.5 * amplitude, turned, out=spectrum[1 : modes + 1])
+    coefficients = 0.5 * amplitude * turned
     if derivative:
-        spectrum[1 : modes + 1] *= (2j * np.pi * np.arange(1, modes + 1)) ** derivative
-    if nodes == 2 * modes:
-        spectrum[-1] = 2 * spectrum[-1].real
-    heights: FloatArray = fft.irfft(spectrum, nodes, norm="forward", overwrite_x=True)
-    return heights
+        coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative
+    return series(coefficients, nodes)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numba import njit
@@ -27,6 +29,41 @@ def mapped(exponent: float) -> float:
     return 0.5 * math.sqrt(math.pi) * exponent * math.gamma(exponent / 2) / math.gamma((exponent + 1) / 2)
 
 
+class Shape(Protocol):
+    """The line of a body under the roughness: what an indenter has to say of itself to the solvers."""
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the height into the elastomer, 0 at the tip, and the slopes on the left and right of every x."""
+
+    def scaled(self, length: float, height: float) -> Shape:
+        """Return the shape in other units of length and height."""
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """The line -c |x|^n of a body of revolution, already mapped by the MDR rule; c > 0, n >= 1."""
+
+    coefficient: float
+    exponent: float
+
+    @classmethod
+    def of_body(cls, coefficient: float, exponent: float) -> PowerLaw:
+        """Return the line of a body c r^n."""
+        return cls(mapped(exponent) * coefficient, exponent)
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
+        distance = np.abs(x)
+        steepness = self.coefficient * self.exponent * distance ** (self.exponent - 1)
+        left = np.where(x > 0, -steepness, steepness)
+        right = np.where(x < 0, steepness, -steepness)
+        return -self.coefficient * distance**self.exponent, left, right
+
+    def scaled(self, length: float, height: float) -> PowerLaw:
+        """Return the shape in other units of length and height."""
+        return PowerLaw(self.coefficient * length**self.exponent / height, self.exponent)
+
+
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:
     """Return the static half-width a of the contact of a smooth line c |x|^n.
 
@@ -41,26 +78,17 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     return width
 
 
-def shape(x: FloatArray, coefficient: float, exponent: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the height -c |x|^n into the elastomer and its slopes on the left and on the right of every x."""
-    distance = np.abs(x)
-    steepness = coefficient * exponent * distance ** (exponent - 1)
-    left = np.where(x > 0, -steepness, steepness)
-    right = np.where(x < 0, steepness, -steepness)
-    return -coefficient * distance**exponent, left, right
-
-
 @njit(nogil=True, cache=True)
-def _trailing(drop: float, reach: float, exponent: float) -> float:
-    """Return b >= 0 with b^n + n reach b^(n-1) = drop, or 0 where there is none (n = 1)."""
+def _trailing(drop: float, deborah: float, exponent: float) -> float:
+    """Return b >= 0 with b^n + n deborah b^(n-1) = drop, or 0 where there is none (n = 1)."""
     if exponent == 1:
-        return max(drop - reach, 0.0)
+        return max(drop - deborah, 0.0)
     # in y = log b the logarithm of the left side is convex and rising: Newton from the right
     y = math.log(drop) / exponent
     for _ in range(ITERATIONS):
         b = math.exp(y)
-        step = ((exponent - 1) * y + math.log(b + exponent * reach) - math.log(drop)) / (
-            exponent - 1 + b / (b + exponent * reach)
+        step = ((exponent - 1) * y + math.log(b + exponent * deborah) - math.log(drop)) / (
+            exponent - 1 + b / (b + exponent * deborah)
         )
         y -= step
         if abs(step) < 1e-15 * max(1.0, abs(y)):
@@ -69,18 +97,18 @@ def _trailing(drop: float, reach: float, exponent: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _carried(depth: float, reach: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
+def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
     """Return F_N / (4 G) at a depth, and the leading and trailing edges."""
     drop = depth / coefficient
     a = drop ** (1 / exponent)
-    b = _trailing(drop, reach, exponent)
+    b = _trailing(drop, deborah, exponent)
     load = depth * (a + b) - coefficient * (a ** (exponent + 1) + b ** (exponent + 1)) / (exponent + 1)
-    return load + reach * (depth - coefficient * b**exponent), a, b
+    return load + deborah * (depth - coefficient * b**exponent), a, b
 
 
 @njit(nogil=True, cache=True)
 def smooth(
-    loads: FloatArray, reaches: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
+    loads: FloatArray, deborah: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
 ) -> None:
     """Slide smooth lines c |x|^n towards -x at prescribed loads.
 
@@ -89,7 +117,7 @@ def smooth(
 
     Parameters
     ----------
-    loads, reaches : array, shape (cases,)
+    loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficients, exponents : array, shape (cases,)
         c_n > 0 and n >= 1 of the lines, already mapped.
@@ -99,16 +127,16 @@ def smooth(
     """
     results[:] = np.nan
     for k in range(loads.size):
-        load, reach, c, n = loads[k], reaches[k], coefficients[k], exponents[k]
+        load, de, c, n = loads[k], deborah[k], coefficients[k], exponents[k]
         depth = c * ((n + 1) * load / (2 * n * c)) ** (n / (n + 1))
         for _ in range(ITERATIONS):
-            carried, a, b = _carried(depth, reach, c, n)
-            step = (load - carried) / (a + b + reach)
+            carried, a, b = _carried(depth, de, c, n)
+            step = (load - carried) / (a + b + de)
             depth = max(depth + step, 0.25 * depth)
             if abs(step) <= 1e-14 * depth:
-                carried, a, b = _carried(depth, reach, c, n)
+                carried, a, b = _carried(depth, de, c, n)
                 stretch = (c * n) ** 2 * (a ** (2 * n - 1) + b ** (2 * n - 1)) / (2 * n - 1)
                 results[k, DEPTH] = depth
-                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + reach * stretch
+                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + de * stretch
                 results[k, LEADING], results[k, TRAILING], results[k, STRETCH] = a, b, stretch
                 break

@@ -1,4 +1,4 @@
-"""The Newton iteration: its linear solver, its laws, its derivatives and the complementarity of its result."""
+"""The Newton iteration: its laws, its derivatives and the complementarity of its result."""
 
 from __future__ import annotations
 
@@ -6,38 +6,21 @@ import numpy as np
 import pytest
 
 from mdr_dask.physics.lubrication import oil
-from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.lubrication.newton import (
-    CONVERGED,
-    FILM_COLLAPSED,
-    TOO_MANY_STEPS,
+    Grid,
+    Iterate,
     Liquid,
+    Pace,
     _mobility,
     balance,
+    film_on,
     log_viscosity,
     newton,
-    nodal_film,
-    solve_linear,
 )
+from mdr_dask.physics.outcome import Outcome
 
 BARUS = Liquid(8.0, 0.0, 0.0, 0.3, 0.9)
 ROELANDS = Liquid(8.0, 0.4, 0.6, 0.3, 0.9)
-
-
-@pytest.mark.parametrize("order", [1, 3, 4, 5, 17, 64])
-def test_linear_solver_leaves_a_small_residual(order: int) -> None:
-    random = np.random.default_rng(order)
-    A, b = random.normal(size=(order, order)), random.normal(size=order)
-    work, x = A.copy(), b.copy()
-    assert solve_linear(work, x, order)
-    assert np.max(np.abs(A @ x - b)) < 1e-13 * order * np.max(np.abs(A)) * max(1.0, np.max(np.abs(x)))
-
-
-def test_linear_solver_pivots_and_knows_singular() -> None:
-    x = np.array([2.0, 3.0])
-    assert solve_linear(np.array([[0.0, 1.0], [1.0, 0.0]]), x, 2)
-    assert x.tolist() == [3.0, 2.0]
-    assert not solve_linear(np.zeros((2, 2)), np.ones(2), 2)
 
 
 def test_laws_are_those_of_the_oil() -> None:
@@ -94,26 +77,22 @@ def test_derivatives_of_the_balance_are_its_differences(liquid: Liquid) -> None:
             assert numeric_H[i] == pytest.approx(by_film[i, j - i + 2] if inside else 0.0, rel=1e-6, abs=1e-7)
 
 
-def _uniform_case(
-    most: int, liquid: Liquid = BARUS, K: float = 0.2
-) -> tuple[int, int, float, np.ndarray, np.ndarray, np.ndarray]:
-    nodes = np.linspace(-6, 2, 161)
-    weights = np.full(nodes.size, 0.05)
-    P = np.sqrt(np.maximum(1 - nodes**2, 0))
-    matrix = influence_matrix(nodes, nodes)
-    status, steps, found, H = newton(nodes, matrix, weights, liquid, K, P, 3 * K, 0.12, 1e-10, most)
-    return status, steps, found, H, P, nodes
+GRID = Grid.of(np.linspace(-6, 2, 161))
+
+
+def _uniform_case(most: int, liquid: Liquid = BARUS, K: float = 0.2) -> Iterate:
+    guess = np.sqrt(np.maximum(1 - GRID.nodes**2, 0))
+    return newton(GRID, liquid, K, guess, 3 * K, Pace(0.12, most, 1e-10))
 
 
 def test_result_is_complementary_and_carries_the_load() -> None:
-    status, _, central, H, P, nodes = _uniform_case(60)
-    assert status == CONVERGED
-    n = nodes.size
-    again, R = np.empty(n), np.empty(n)
-    nodal_film(nodes, influence_matrix(nodes, nodes), P, central, again)
-    assert np.array_equal(again, H)
+    found = _uniform_case(60)
+    assert found.outcome == Outcome.CONVERGED
+    P, H, n = found.pressure, found.film, GRID.nodes.size
+    assert np.array_equal(film_on(GRID, P, found.central), H)
     assert H.min() > 0
-    balance(nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))
+    R = np.empty(n)
+    balance(GRID.nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))
     carrying = P > 0
     carrying[[0, -1]] = False
     assert np.max(np.abs(R[carrying])) < 1e-9  # the step was below 1e-10 of the pressure
@@ -122,6 +101,13 @@ def test_result_is_complementary_and_carries_the_load() -> None:
     assert 0.05 * P.sum() == pytest.approx(np.pi / 2, rel=1e-12)
 
 
+def test_weights_are_those_of_the_trapezoidal_rule() -> None:
+    nodes = np.array([-2.0, -1.5, 0.0, 0.25, 3.0])
+    values = np.array([1.0, -2.0, 0.5, 4.0, 1.0])
+    assert Grid.of(nodes).weights @ values == pytest.approx(np.trapezoid(values, nodes), rel=1e-14)
+
+
 def test_failures_are_values() -> None:
-    assert _uniform_case(2)[0] == TOO_MANY_STEPS
-    assert _uniform_case(60, Liquid(0.0, 0.0, 0.0, 0.0, 0.0), 1e-4)[0] == FILM_COLLAPSED  # far too coarse
+    assert _uniform_case(2).outcome == Outcome.TOO_MANY_STEPS
+    coarse = _uniform_case(60, Liquid(0.0, 0.0, 0.0, 0.0, 0.0), 1e-4)  # far too coarse
+    assert coarse.outcome == Outcome.FILM_COLLAPSED

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from schemes import on_line
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import cubic_line as profile
 from mdr_dask.physics.surfaces import roughness
 
@@ -21,8 +22,8 @@ def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
 
 def friction(height, slope, reach, load, scheme):
     reaches, loads = np.broadcast_arrays(np.atleast_1d(reach).astype(float), np.atleast_1d(load).astype(float))
-    steady = sliding.steady_sliding(height, slope, reaches, loads, scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
+    steady = on_line(height, slope, reaches, loads, scheme)
+    assert np.all(steady.status == Outcome.CONVERGED)
     return steady.drag / loads
 
 
@@ -46,7 +47,7 @@ def march(height, reach, depth, turns=3):
 @pytest.mark.parametrize("load", [0.01, 0.3, 5.0])
 def test_backward_euler_agrees_with_time_stepping(hurst, reach, load):
     height, _, _ = rough(50, hurst, 1)
-    steady = sliding.steady_sliding(height, None, np.array([reach]), np.array([load]), "backward_euler")
+    steady = on_line(height, None, np.array([reach]), np.array([load]), "backward_euler")
     normal, drag = march(height, reach, steady.depth[0], turns=3 + int(20 * reach))
     # both do the same arithmetic in another order
     assert normal == pytest.approx(load, rel=1e-10)
@@ -87,7 +88,7 @@ def test_friction_has_no_floor_at_low_velocity(scheme, load):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_load_is_met_by_the_displacement_marched_at_the_depth_found(scheme):
     height, slope, _ = rough(100, 0.5, 8)
-    steady = sliding.steady_sliding(height, slope, np.array([1e-2]), np.array([0.5]), scheme)
+    steady = on_line(height, slope, np.array([1e-2]), np.array([0.5]), scheme)
     normal, _ = march(height, 1e-2, steady.depth[0])
     # another discretisation of the same state: first order in the cell
     assert normal == pytest.approx(0.5, rel=2e-2)
@@ -115,16 +116,11 @@ def test_order_of_convergence(scheme, order):
 def test_bad_numbers_are_a_status():
     height, slope, _ = rough()
     bad = np.array([np.nan, np.inf, 0.0, -1.0])
-    steady = sliding.steady_sliding(height, slope, np.append(bad, np.ones(4)), np.append(np.ones(4), bad))
-    assert np.all(steady.status == sliding.INVALID)
+    steady = on_line(height, slope, np.append(bad, np.ones(4)), np.append(np.ones(4), bad))
+    assert np.all(steady.status == Outcome.INVALID)
     assert np.all(np.isnan(steady.drag))
     height[3] = np.nan
-    assert sliding.steady_sliding(height, slope, np.ones(1), np.ones(1)).status[0] == sliding.INVALID
-
-
-def test_hermite_needs_slopes():
-    with pytest.raises(ValueError, match="expected slopes at the nodes"):
-        sliding.steady_sliding(np.zeros(32), None, np.ones(1), np.ones(1))
+    assert on_line(height, slope, np.ones(1), np.ones(1)).status[0] == Outcome.INVALID
 
 
 @pytest.mark.parametrize("load", [0.05, 2.0])
@@ -132,7 +128,7 @@ def test_hermite_needs_slopes():
 def test_friction_is_the_energy_lost(load, reach):
     """F_x = 4 G v tau times the integral of u'^2, with u marched finely as the running maximum of w exp(s / v tau)."""
     height, slope, _ = rough(30, 0.7, 400)
-    steady = sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]))
+    steady = on_line(height, slope, np.array([reach]), np.array([load]))
     n, w = height.size, height + steady.depth[0]
     decay, u = np.exp(-1 / (reach * n)), np.empty(2 * n)
     u[0] = max(w[0], 0.0)
@@ -157,8 +153,8 @@ def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
     h1, t1 = np.repeat(np.roll(height, -1), fine), np.repeat(np.roll(rise, -1), fine)
     dense = h0 * (1 + 2 * x) * (1 - x) ** 2 + h1 * x**2 * (3 - 2 * x) + t0 * x * (1 - x) ** 2 - t1 * x**2 * (1 - x)
     reaches, loads = (grid.ravel() for grid in np.meshgrid(10.0 ** np.arange(-3, 2), [0.05, 0.5, 2.0, 5.0]))
-    ours = sliding.steady_sliding(height, rise * n, reaches, loads)
-    reference = sliding.steady_sliding(dense, None, reaches, loads, "piecewise_linear")
+    ours = on_line(height, rise * n, reaches, loads)
+    reference = on_line(dense, None, reaches, loads, "piecewise_linear")
     assert np.all(ours.status == 0)
     # second order of the reference, and its shorter contacts at light loads
     assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
@@ -171,7 +167,7 @@ def test_time_steps_by_blocks_are_those_node_by_node(hurst):
     n = 1100  # four blocks and a rest
     height = roughness.line(roughness.amplitudes(n // 2, hurst), roughness.phases(3, 0, n // 2), n)
     reaches, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
-    found = sliding.steady_sliding(height, None, reaches, loads, "backward_euler")
+    found = on_line(height, None, reaches, loads, "backward_euler")
     assert np.all(found.status == 0)
     line = np.roll(height, -1 - int(np.argmax(height)))
     decay = reaches * n / (1 + reaches * n)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from schemes import on_line, under_indenter
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 
 SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
@@ -13,7 +14,7 @@ exponents = st.floats(-15, 15)
 
 
 def solve(height, slope, reach, load, scheme):
-    return sliding.steady_sliding(height, slope, np.array([reach]), np.array([load]), scheme)
+    return on_line(height, slope, np.array([reach]), np.array([load]), scheme)
 
 
 @settings(max_examples=150, deadline=None)
@@ -33,7 +34,11 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
     h, slope = (10**height * roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
     carried = 10 ** (load + height)
     steady = solve(h, slope, 10**reach, carried, scheme)
-    assert steady.status[0] == sliding.CONVERGED
+    if steady.status[0] == Outcome.DEPTH_NOT_FOUND:
+        # the dashpot alone holds the load on a length, or at a depth, that is lost in the rounding of the line
+        assert load - reach < -12
+        return
+    assert steady.status[0] == Outcome.CONVERGED
     # the highest point, which lies above the nodes by part of the range, is pressed in; at most all of the line is
     slack = 1e-9 * (np.ptp(h) + carried)
     assert -np.max(h) - np.ptp(h) <= steady.depth[0] <= carried + np.ptp(h) + slack
@@ -55,19 +60,18 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
 )
 def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, reach, load, scheme):
     amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
-    lines = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    height, slope = (np.append(line, line[0]) for line in lines)
+    height, slope = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
     numbers = (10**coefficient, exponent, np.array([10**reach]), np.array([10**load]), scheme)
-    steady = sliding.steady_indenter(height, slope, *numbers)
-    assert steady.status[0] in (sliding.CONVERGED, sliding.OUTSIDE_LINE)
-    assert np.isfinite(steady.drag[0]) == (steady.status[0] == sliding.CONVERGED)
+    steady = under_indenter(height, slope, *numbers)
+    assert steady.status[0] in (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
+    assert np.isfinite(steady.drag[0]) == (steady.status[0] == Outcome.CONVERGED)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_flat_line_has_no_friction(scheme):
     flat = np.zeros(64)
-    steady = sliding.steady_sliding(flat, flat, np.geomspace(1e-15, 1e15, 7), np.geomspace(1e-15, 1e15, 7), scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
+    steady = on_line(flat, flat, np.geomspace(1e-15, 1e15, 7), np.geomspace(1e-15, 1e15, 7), scheme)
+    assert np.all(steady.status == Outcome.CONVERGED)
     assert np.all(steady.drag == 0)
     assert steady.depth == pytest.approx(np.geomspace(1e-15, 1e15, 7), rel=1e-12)
     # by time steps the fastest one loses less than rounding in a step, and cannot tell contact from flight
@@ -79,9 +83,11 @@ def test_spikes_and_steps_are_solved(scheme):
     height = np.where(np.arange(200) > 120, 1.0, 0.0)
     height[40] = 1e6
     reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
-    steady = sliding.steady_sliding(height, np.zeros(200), reach, load, scheme)
-    assert np.all(steady.status == sliding.CONVERGED)
-    assert np.all(steady.drag >= 0)
+    steady = on_line(height, np.zeros(200), reach, load, scheme)
+    rounding = load / 1e6 / np.maximum(reach, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
+    found = steady.status == Outcome.CONVERGED
+    assert np.all(found | rounding)
+    assert np.all(steady.drag[found] >= 0)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -90,9 +96,9 @@ def test_neighbours_and_order_do_not_change_a_bit(scheme, points):
     amplitude, phase = roughness.amplitudes(points // 2, 0.3), roughness.phases(0, 0, points // 2)
     h, slope = (roughness.line(amplitude, phase, 2 * points, order) for order in (0, 1))
     reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
-    together = sliding.steady_sliding(h, slope, reach, load, scheme)
+    together = on_line(h, slope, reach, load, scheme)
     shuffle = np.random.default_rng(0).permutation(reach.size)
-    shuffled = sliding.steady_sliding(h, slope, reach[shuffle], load[shuffle], scheme)
+    shuffled = on_line(h, slope, reach[shuffle], load[shuffle], scheme)
     for name, column in vars(together).items():
         assert np.array_equal(column[shuffle], vars(shuffled)[name])
         for k in (0, 77, 179):
@@ -104,7 +110,7 @@ def test_a_guess_does_not_change_a_bit():
     amplitude, phase = roughness.amplitudes(200, 0.7), roughness.phases(0, 3, 200)
     h, slope = (roughness.line(amplitude, phase, 800, order) for order in (0, 1))
     reach, load = np.geomspace(1e-5, 1e1, 20), np.geomspace(1e-3, 1e2, 20)
-    cold = sliding.steady_sliding(h, slope, reach, load)
+    cold = on_line(h, slope, reach, load)
     for factor in (1e-3, 0.999, 1.5, 1e3):
-        warm = sliding.steady_sliding(h, slope, reach, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
+        warm = on_line(h, slope, reach, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
         assert np.array_equal(cold.drag, warm.drag)

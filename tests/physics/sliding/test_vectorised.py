@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from schemes import on_line
 
 from mdr_dask.physics.sliding import nodes as sampled_nodes
-from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised as sampled
 from mdr_dask.physics.sliding.nodes import halved, nodes, refine, weights
 from mdr_dask.physics.surfaces import roughness
@@ -38,7 +38,7 @@ def settled(refinement, hurst=0.7):
 def test_grids_converge_to_the_exact_sweep():
     reaches, loads = cases()
     height, slope, _ = line(oversampling=32)
-    exact = sliding.steady_sliding(height, slope, reaches, loads)
+    exact = on_line(height, slope, reaches, loads)
     many = exact.contact_fraction * POINTS > 10
     errors = []
     for refinement in (1, 4):
@@ -112,4 +112,4 @@ def test_a_line_that_does_not_divide_by_the_blocks():
     whole = sampled.finer(height, slope)
     for refinement in (1, 2, 4):
         states = states[-1], sampled.settle(whole, refinement, reaches, loads, states, 1e-3)
-    assert states[-1].drag == pytest.approx(sliding.steady_sliding(*fine, reaches, loads).drag, rel=0.005)
+    assert states[-1].drag == pytest.approx(on_line(*fine, reaches, loads).drag, rel=0.005)

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from schemes import under_indenter
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import shapes as indenter
 
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
@@ -63,9 +64,9 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     nodes = 2000
     reach = np.geomspace(1e-10, 1e2, 13)
     load = np.full(13, 0.02)
-    steady = sliding.steady_indenter(np.zeros(nodes + 1), np.zeros(nodes + 1), coefficient, exponent, reach, load)
+    steady = under_indenter(np.zeros(nodes), np.zeros(nodes), coefficient, exponent, reach, load)
     exact = solve(load, reach, coefficient, exponent)
-    assert np.all(steady.status == sliding.CONVERGED)
+    assert np.all(steady.status == Outcome.CONVERGED)
     # cubic cells hold a cone and a parabola exactly; a quartic to the fourth order
     assert steady.drag == pytest.approx(exact[indenter.DRAG], rel=1e-6)
     assert steady.depth == pytest.approx(exact[indenter.DEPTH], rel=1e-6)
@@ -77,7 +78,7 @@ def test_other_schemes_tend_to_the_closed_form(scheme):
     load, reach = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
     exact = solve(load, reach, 0.5, 2.0)[indenter.DRAG]
     errors = [
-        np.max(np.abs(sliding.steady_indenter(np.zeros(n + 1), None, 0.5, 2.0, reach, load, scheme).drag / exact - 1))
+        np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, reach, load, scheme).drag / exact - 1))
         for n in (2000, 8000)
     ]
     assert errors[1] < 0.3 * errors[0]
@@ -86,9 +87,9 @@ def test_other_schemes_tend_to_the_closed_form(scheme):
 
 @pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
 def test_a_contact_that_leaves_the_line_fails(scheme):
-    zeros, load = np.zeros(201), np.array([0.005, 0.2, 2.0])
-    steady = sliding.steady_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
-    assert steady.status.tolist() == [sliding.CONVERGED, sliding.OUTSIDE_LINE, sliding.OUTSIDE_LINE]
+    zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
+    steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
+    assert steady.status.tolist() == [Outcome.CONVERGED, Outcome.OUTSIDE_LINE, Outcome.OUTSIDE_LINE]
 
 
 def test_low_velocity_gives_the_law():

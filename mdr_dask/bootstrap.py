@@ -1,0 +1,139 @@
+"""The one bootstrap and the one interval: scatter of the realisations, and errors of the numbers themselves beside it.
+
+A *stack* has a mean in its first row, `RESAMPLES` means of resampled realisations behind it, and perhaps means moved by
+their errors behind those. What is computed from a stack row by row is a stack, too, and `interval` joins all of it.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdr_dask.arrays import FloatArray
+
+CONFIDENCE = 0.95
+RESAMPLES = 400
+#: Sets of values that are moved by their errors one after the other; the errors within one have one sign.
+GROUPS = 32
+
+
+@lru_cache(maxsize=8)
+def weights(count: int) -> FloatArray:
+    """Return how often each realisation is drawn, shape (1 + RESAMPLES, count): each once first, then the resamples.
+
+    All cases are resampled alike, because they share their lines: differences between them keep that pairing.
+    """
+    generator = np.random.Generator(np.random.Philox(0))
+    drawn = generator.multinomial(count, np.full(count, 1 / count), RESAMPLES)
+    both: FloatArray = np.vstack([np.ones(count), drawn])
+    both.flags.writeable = False
+    return both
+
+
+def means(values: FloatArray) -> FloatArray:
+    """Return the stack of means over the first axis, realisations.
+
+    What is not finite is left out. NaN where nothing is left, and in all resamples where one realisation is left.
+    """
+    flat = values.reshape(values.shape[0], -1)
+    known = np.isfinite(flat)
+    drawn = weights(values.shape[0])
+    total = drawn @ np.where(known, flat, 0.0)
+    number = drawn @ known if not known.all() else drawn.sum(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = total / number
+    mean[1:, known.sum(axis=0) < 2] = np.nan
+    return mean.reshape(drawn.shape[0], *values.shape[1:])
+
+
+def complete(values: FloatArray) -> FloatArray:
+    """Return values without the realisations, along the first axis, that are not finite somewhere."""
+    known = np.all(np.isfinite(values.reshape(values.shape[0], -1)), axis=1)
+    return np.where(known.reshape(-1, *(1 for _ in values.shape[1:])), values, np.nan)
+
+
+def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
+    """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...)."""
+    flat = np.abs(np.where(np.isfinite(errors), errors, 0.0)).ravel()
+    groups = np.array_split(np.arange(flat.size), max(1, min(GROUPS, flat.size)))
+    shifts = np.zeros((2 * len(groups), flat.size))
+    for k, group in enumerate(groups):
+        shifts[2 * k, group], shifts[2 * k + 1, group] = flat[group], -flat[group]
+    rows: FloatArray = values + shifts.reshape(-1, *values.shape)
+    return rows
+
+
+def _reach(shifts: FloatArray) -> FloatArray:
+    """Return how far errors reach up together, from the shifts of every group up and down; NaN is none."""
+    known = np.where(np.isfinite(shifts), shifts, 0.0)
+    reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
+    return reach
+
+
+def regrouped(stack: FloatArray) -> FloatArray:
+    """Return a stack of cases, each with errors of its own, as a stack in which neighbouring cases err together."""
+    shifts = stack[1 + RESAMPLES :] - stack[0]
+    own = np.maximum(_reach(shifts), _reach(-shifts))
+    return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
+
+
+def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
+    """Return 95 % intervals from a stack, along its first axis.
+
+    The percentiles of a bootstrap over a few realisations are too near: their distances from the value are widened by
+    sqrt(n / (n - 1)) t / z, Student's t over the normal z. The errors of the numbers are added to that: the same error
+    in every realisation does not average out, and a root of squares would hold too few truths.
+
+    Parameters
+    ----------
+    stack : array, shape (1 + RESAMPLES + 2 groups, ...)
+        The value, the resamples, and the values moved up and down by their errors.
+    count : int or array
+        Realisations n that were resampled.
+    positive : bool
+        Whether to widen in logarithms, for what is positive.
+    """
+    with np.errstate(invalid="ignore"):
+        values = np.log(np.where(stack > 0, stack, np.nan)) if positive else stack
+    known = np.isfinite(values[0]) & np.any(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) & (np.asarray(count) > 1)
+    ends = np.full((2, *values.shape[1:]), np.nan)
+    ends[:, known] = np.nanquantile(values[1 : 1 + RESAMPLES, known], _TAILS, axis=0)
+    with np.errstate(invalid="ignore"):
+        shifts = values[1 + RESAMPLES :] - values[0]
+    wider = widening(count)
+    low = values[0] + wider * np.minimum(ends[0] - values[0], 0.0) - _reach(-shifts)
+    high = values[0] + wider * np.maximum(ends[1] - values[0], 0.0) + _reach(shifts)
+    return (np.exp(low), np.exp(high)) if positive else (low, high)
+
+
+_TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
+
+
+def widening(count: ArrayLike) -> FloatArray:
+    """Return sqrt(n / (n - 1)) t / z, by which deviations of resamples are too small for n realisations."""
+    from scipy.special import ndtri, stdtrit
+
+    number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
+    wider: FloatArray = np.sqrt(number / (number - 1)) * stdtrit(number - 1, _TAILS[1]) / ndtri(_TAILS[1])
+    return wider
+
+
+def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
+    """Return how often scatter and errors alone leave residuals as large as those of the first row.
+
+    Parameters
+    ----------
+    residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
+        Stack of data less law. If the law holds, the first row is to the truth as the resamples are to the first row.
+    count : int
+        Realisations that were resampled.
+    draws : int
+        Resamples among the rows.
+    """
+    flat = residuals.reshape(residuals.shape[0], -1)
+    size = np.sqrt(np.sum(flat[0] ** 2))
+    away = np.sqrt(np.sum((flat[1:] - flat[0]) ** 2, axis=1))
+    alone = widening(count) * away[:draws] + _reach(away[draws:])
+    return float(np.mean(alone >= size))

@@ -1,0 +1,161 @@
+"""Parameters and outputs of the lubricated line contact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, deferred, quantity
+
+#: Contact modulus of steel on steel, 210 GPa and 0.3 each.
+STEEL = 210e9 / (2 * (1 - 0.3**2))
+#: Relative error of the films where the campaign names none.
+ACCURACY = 1e-3
+
+#: Each dimensionless number, its dimensional counterpart, and what that one needs beside it.
+_PAIRS = (
+    ("load_parameter", "line_load", ("radius",)),
+    ("speed_parameter", "mean_velocity", ("radius", "viscosity")),
+    ("material_parameter", "pressure_viscosity", ()),
+)
+
+
+class EhlLineParameters(Parameters):
+    """A line contact by dimensionless numbers or by dimensional quantities: one of each pair."""
+
+    gone: ClassVar[Mapping[str, str]] = {
+        "neighbours": "every case is solved alone, so leave it out",
+        "discretisation_error": "central_film and minimum_film come with central_film_error and minimum_film_error",
+        "traction_error": "traction_coefficient comes with traction_coefficient_error",
+    }
+    load_parameter: float | None = quantity("1", "load parameter W = w/(E' R), E' = 2 E*", gt=0, default=None)
+    speed_parameter: float | None = quantity("1", "speed parameter U = eta0 u/(E' R)", gt=0, default=None)
+    material_parameter: float | None = quantity("1", "material parameter G = alpha E'", ge=0, default=None)
+    line_load: float | None = quantity("N/m", "normal force per length of the line w", gt=0, default=None)
+    mean_velocity: float | None = quantity("m/s", "mean velocity of the surfaces u = (u1 + u2)/2", gt=0, default=None)
+    pressure_viscosity: float | None = quantity("1/Pa", "pressure-viscosity coefficient alpha", ge=0, default=None)
+    radius: float | None = quantity("m", "reduced radius of curvature R", gt=0, default=None)
+    viscosity: float | None = quantity("Pa*s", "viscosity at ambient pressure eta0", gt=6.4e-5, default=None)
+    contact_modulus: float = quantity("Pa", "contact modulus E*", gt=0, default=STEEL)
+    viscosity_law: Literal["barus", "roelands"] = Field("barus", description="viscosity over pressure")
+    compressible: bool = Field(True, description="whether the density follows the law of Dowson and Higginson")
+    inlet: float | None = quantity(
+        "1", "where the oil begins, over the half width (negative); fully flooded if not given", lt=0, default=None
+    )
+    slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u", ge=0, default=0.0)
+    shear_law: Literal["newtonian", "eyring"] = Field("newtonian", description="shear stress over shear rate")
+    eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", gt=0, default=5e6)
+    profile_start: float = quantity("1", "first position of film and pressure, over the half width", default=-4.0)
+    profile_end: float = quantity("1", "last position of film and pressure, over the half width", default=2.0)
+    profile_points: int = quantity("1", "number of positions of film and pressure", ge=2, default=241)
+
+    @model_validator(mode="after")
+    def _one_of_each_pair(self) -> Self:
+        """Demand one of each pair and what it needs."""
+        for number, dimensional, companions in _PAIRS:
+            given = [name for name in (number, dimensional) if getattr(self, name) is not None]
+            if len(given) != 1:
+                raise ValueError(f"expected either {number} or {dimensional}, got {' and '.join(given) or 'neither'}")
+            missing = [name for name in companions if given == [dimensional] and getattr(self, name) is None]
+            if missing:
+                raise ValueError(f"{dimensional} needs {' and '.join(missing)}")
+        if self.viscosity_law == "roelands" and self.viscosity is None:
+            raise ValueError("viscosity_law roelands needs viscosity, which it refers to a pole in Pa s")
+        if self.profile_end <= self.profile_start:
+            raise ValueError(
+                f"expected profile_end above profile_start {self.profile_start:g}, got {self.profile_end:g}"
+            )
+        return self
+
+
+OUTPUTS = (
+    Output("central_film", "1", "central film thickness over the radius h_c/R", has_error=True),
+    Output("minimum_film", "1", "minimum film thickness over the radius h_min/R", has_error=True),
+    Output("central_film_thickness", "m", "central film thickness h_c (needs radius)", default=False, has_error=True),
+    Output("minimum_film_thickness", "m", "minimum film thickness h_min (needs radius)", default=False, has_error=True),
+    Output(
+        "film",
+        "1",
+        "film thickness over the radius h/R; where the film is torn, the gap",
+        ("position",),
+        default=False,
+        has_error=True,
+    ),
+    Output("pressure", "Pa", "pressure in the film", ("position",), default=False, has_error=True),
+    Output("formula_central_film", "1", "h_c/R by Pan and Hamrock", default=False),
+    Output("formula_minimum_film", "1", "h_min/R by Pan and Hamrock", default=False),
+    Output("moes_load", "1", "Moes' load parameter M = W (2U)^(-1/2)", default=False),
+    Output("moes_lubricant", "1", "Moes' lubricant parameter L = G (2U)^(1/4)", default=False),
+    Output("minimum_position", "1", "position of the minimum film over the half width", default=False, has_error=True),
+    Output("rupture_position", "1", "position where the film ends over the half width", default=False, has_error=True),
+    Output("spike_position", "1", "position of the pressure spike over the half width", default=False, has_error=True),
+    Output(
+        "spike_pressure",
+        "Pa",
+        "pressure of the spike; its height does not converge with Barus' law",
+        default=False,
+        has_error=True,
+    ),
+    Output("load_error", "1", "relative deviation of the pressure's integral from the load", default=False),
+    Output("traction_coefficient", "1", "shear force at mid-film over the load", default=False, has_error=True),
+    Output("rolling_coefficient", "1", "rolling friction of each surface over the load", default=False, has_error=True),
+)
+
+
+def groups(lookup: Callable[[str], Any]) -> tuple[Any, Any, Any]:
+    """Return W, U and G from one quantity of each pair.
+
+    Parameters
+    ----------
+    lookup : callable, str -> array or None
+        Gives the values of a parameter, None for one that is not given.
+    """
+    modulus = 2 * lookup("contact_modulus")
+    W, U, G = lookup("load_parameter"), lookup("speed_parameter"), lookup("material_parameter")
+    if W is None:
+        W = lookup("line_load") / (modulus * lookup("radius"))
+    if U is None:
+        U = lookup("viscosity") * lookup("mean_velocity") / (modulus * lookup("radius"))
+    if G is None:
+        G = lookup("pressure_viscosity") * modulus
+    return W, U, G
+
+
+def positions(parameters: EhlLineParameters) -> FloatArray:
+    """Return the positions of film and pressure in half widths."""
+    return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
+
+
+def seconds(block: Block[EhlLineParameters]) -> float:
+    """Return the estimated time of `compute`: a solution takes some 20 ms, more for a tighter accuracy."""
+    accuracy = block.accuracy or ACCURACY
+    return 0.02 * block.cases * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
+
+
+def memory(_: Block[EhlLineParameters]) -> float:
+    """Return the memory of one solution on the finest grid allowed: some three dense matrices of 1281 nodes."""
+    return 3.0 * 8 * 1281**2
+
+
+def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
+    """Return the positions of film and pressure."""
+    return {"position": Coordinate(positions(parameters), "1", "position over the half width x/a, flow to the right")}
+
+
+MODEL = Model(
+    name="ehl_line",
+    version=3,
+    summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
+    parameters=EhlLineParameters,
+    outputs=OUTPUTS,
+    compute=deferred("mdr_dask.models.ehl_line.solve", "compute"),
+    seconds=seconds,
+    whole=("slide_roll_ratio", "eyring_stress"),
+    coordinates=coordinates,
+    distinct=deferred("mdr_dask.models.ehl_line.solve", "distinct"),
+    memory=memory,
+)

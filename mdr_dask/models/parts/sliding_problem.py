@@ -1,0 +1,174 @@
+"""Sliding bodies as dimensionless numbers: the one place where loads, speeds, lines and solids lose their units."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import Block, canonical
+from mdr_dask.models.parts.material import solid_of
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.rough_line import Generated, Measured, Roughness, Smooth
+from mdr_dask.models.parts.sliding_body import SlidingBody
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.sliding.problem import Arms
+    from mdr_dask.physics.surfaces.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What cases share that are solved together: the line and the arms of the solid (None of Kelvin), without units."""
+
+    roughness: Roughness
+    body: Shape | None
+    arms: Arms | None
+
+
+@dataclass(frozen=True)
+class SlidingProblems:
+    """The cases of a block as dimensionless numbers; only these decide a solution.
+
+    Parameters
+    ----------
+    settings : list of Setting
+        Line and arms of every case.
+    loads : array, shape (cases,)
+        F_N / (4 G_inf L h).
+    deborah : array, shape (cases,)
+        eta v / (G_inf L): the Deborah number v tau / L of a Kelvin body.
+    length, height : array, shape (cases,)
+        L and h, m: the units of length and height. h is the rms height, or L where there is no roughness.
+    faults : dict of int to str
+        Why a case has no numbers.
+    """
+
+    settings: list[Setting]
+    loads: FloatArray
+    deborah: FloatArray
+    length: FloatArray
+    height: FloatArray
+    faults: dict[int, str]
+
+    def groups(self, *columns: list[Any]) -> Iterator[tuple[Setting, tuple[Any, ...], IntArray]]:
+        """Yield the cases that share a setting, and what else the columns hold."""
+        members: dict[Any, list[int]] = {}
+        for j, key in enumerate(zip(map(id, self.settings), *columns, strict=True)):  # equal settings are one object
+            members.setdefault(key, []).append(j)
+        for (_, *others), cases in members.items():
+            sound = [j for j in cases if j not in self.faults]
+            if sound:
+                yield self.settings[sound[0]], tuple(others), np.array(sound)
+
+
+def sliding_problems(block: Block[Any]) -> SlidingProblems:
+    """Return the cases of a block of any `SlidingBody` without units."""
+    faults: dict[int, str] = {}
+    roughness, length, height = _lines(block, faults)
+    static, viscosity, arms = _solids(block, faults)
+    velocity, force = (np.asarray(block.column(name), dtype=np.float64) for name in ("velocity", "normal_force"))
+    with np.errstate(all="ignore"):
+        loads = canonical(force / (4 * static * length * height))
+        deborah = canonical(velocity * viscosity / length)
+    given = {"length": length, "rms roughness": height, "load": force, "velocity": velocity}
+    for name, numbers in given.items():
+        for j in np.flatnonzero(~(np.isfinite(numbers) & (numbers > 0))):
+            faults.setdefault(int(j), f"the {name} must be positive and finite, got {numbers[j]:g}")
+    settings = _settings(block, roughness, arms, length, height, velocity, faults)
+    return SlidingProblems(settings, loads, deborah, length, height, faults)
+
+
+def each(block: Block[Any], name: str) -> list[Any]:
+    """Return a structured parameter of every case, whichever part of it varies."""
+    if any(path.partition(".")[0] == name for path in block.columns):
+        return [getattr(block.case(j), name) for j in range(block.cases)]
+    return [getattr(block.parameters, name)] * block.cases
+
+
+def _numbers(block: Block[Any], name: str) -> FloatArray:
+    """Return a number of every case, NaN where there is none."""
+    return np.array([np.nan if value is None else value for value in block.column(name).tolist()], dtype=np.float64)
+
+
+def _lines(block: Block[Any], faults: dict[int, str]) -> tuple[list[Roughness], FloatArray, FloatArray]:
+    """Return roughness, length and height of every case."""
+    length, height = _numbers(block, "length"), _numbers(block, "rms_roughness")
+    flat = height == 0
+    height = np.where(flat, length, height)
+    with np.errstate(all="ignore"):
+        corners = [
+            np.where(np.isnan(wavelength), 0.0, canonical(length / wavelength)).tolist()
+            for wavelength in (_numbers(block, "rolloff_wavelength"), _numbers(block, "longest_wavelength"))
+        ]
+    columns = block.column("hurst").tolist(), block.column("points").tolist(), *corners
+    distinct: dict[Any, Roughness] = {}
+    lines: list[Roughness] = []
+    for smooth, *numbers in zip(flat.tolist(), *columns, strict=True):
+        key = (smooth, *numbers)
+        if key not in distinct:
+            distinct[key] = Smooth(numbers[1]) if smooth else Generated(*numbers)
+        lines.append(distinct[key])
+    for j, profile in enumerate(each(block, "profile")):
+        if profile is not None:
+            try:
+                line = Measured(profile)
+                lines[j], length[j], height[j] = line, line_of(profile).length, line.height()
+            except DataError as problem:
+                faults[j] = str(problem)
+    return lines, length, height
+
+
+def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any]]:
+    """Return static modulus, viscosity over it, and the arms (moduli over it, times) of every case, None of Kelvin."""
+    static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
+    arms: list[Any] = [None] * block.cases
+    for j, material in enumerate(each(block, "material")):
+        if material is not None:
+            try:
+                solid = solid_of(material)
+            except (DataError, ValueError) as problem:
+                faults[j] = str(problem)
+                continue
+            static[j], viscosity[j] = solid.static_modulus, solid.viscosity / solid.static_modulus
+            is_kelvin = solid.times.size == 0 and solid.viscosity > 0
+            arms[j] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
+    return static, viscosity, arms
+
+
+def _settings(
+    block: Block[Any],
+    roughness: list[Roughness],
+    arms: list[Any],
+    length: FloatArray,
+    height: FloatArray,
+    velocity: FloatArray,
+    faults: dict[int, str],
+) -> list[Setting]:
+    """Return what the cases share, in units of length and height; equal settings are one object."""
+    from mdr_dask.physics.sliding.problem import Arms
+
+    indenters = each(block, "indenter")
+    bodies = {id(indenter): indenter.line() for indenter in {id(one): one for one in indenters}.values()}
+    known: dict[Any, Setting] = {}
+    equal: dict[Setting, Setting] = {}
+    settings = []
+    columns = roughness, indenters, arms, length.tolist(), height.tolist(), velocity.tolist()
+    for j, (line, indenter, arm, unit, rms, pace) in enumerate(zip(*columns, strict=True)):
+        key = (id(line), id(indenter), unit, rms) if arm is None else (id(line), id(indenter), unit, rms, id(arm), pace)
+        if key not in known:
+            body, travelling = bodies[id(indenter)], None
+            if body is not None and j not in faults:
+                body = body.scaled(unit, rms)
+                body = replace(body, **{name: float(canonical(number)) for name, number in vars(body).items()})
+            if arm is not None and j not in faults:
+                numbers = canonical(arm[0]), canonical(arm[1] * pace / unit)
+                travelling = Arms(*(tuple(column.tolist()) for column in numbers))
+            setting = Setting(line, body, travelling)
+            known[key] = equal.setdefault(setting, setting)
+        settings.append(known[key])
+    return settings

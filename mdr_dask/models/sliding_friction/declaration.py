@@ -1,0 +1,51 @@
+"""What a campaign can name of steady friction: parameters, outputs, and where it is solved."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from mdr_dask.models.base import Model, Output, deferred, quantity
+from mdr_dask.models.parts.material import fit_notes
+from mdr_dask.models.parts.sliding_body import SlidingBody
+
+
+class SlidingFriction(SlidingBody):
+    """A viscoelastic body under a load, sliding at constant speed over a rough line."""
+
+    oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
+        "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
+    )
+    scheme: Literal["hermite", "piecewise_linear", "backward_euler"] = Field(
+        default="hermite",
+        description="exact sweep over cubic or straight cells, or the papers' time steps; of a Kelvin body",
+    )
+
+
+OUTPUTS = (
+    Output("friction_coefficient", "1", "coefficient of friction", has_error=True),
+    Output("indentation_depth", "m", "penetration of the mean line into the undeformed body", has_error=True),
+    Output("contact_fraction", "1", "length in contact over length of the line", has_error=True),
+    Output("contact_slope", "1", "rms slope of the line over the contact", has_error=True),
+    Output("rms_slope", "1", "spectral rms slope of the line"),
+    Output(
+        "material_error", "1", "rms relative error of the material's Prony series, 0 where none is fitted", (), False
+    ),
+)
+
+SOLVE = "mdr_dask.models.sliding_friction.solve"
+
+MODEL = Model(
+    name="sliding_friction",
+    version=6,
+    summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
+    parameters=SlidingFriction,
+    outputs=OUTPUTS,
+    compute=deferred(SOLVE, "compute"),
+    seconds=deferred(SOLVE, "seconds"),
+    whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
+    distinct=deferred(SOLVE, "distinct"),
+    memory=deferred(SOLVE, "memory"),
+    notes=lambda parameters: fit_notes(parameters.material),
+)

@@ -1,0 +1,200 @@
+"""Steady friction of a block of cases: each different case is solved once in every realisation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.parts.material import fit_error
+from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.sliding_friction.declaration import SlidingFriction
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
+from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, Line, solve
+from mdr_dask.physics.sliding.steady import Steady
+
+ACCURACY = 0.01  # where the campaign does not say
+NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
+POINT_LINE, POINT_SAMPLED = 1.2e-7, 1.5e-8  # and for every Nyquist point gone along from node to node
+NODE_ARM, NODE_GENERAL, GENERAL = 1e-8, 1e-7, 3e-4  # for every node and arm of a general solid, and to begin with
+ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
+
+#: Outputs that have errors, and the column of a steady state that each is.
+COLUMNS = {
+    "friction_coefficient": "drag",
+    "indentation_depth": "depth",
+    "contact_fraction": "contact_fraction",
+    "contact_slope": "contact_slope",
+}
+
+
+def compute(block: Block[SlidingFriction]) -> Result:
+    """Solve the cases of a block, each different one once."""
+    shape = (block.cases, len(block.realisations))
+    values = {name: np.full(shape, np.nan) for name in block.outputs}
+    result = Result(values, np.full(shape, Status.FAILED, np.int8))
+    problems = sliding_problems(block)
+    materials = each(block, "material") if "material_error" in block.outputs else [None] * block.cases
+    solves = 0
+    groups = [_Group.of(block, problems, *group) for group in _groups(block, problems)]
+    for r, realisation in enumerate(block.realisations):  # outside: every line of one has the same phases
+        for group in groups:
+            solves += group.solve(result, materials, r, realisation)
+    result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
+    return replace(result, solves=solves)
+
+
+def _groups(block: Block[SlidingFriction], problems: SlidingProblems) -> Any:
+    """Yield setting, oversampling and scheme, and the cases that share them."""
+    yield from problems.groups(block.column("oversampling").tolist(), block.column("scheme").tolist())
+
+
+@dataclass
+class _Group:
+    """Cases that share line, solid and grid, each different one once."""
+
+    block: Block[SlidingFriction]
+    problems: SlidingProblems
+    setting: Setting
+    aim: Aim
+    members: IntArray
+    deborah: FloatArray
+    loads: FloatArray
+    which: IntArray  # the entry of `deborah` and `loads` of every member
+    solved: dict[str, FloatArray] | None = None  # of a line that is the same in every realisation
+
+    @classmethod
+    def of(
+        cls, block: Block[SlidingFriction], problems: SlidingProblems, setting: Setting, how: Any, members: IntArray
+    ) -> _Group:
+        """Collect the different cases among the members."""
+        numbers = np.stack([problems.deborah[members], problems.loads[members]])
+        (deborah, loads), which = np.unique(numbers, axis=1, return_inverse=True)
+        wanted = {name.removesuffix("_error") for name in block.outputs}
+        columns = [column for output, column in COLUMNS.items() if output in wanted]
+        with_errors = any(f"{output}_error" in block.outputs for output in COLUMNS)
+        accuracy = ACCURACY if block.accuracy is None else block.accuracy
+        oversampling, scheme = how
+        aim = Aim(columns, accuracy, oversampling, scheme, with_errors)
+        return cls(block, problems, setting, aim, members, deborah, loads, which)
+
+    def solve(self, result: Result, materials: list[Any], r: int, realisation: int) -> int:
+        """Write the cases of one realisation, the r-th of the block; return how many were solved."""
+        roughness = self.setting.roughness
+        if r and not roughness.is_random:
+            for array in result.values.values():
+                array[self.members, r] = array[self.members, 0]
+            result.status[self.members, r] = result.status[self.members, 0]
+            result.messages.update(
+                {(int(j), r): result.messages[j, 0] for j in self.members if (j, 0) in result.messages}
+            )
+            return 0
+        try:
+            line = Line(roughness.waves(self.block.seed, realisation), self.setting.body)
+            steady, errors = solve(line, self.setting.arms, self.deborah, self.loads, self.aim)
+        except ValueError as problem:
+            result.messages.update({(int(j), r): str(problem) for j in self.members})
+            return 0
+        found = self._outputs(steady, errors)
+        if "material_error" in self.block.outputs:
+            found["material_error"] = np.array([fit_error(materials[j]) for j in self.members])
+        status = steady.status[self.which]
+        result.status[self.members, r] = STATUS[status]
+        for name in self.block.outputs:
+            result.values[name][self.members, r] = np.where(status == Outcome.CONVERGED, found[name], np.nan)
+        for k, sentence in self._sentences(steady, errors):
+            result.messages.update({(int(j), r): sentence for j in self.members[self.which == k]})
+        return int(self.loads.size)
+
+    def _outputs(self, steady: Steady, errors: Errors) -> dict[str, FloatArray]:
+        """Return the outputs of the members and their errors, in units."""
+        height = self.problems.height[self.members]
+        slope = height / self.problems.length[self.members]
+        units = {"friction_coefficient": slope, "indentation_depth": height, "contact_slope": slope}
+        found: dict[str, FloatArray] = {"rms_slope": self.setting.roughness.slope() * slope}
+        for output, column in COLUMNS.items():
+            per = self.loads if column == "drag" else 1.0
+            unit = units.get(output, 1.0)
+            found[output] = (getattr(steady, column) / per)[self.which] * unit
+            found[f"{output}_error"] = (getattr(errors, column) / per)[self.which] * unit
+        return found
+
+    def _sentences(self, steady: Steady, errors: Errors) -> Iterator[tuple[int, str]]:
+        """Yield why a case failed, or which outputs miss the accuracy and by how much."""
+        failed = steady.status != Outcome.CONVERGED
+        for k in np.flatnonzero(failed):
+            yield int(k), Outcome(int(steady.status[k])).sentence
+        if self.aim.oversampling != "auto":
+            return
+        missed = relative(steady, errors, self.aim.columns)
+        late = ~(missed <= self.aim.accuracy)
+        outputs = [output for output, column in COLUMNS.items() if column in self.aim.columns]
+        for k in np.flatnonzero(late.any(axis=0) & ~failed):
+            named = ", ".join(f"{output} by {missed[i, k]:.2g}" for i, output in enumerate(outputs) if late[i, k])
+            yield int(k), f"an accuracy of {self.aim.accuracy:.2g} is missed on the finest grid: {named} (estimated)"
+
+
+STATUS = np.array(
+    [
+        Status.DONE
+        if outcome == Outcome.CONVERGED
+        else Status.FAILED
+        if outcome.is_impossible
+        else Status.NOT_CONVERGED
+        for outcome in Outcome
+    ],
+    dtype=np.int8,
+)
+
+
+def distinct(block: Block[SlidingFriction]) -> int:
+    """Return how many different cases a block holds, over all realisations."""
+    problems, total = sliding_problems(block), 0
+    for setting, _, members in _groups(block, problems):
+        solves = len(set(zip(problems.deborah[members].tolist(), problems.loads[members].tolist(), strict=True)))
+        total += solves * (len(block.realisations) if setting.roughness.is_random else 1)
+    return total
+
+
+def seconds(block: Block[SlidingFriction]) -> float:
+    """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
+    problems, total = sliding_problems(block), 1e-4
+    for setting, (oversampling, scheme), members in _groups(block, problems):
+        numbers = set(zip(problems.deborah[members].tolist(), problems.loads[members].tolist(), strict=True))
+        lines = len(block.realisations) if setting.roughness.is_random else 1
+        total += lines * _seconds_of_line(block, setting, oversampling, scheme, len(numbers))
+    return total
+
+
+def _seconds_of_line(
+    block: Block[SlidingFriction], setting: Setting, oversampling: int | str, scheme: str, solves: int
+) -> float:
+    """Estimate the time of some cases on one line."""
+    points, auto = setting.roughness.points, oversampling == "auto"
+    if setting.arms is not None:
+        grid = 2 * COARSEST if auto else int(oversampling)
+        return solves * (GENERAL + (NODE_ARM * (len(setting.arms.moduli) + 1) + NODE_GENERAL) * points * grid)
+    if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):
+        return points * (POINT_LINE + solves * POINT_SAMPLED)
+    grid = 4 if auto else int(oversampling)
+    checks = 3.5 if auto or any(f"{output}_error" in block.outputs for output in COLUMNS) else 1
+    nodes = points * grid
+    sweep = NODE_STEPPED * nodes if scheme == "backward_euler" else NODE_SWEPT * points * grid**0.25
+    return checks * (NODE_LINE * nodes + solves * sweep)
+
+
+def memory(block: Block[SlidingFriction]) -> float:
+    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
+    largest = 0.0
+    for setting, oversampling in zip(
+        sliding_problems(block).settings, block.column("oversampling").tolist(), strict=True
+    ):
+        kelvin = setting.arms is None
+        grid = oversampling if oversampling != "auto" else SETTINGS.finest if kelvin else FINEST
+        largest = max(largest, setting.roughness.points * grid * (2 * ARRAYS if kelvin else ARRAYS_GENERAL))
+    return 8 * largest

@@ -1,0 +1,47 @@
+"""What became of a solution: one enumeration for every solver, each outcome with its sentence for a user."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Outcome(IntEnum):
+    """How a solver ended; kernels return the number, users read the `sentence`.
+
+    A kernel compares with members as with whole numbers: numba takes them for constants.
+    """
+
+    CONVERGED = 0
+    DEPTH_NOT_FOUND = 1
+    OUTSIDE_LINE = 2
+    INVALID = 3
+    NOT_STEADY = 4
+    TOO_MANY_STEPS = 5
+    SINGULAR = 6
+    FILM_COLLAPSED = 7
+    STEP_TOO_SMALL = 8
+    UNDER_WAY = 9
+
+    @property
+    def sentence(self) -> str:
+        """The reason, for a user."""
+        return _SENTENCES[self]
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether no solver could have done better: the case itself is to blame."""
+        return self in (Outcome.OUTSIDE_LINE, Outcome.INVALID)
+
+
+_SENTENCES = {
+    Outcome.CONVERGED: "converged",
+    Outcome.DEPTH_NOT_FOUND: "the depth for the load was not found",
+    Outcome.OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
+    Outcome.INVALID: "load, velocity and line must be finite, the load and the Deborah number positive",
+    Outcome.NOT_STEADY: "friction did not come to the steady state at the new velocity",
+    Outcome.TOO_MANY_STEPS: "too many steps were needed",
+    Outcome.SINGULAR: "the linear equations of a step have no solution",
+    Outcome.FILM_COLLAPSED: "the next step would have closed the film",
+    Outcome.STEP_TOO_SMALL: "the steps became too small",
+    Outcome.UNDER_WAY: "the solution was not finished",
+}

@@ -1,0 +1,70 @@
+"""A periodic line as a sum of waves: the common form of generated and measured roughness, on any grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from mdr_dask.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class Waves:
+    """A line h(x) = 2 Re sum_k c_k exp(2 pi i k x) of unit length and mean 0.
+
+    Parameters
+    ----------
+    coefficients : array, shape (modes,)
+        c_k for k = 1..modes, half the complex amplitude of each wave.
+    points : int
+        Nyquist points of the line: 2 modes, or one more.
+    """
+
+    coefficients: NDArray[np.complex128]
+    points: int
+
+    def heights(self, nodes: int) -> FloatArray:
+        """Return h at x = 0, 1/nodes, ..."""
+        return series(self.coefficients, nodes)
+
+    def slopes(self, nodes: int) -> FloatArray:
+        """Return dh/dx at the same places, exact."""
+        return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
+
+    def rms_slope(self) -> float:
+        """Return the spectral rms slope, sqrt(sum (A_k q_k)^2 / 2) with A_k = 2 |c_k| and q_k = 2 pi k."""
+        q = 2 * np.pi * np.arange(1, self.coefficients.size + 1)
+        return float(np.sqrt(2 * np.sum((np.abs(self.coefficients) * q) ** 2)))
+
+
+def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
+    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT.
+
+    Raises
+    ------
+    ValueError
+        If the grid does not resolve the shortest wave.
+    """
+    modes = coefficients.size
+    if nodes < 2 * modes:
+        raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
+    spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
+    spectrum[1 : modes + 1] = coefficients
+    if nodes == 2 * modes:
+        spectrum[-1] = 2 * spectrum[-1].real
+    heights: FloatArray = fft.irfft(spectrum, nodes, norm="forward", overwrite_x=True)
+    return heights
+
+
+def waves_of(height: FloatArray) -> Waves:
+    """Return the waves of the periodic line through equidistant samples, their mean left out.
+
+    The last wave of an even number of samples, two samples long, is the cosine that they show; it counts in full.
+    """
+    coefficients = np.fft.rfft(height)[1:] / height.size
+    if height.size % 2 == 0:
+        coefficients[-1] = 0.5 * coefficients[-1].real
+    return Waves(coefficients, height.size)

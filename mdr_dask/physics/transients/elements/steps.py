@@ -1,0 +1,440 @@
+"""All elements of a viscoelastic foundation through a course of velocity and load, and around a line until steady.
+
+Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.transients.elements.edges import Edges, Line, balance, depth_for, under_elements
+from mdr_dask.physics.transients.elements.foundation import (
+    Foundation,
+    Scratch,
+    advance,
+    at_rest,
+    fading,
+    flight,
+    fly,
+    pull,
+    release,
+    scratch_for,
+    stored,
+)
+
+DRAG, DEPTH, RATE, CONTACT, STORED, WORK, LOST = range(7)
+ROWS = 7
+CORRECTIONS = 2  # of the moments of release and the depth within a step
+
+
+class State(NamedTuple):
+    """All elements at one moment.
+
+    Parameters
+    ----------
+    displacement, arms : array, shape (n,) and (n, arms)
+        u, and the strain of the arms.
+    free, free_arms : array, shape (n,) and (n, arms)
+        The same as they would be, had an element in contact not been touched; `free_arms` of these elements only.
+    touching : array, shape (n,)
+        Whether in contact.
+    edges : Edges
+    """
+
+    displacement: FloatArray
+    arms: FloatArray
+    free: FloatArray
+    free_arms: FloatArray
+    touching: BoolArray
+    edges: Edges
+
+
+@njit(nogil=True, cache=True)
+def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
+    """Return the mean displacement that the course of the load decides, whatever is in contact."""
+    n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
+    count, arms = solid.rates.size, solid.times.size
+    inward, strain, mean = solid.inward, state.arms, state.displacement.sum() / n
+    for k in range(count):
+        modes[k] = inward[k, 0] * mean if extra else 0.0
+    for m in range(arms):
+        total = 0.0
+        for j in range(n):
+            total += strain[j, m]
+        for k in range(count):
+            modes[k] += inward[k, m + extra] * total / n
+    for k in range(count):
+        z = solid.rates[k] * step
+        one = -np.expm1(-z) / z
+        late = (1 - one) / z if z > 1e-3 else 0.5 - z / 6 + z * z / 24
+        modes[k] = modes[k] * np.exp(-z) + solid.push[k] * step * (load * (one - late) + next_load * late)
+    glass, total = 1.0, 0.0
+    if extra:
+        for k in range(count):
+            total += solid.outward[0, k] * modes[k]
+        return total
+    for m in range(arms):
+        glass += solid.moduli[m]
+        for k in range(count):
+            total += solid.moduli[m] * solid.outward[m, k] * modes[k]
+    return (next_load + total) / glass
+
+
+@njit(nogil=True, cache=True)
+def _instant(
+    solid: Foundation, state: State, under: FloatArray, load: float, depth: float
+) -> tuple[float, float, bool]:
+    """Bring elements without a dashpot under a load at once; return the depth and the work, all of which is stored."""
+    n = under.size
+    mean, work, glass = 0.0, 0.0, 1.0 + solid.moduli.sum()
+    for j in range(n):
+        state.free[j] = at_rest(solid, state.arms, j)
+        mean += state.free[j] / n
+    depth, good = depth_for(under, state.free, mean + load / glass, depth)
+    for j in range(n):
+        before = stored(solid, state.displacement[j], state.arms, j)
+        w = depth + under[j]
+        state.touching[j] = w > state.free[j]
+        state.displacement[j] = max(w, state.free[j])
+        work += stored(solid, state.displacement[j], state.arms, j) - before
+    return depth, work / n, good
+
+
+@njit(nogil=True, cache=True)
+def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
+    """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
+    n, lost = state.displacement.size, 0.0
+    for j in range(n):
+        if (j + old) // n != (j + new) // n:
+            lost += stored(solid, state.displacement[j], state.arms, j)
+            state.displacement[j] = state.free[j] = 0.0
+            state.arms[j, :] = 0.0
+            state.edges.place[j] = -1.0
+            state.touching[j] = False
+    return lost / n
+
+
+class Room(NamedTuple):
+    """Arrays of one step: heights and slopes over the elements at its end and start, where each would be at the end
+    without contact, when and where it is let go, gaps and forces, and decay over the whole step.
+    """
+
+    under: FloatArray
+    slope: FloatArray
+    old_under: FloatArray
+    old_slope: FloatArray
+    after: FloatArray
+    after_arms: FloatArray
+    parts: FloatArray
+    leaves: FloatArray
+    gaps: FloatArray
+    pulls: FloatArray
+    force: FloatArray
+    power: FloatArray
+    decay: FloatArray
+    fades: FloatArray
+    scratch: Scratch
+
+
+@njit(nogil=True, cache=True)
+def _room_for(solid: Foundation, n: int) -> Room:
+    rows = np.empty((11, n))
+    return Room(
+        rows[0],
+        rows[1],
+        rows[2],
+        rows[3],
+        rows[4],
+        np.empty((n, solid.times.size)),
+        rows[5],
+        rows[6],
+        rows[7],
+        rows[8],
+        rows[9],
+        rows[10],
+        np.empty(solid.rates.size),
+        np.empty(solid.times.size),
+        scratch_for(solid),
+    )
+
+
+@njit(nogil=True, cache=True)
+def _let_go(
+    solid: Foundation, state: State, room: Room, depth: float, fall: float, reach0: float, reach1: float, step: float
+) -> None:
+    """Write which elements are let go within a step that ends at a depth, and where they end."""
+    plain, damping = solid.times.size == 0, solid.viscosity
+    for j in range(room.under.size):
+        if not state.touching[j]:
+            continue
+        u, w1 = state.displacement[j], depth + room.under[j]
+        rise0, rise1 = fall + reach0 * room.old_slope[j], fall + reach1 * room.slope[j]
+        if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
+            room.parts[j], room.leaves[j], room.after[j] = 1.0, w1, u * room.decay[0]
+            continue
+        arms, scratch = state.arms, room.scratch
+        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, room.fades, scratch.arms)
+        if part < 1 or room.parts[j] < 1:
+            pressed = part if part < 1 else 0.0
+            room.after[j] = flight(solid, u, arms, j, pressed, leaves, step, room.decay, scratch)
+        room.parts[j], room.leaves[j] = part, leaves
+
+
+@njit(nogil=True, cache=True)
+def _move(
+    solid: Foundation, state: State, room: Room, old_depth: float, depth: float, step: float
+) -> tuple[float, float]:
+    """Move all elements through a step; return mean work and loss."""
+    n, plain, damping = room.under.size, solid.times.size == 0, solid.viscosity
+    u, touching, after = state.displacement, state.touching, room.after
+    work, lost = 0.0, 0.0
+    for j in range(n):
+        w0, w1, was = old_depth + room.old_under[j], depth + room.under[j], touching[j]
+        if not was:
+            state.free[j] = after[j]
+            for m in range(solid.times.size):
+                state.free_arms[j, m] = room.after_arms[j, m]
+        elif plain:
+            state.free[j] *= room.decay[0]
+        elif damping > 0:
+            state.free[j] = fly(solid, state.free[j], state.free_arms, j, room.decay, room.scratch.modes)
+        if not was and w1 <= after[j]:
+            if plain:
+                lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
+            else:
+                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], room.after_arms, j)
+            u[j] = after[j]
+            for m in range(solid.times.size):
+                state.arms[j, m] = room.after_arms[j, m]
+            continue
+        if was and plain and w1 > after[j]:
+            gone = damping * (w1 - u[j]) ** 2 / step
+            work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
+            lost += gone
+            u[j] = w1
+            continue
+        u[j], touching[j], done, gone = advance(
+            solid,
+            u[j],
+            state.arms,
+            j,
+            was,
+            room.parts[j],
+            room.leaves[j],
+            after[j],
+            w0,
+            w1,
+            step,
+            room.decay,
+            room.fades,
+            room.scratch,
+        )
+        if not touching[j]:
+            state.free[j] = u[j]
+        work += done
+        lost += gone
+    return work / n, lost / n
+
+
+@njit(nogil=True, cache=True)
+def _step(
+    solid: Foundation,
+    state: State,
+    room: Room,
+    mean: float,
+    old_depth: float,
+    guess: float,
+    reach0: float,
+    reach1: float,
+    step: float,
+) -> tuple[float, float, float, bool]:
+    """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
+    plain = solid.times.size == 0
+    for j in range(room.under.size):
+        room.parts[j] = 1.0 if state.touching[j] else 0.0
+        if plain:
+            room.after[j] = state.displacement[j] * room.decay[0]
+            continue
+        for m in range(solid.times.size):
+            room.after_arms[j, m] = state.arms[j, m]
+        room.after[j] = fly(solid, state.displacement[j], room.after_arms, j, room.decay, room.scratch.modes)
+    depth = guess
+    for _ in range(CORRECTIONS):
+        depth, good = depth_for(room.under, room.after, mean, depth)
+        if not good:
+            return depth, 0.0, 0.0, False
+        _let_go(solid, state, room, depth, (depth - old_depth) / step, reach0, reach1, step)
+    depth, good = depth_for(room.under, room.after, mean, depth)
+    if not good:
+        return depth, 0.0, 0.0, False
+    work, lost = _move(solid, state, room, old_depth, depth, step)
+    return depth, work, lost, True
+
+
+@njit(nogil=True, cache=True)
+def _state_energy(solid: Foundation, state: State) -> float:
+    energy, n = 0.0, state.displacement.size
+    if solid.times.size == 0:
+        for j in range(n):
+            energy += 0.5 * state.displacement[j] * state.displacement[j] / n
+        return energy
+    for j in range(n):
+        energy += stored(solid, state.displacement[j], state.arms, j) / n
+    return energy
+
+
+@njit(nogil=True, cache=True)
+def forces_now(
+    solid: Foundation,
+    state: State,
+    room: Room,
+    depth: float,
+    rate: float,
+    reach: float,
+    load: float,
+    first: int,
+) -> tuple[float, float, float, float]:
+    """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
+
+    Without a dashpot the depth is that of the load; the one for the mean displacement of the elements is not more exact
+    than a sum over a line with kinks.
+    """
+    plain = solid.times.size == 0
+    for j in range(room.under.size):
+        w = depth + room.under[j]
+        room.pulls[j] = w if plain else pull(solid, w, state.arms, j)
+        room.gaps[j] = w - state.free[j] if solid.viscosity > 0 else room.pulls[j]
+    edges, force, power = state.edges, room.force, room.power
+    if solid.viscosity > 0:
+        rate, drag, length = balance(
+            solid.viscosity,
+            room.gaps,
+            room.pulls,
+            room.slope,
+            state.touching,
+            edges,
+            rate,
+            reach,
+            load,
+            first,
+            force,
+            power,
+        )
+        return depth, rate, drag, length
+    glass = 1 + solid.moduli.sum()
+    more, drag, length = balance(
+        glass, room.gaps, room.pulls, room.slope, state.touching, edges, 0.0, 0.0, load, first, force, power
+    )
+    return depth + more, rate, drag, length
+
+
+@njit(nogil=True, cache=True)
+def follow_elements(
+    solid: Foundation,
+    line: Line,
+    moments: FloatArray,
+    travels: FloatArray,
+    reaches: FloatArray,
+    loads: FloatArray,
+    state: State,
+    depth: float,
+    out: FloatArray,
+) -> int:
+    """March all elements through the moments and write `out`, shape (ROWS, moments)."""
+    n = line.height.size - 1
+    room, modes = _room_for(solid, n), np.empty(solid.rates.size)
+    shift = under_elements(line, travels[0], room.under, room.slope)
+    rate, work, lost = 0.0, 0.0, 0.0
+    if solid.viscosity == 0:
+        depth, work, good = _instant(solid, state, room.under, loads[0], depth)
+        if not good:
+            return Outcome.DEPTH_NOT_FOUND
+    for now in range(moments.size):
+        if now > 0:
+            step = moments[now] - moments[now - 1]
+            room.old_under[:] = room.under
+            room.old_slope[:] = room.slope
+            old_depth, old_shift = depth, shift
+            shift = under_elements(line, travels[now], room.under, room.slope)
+            if not line.periodic and shift != old_shift:
+                lost += _forget(solid, state, old_shift, shift)
+            fading(solid, step, room.decay, room.fades)
+            mean = mean_after(solid, state, loads[now - 1], loads[now], step, modes)
+            guess = depth + rate * step
+            depth, done, gone, good = _step(
+                solid, state, room, mean, old_depth, guess, reaches[now - 1], reaches[now], step
+            )
+            if not good:
+                return Outcome.DEPTH_NOT_FOUND
+            work, lost = work + done, lost + gone
+            if solid.viscosity == 0:
+                rate = (depth - old_depth) / step
+        first = -1 if line.periodic else (-shift) % n
+        if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
+            return Outcome.OUTSIDE_LINE
+        exact, rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
+        out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
+        out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
+    return Outcome.CONVERGED
+
+
+@njit(nogil=True, cache=True)
+def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
+    """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
+
+    The line may have a multiple of the nodes that there are elements.
+
+    Return whether it did, and its displacement at the end.
+    """
+    n, scratch = line.height.size - 1, scratch_for(solid)
+    every = n // state.displacement.size
+    step = 1 / (n * reach)
+    decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
+    fading(solid, step, decay, fades)
+    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
+    top = int(np.argmax(line.height[:n])) if line.periodic else 0
+    w0 = depth + line.height[top]
+    u, touching = max(w0, 0.0), w0 > 0
+    free = 0.0
+    for _ in range(turns if line.periodic else 1):
+        last[:] = arms[0]
+        before = u
+        for cell in range(n):
+            i = (top + cell) % n
+            if not touching:
+                free = u
+                free_arms[0, :] = arms[0]
+            if i % every == 0:
+                j = i // every
+                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
+                state.arms[j, :] = arms[0]
+                state.free_arms[j, :] = free_arms[0]
+            w0, w1 = depth + line.height[i], depth + line.height[i + 1]
+            rise0, rise1 = reach * line.slope[i], reach * line.slope[i + 1]
+            part, leaves = 0.0, u
+            if touching:
+                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
+            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
+            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
+            u, touching, _, _ = advance(
+                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
+            )
+        change = abs(u - before)
+        for m in range(arms.size):
+            change = max(change, abs(arms[0, m] - last[m]))
+        if line.periodic and change <= 1e-13 * abs(u):
+            return True, u
+    return not line.periodic, u
+
+
+@njit(nogil=True, cache=True)
+def note_edges(solid: Foundation, line: Line, state: State, depth: float, reach: float, load: float) -> None:
+    """Note where the edges are in a steady state."""
+    room = _room_for(solid, line.height.size - 1)
+    under_elements(line, 0.0, room.under, room.slope)
+    forces_now(solid, state, room, depth, 0.0, reach, load, -1 if line.periodic else 0)

@@ -1,0 +1,218 @@
+"""Units of campaign files and tables to SI: the one list, and the only module that knows pint."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from mdr_dask.errors import did_you_mean
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+#: In pint's language. Its own list has 900 units, takes ten times as long to read, and holds single letters that are
+#: rather mistakes in a campaign (``c``, ``e``, ``M``); here angles have a dimension of their own.
+DEFINITIONS = """
+yocto- = 1e-24 = y-
+zepto- = 1e-21 = z-
+atto- = 1e-18 = a-
+femto- = 1e-15 = f-
+pico- = 1e-12 = p-
+nano- = 1e-9 = n-
+micro- = 1e-6 = µ- = μ- = u-
+milli- = 1e-3 = m-
+centi- = 1e-2 = c-
+deci- = 1e-1 = d-
+hecto- = 1e2 = h-
+kilo- = 1e3 = k-
+mega- = 1e6 = M-
+giga- = 1e9 = G-
+tera- = 1e12 = T-
+peta- = 1e15 = P-
+meter = [length] = m = metre
+second = [time] = s = sec
+gram = [mass] = g
+kelvin = [temperature]; offset: 0 = K
+radian = [angle] = rad
+ampere = [current] = A
+mole = [substance] = mol
+degree_Celsius = kelvin; offset: 273.15 = °C = degC = celsius = degreeC
+percent = 0.01
+permille = 0.001 = ‰
+ppm = 1e-6
+degree = 0.017453292519943295 * radian = deg = °
+arcminute = degree / 60 = arcmin
+arcsecond = degree / 3600 = arcsec
+turn = 6.283185307179586 * radian = _ = revolution = rev
+revolutions_per_minute = turn / minute = rpm
+minute = 60 * second = min
+hour = 3600 * second = h = hr
+day = 86400 * second = d
+year = 31557600 * second = a
+hertz = 1 / second = Hz
+inch = 0.0254 * meter = in
+foot = 0.3048 * meter = ft
+angstrom = 1e-10 * meter = Å
+liter = 1e-3 * meter ** 3 = L = l = litre
+tonne = 1e6 * gram = t
+newton = kilogram * meter / second ** 2 = N
+kilogram_force = 9.80665 * newton = kgf
+pound_force = 4.4482216152605 * newton = lbf
+pascal = newton / meter ** 2 = Pa
+bar = 1e5 * pascal
+atmosphere = 101325 * pascal = atm
+psi = pound_force / inch ** 2
+joule = newton * meter = J
+electron_volt = 1.602176634e-19 * joule = eV
+watt = joule / second = W
+poise = 0.1 * pascal * second = P
+stokes = 1e-4 * meter ** 2 / second = St
+volt = joule / ampere / second = V
+ohm = volt / ampere = Ω
+siemens = ampere / volt = S
+"""
+
+#: What a quantity of a SI unit is called in messages, with an example of how to write one.
+_MEANINGS = {
+    "1": ("a number", ""),
+    "m": ("a length", "20 mm"),
+    "1/m": ("an inverse length", "5 1/mm"),
+    "m/s": ("a velocity", "1 mm/s"),
+    "m/s^2": ("an acceleration", "1 m/s^2"),
+    "m^2": ("an area", "4 mm^2"),
+    "m^3": ("a volume", "1 mm^3"),
+    "s": ("a time", "1 ms"),
+    "1/s": ("a rate", "10 1/s"),
+    "N": ("a force", "1 mN"),
+    "N/m": ("a force per length", "1 N/mm"),
+    "Pa": ("a pressure", "10 MPa"),
+    "1/Pa": ("an inverse pressure", "20 1/GPa"),
+    "Pa s": ("a viscosity", "10 mPa s"),
+    "m^2/s": ("a diffusivity", "1 mm^2/s"),
+    "rad": ("an angle", "5 deg"),
+    "rad/s": ("an angular frequency", "10 rad/s"),
+    "K": ("a temperature", "300 K"),
+    "1/K": ("an inverse temperature", "1e-3 1/K"),
+    "kg": ("a mass", "1 g"),
+    "kg/m^3": ("a density", "870 kg/m^3"),
+    "J": ("an energy", "1 mJ"),
+    "W": ("a power", "1 W"),
+}
+
+#: What a unit may be: short, and with exponents of at most two digits. Others would keep pint busy for ever.
+_MOST_LETTERS = 60
+_UNTOLD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
+
+_NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)")
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
+
+
+def to_si(value: str, unit: str) -> float:
+    """Convert a number with its unit to SI.
+
+    Parameters
+    ----------
+    value : str
+        Such as ``"20 mm"``; without a unit it is in SI already.
+    unit : str
+        The coherent SI unit wanted, ``"1"`` for a pure number.
+
+    Returns
+    -------
+    float
+        Correctly rounded for decimal units: ``"1.1 mm"`` is 0.0011, not 1.1 x 0.001.
+
+    Raises
+    ------
+    ValueError
+        If it is no number with a unit, the unit is unknown or of another dimension.
+    """
+    match = _QUANTITY.match(value)
+    if match is None or _NOT_A_UNIT.match(match[2]) or len(match[2]) > _MOST_LETTERS or _UNTOLD_POWER.search(match[2]):
+        shown = value if len(value) <= _MOST_LETTERS else value[:_MOST_LETTERS] + "..."
+        raise ValueError(f"expected {expected(unit)}, got {shown!r}")
+    number, given = match.groups()
+    if not math.isfinite(float(number)):
+        raise ValueError(f"expected a finite number, got {value!r}")
+    try:
+        factor, offset = _conversion(given, unit) if given else (1.0, 0.0)
+    except ValueError as error:
+        raise ValueError(f"{error}, got {value!r}") from None
+    si = _times(number, factor) + offset
+    if not math.isfinite(si):
+        raise ValueError(f"expected a finite number, got {value!r}")
+    return si
+
+
+def expected(unit: str) -> str:
+    """Return how a message names a quantity of a unit: ``a length (such as '20 mm')``."""
+    spaced = unit.replace("*", " ").replace("**", "^")
+    name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
+    return f"{name} (such as {example!r})" if example else name
+
+
+def example_unit(unit: str) -> str:
+    """Return a unit that a user would write for a quantity of a SI unit: MPa for Pa."""
+    return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
+
+
+def is_unit(text: str) -> bool:
+    """Return whether a text is a unit of the list."""
+    if _NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text):
+        return False
+    try:
+        registry().parse_units(_spelling(text))
+    except Exception:  # whatever its tokens happen to raise
+        return False
+    return True
+
+
+def _times(number: str, factor: float) -> float:
+    power = round(math.log10(factor))
+    if math.isclose(factor, 10.0**power, rel_tol=1e-12):
+        return float(Decimal(number).scaleb(power))
+    return float(number) * factor
+
+
+@lru_cache(maxsize=1)
+def registry() -> UnitRegistry[Any]:
+    """Return the units of a campaign file; pint is imported here and not before."""
+    from pint import UnitRegistry
+
+    units: UnitRegistry[Any] = UnitRegistry(None)
+    units.load_definitions(DEFINITIONS.split("\n"))
+    return units
+
+
+@lru_cache(maxsize=1024)
+def _conversion(given: str, unit: str) -> tuple[float, float]:
+    from pint.errors import DimensionalityError, UndefinedUnitError
+
+    units = registry()
+    try:
+        source, target = (units.parse_units(_spelling(text)) for text in (given, unit))
+        zero, one = (units.Quantity(size, source).to(target).magnitude for size in (0.0, 1.0))
+    except UndefinedUnitError as error:
+        word = error.args[0] if isinstance(error.args[0], str) else next(iter(error.args[0]))
+        raise ValueError(f"unknown unit {word!r}{_nearest(word)}") from None
+    except DimensionalityError:
+        raise ValueError(f"expected {expected(unit)}") from None
+    except Exception:  # pint's parser raises what its tokens happen to raise: TypeError, AssertionError, ...
+        raise ValueError(f"expected {expected(unit)}") from None
+    return (1.0, zero) if zero else (one, 0.0)
+
+
+def _spelling(unit: str) -> str:
+    unit = unit.replace("%", " percent ").strip()
+    return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
+
+
+def _nearest(word: str) -> str:
+    if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
+        return ", temperatures are in 'degC', '°C' or 'K'"
+    common = "m mm um nm s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent"
+    hint = did_you_mean(word, common.split())
+    return hint if "mean" in hint else ""

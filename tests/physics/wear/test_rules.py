@@ -1,0 +1,176 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
+from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
+from mdr_dask.physics.mdr.transforms import forward_transform, power_factor
+from mdr_dask.physics.wear import rules as wear
+
+PARABOLA, CONE = PowerProfile(2.0), PowerProfile(1.0)
+
+
+def test_checked_limit_of_the_parabola():
+    worn = wear.limit(PARABOLA, 0.455)
+    assert worn.contact_radius == pytest.approx(1.24835394, abs=5e-9)  # printed digits
+    assert worn.wear_volume == pytest.approx(0.9181587, abs=5e-8)
+
+
+@pytest.mark.parametrize("t", [0.05, 0.4, 1.0, 1.4, 1.55])
+def test_limit_radius_is_the_parametric_form(t):
+    for profile, form in ((PARABOLA, wear.parabola_limit_radius), (CONE, wear.cone_limit_radius)):
+        c, a = form(t)
+        assert wear.limit_radius(profile, float(c)) == pytest.approx(float(a), rel=1e-12)
+
+
+def test_printed_limit_of_the_parabola_is_low_by_at_most_3_6_percent():
+    c, a = wear.parabola_limit_radius(np.linspace(0.01, 1.57, 400))
+    low = 1 - wear.printed_parabola_limit(c) / a
+    assert low.min() > -1e-12
+    assert low.max() == pytest.approx(0.036, abs=0.0005)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0, 3.3, 10.0])
+@pytest.mark.parametrize("c", [0.02, 0.455, 0.97])
+def test_limit_leaves_no_step_and_conserves_volume(exponent, c):
+    worn, profile = wear.limit(PowerProfile(exponent), c), PowerProfile(exponent)
+    a = worn.contact_radius
+    at_edge = worn.height(np.array([a * (1 - 1e-12)]))[0] - profile.height(np.array(a))
+    assert abs(at_edge) < 1e-10 * (1 - c**exponent) + 1e-13
+
+    def ring(r):
+        return 2 * np.pi * r * float(worn.height(np.array([r]))[0] - profile.height(np.array(r)))
+
+    assert worn.wear_volume == pytest.approx(quad(ring, c, a, epsabs=1e-11)[0], rel=1e-6)  # the root at c limits quad
+
+
+def test_image_beyond_the_scar_restores_the_virgin_profile():
+    worn = wear.limit(PARABOLA, 0.455)
+    a = worn.contact_radius
+    r = np.array([1.3, 2.0])
+    # f = f0 outside, from g over the whole line
+    from mdr_dask.physics.mdr.transforms import inverse_transform
+
+    f = inverse_transform(lambda x: worn.image(x.ravel()).reshape(x.shape), r, breaks=[0.455, a], tolerance=1e-7).value
+    np.testing.assert_allclose(f, r**2 / 2, atol=2e-6)  # a root singularity at a limits the Gauss rule
+
+
+def test_limit_pressure_lives_on_the_stick_area_only():
+    worn = wear.limit(PARABOLA, 0.455)
+    p = worn.pressure(np.array([0.1, 0.3, 0.5, 0.9]))
+    r = np.array([0.1, 0.3])
+    exact = 2 / np.pi * np.sqrt(0.455**2 - r**2) + (1 - 0.455**2) / np.pi / np.sqrt(0.455**2 - r**2)
+    np.testing.assert_allclose(p[:2], exact, rtol=1e-8)
+    np.testing.assert_allclose(p[2:], 0, atol=1e-10)
+
+
+def test_fast_rule_solves_its_equation():
+    c, xi, h = 0.455, 0.8, 1e-5
+    x = np.array([0.5, 0.8, 0.99, 1.05, 1.1])
+    before, now, after = (wear.fast(PARABOLA, c, N, xi).image(x) for N in (3 - h, 3.0, 3 + h))
+    rate = (after - before) / (2 * h)
+    eta, g_c, a = 1 - c**2, c**2, wear.limit_radius(PARABOLA, c)
+    expected = xi / a * np.where(x < 1, (1 - now) * (now - g_c) / eta, -(now - 1))
+    np.testing.assert_allclose(rate, expected, rtol=1e-6)  # central difference
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 3.5])
+def test_fast_rule_starts_at_the_virgin_body_and_ends_at_the_limit(exponent):
+    profile = PowerProfile(exponent)
+    r = np.linspace(0.0, 1.5, 40)
+    np.testing.assert_allclose(wear.fast(profile, 0.4, 0.0).height(r), profile.height(r), atol=1e-14)
+    end, limit = wear.fast(profile, 0.4, 60.0), wear.limit(profile, 0.4)
+    np.testing.assert_allclose(end.height(r), limit.height(r), atol=1e-8)
+    assert end.wear_volume == pytest.approx(limit.wear_volume, rel=1e-8)
+
+
+def change(x, n, c, rest):
+    """g - g0 of the rule as the equations have it."""
+    eta, start = 1 - c**n, (x**n - c**n) / (1 - c**n)
+    inside = eta * (start / (start + (1 - start) * rest) - start)
+    return inside if x <= 1 else (x**n - 1) * (rest - 1)
+
+
+def quadrature(n, c, cycles, xi=0.8):
+    """Scar, volume and force by a bracketed root and 80 Gauss nodes in each of many pieces of x = r cos(phi)."""
+    rest = np.exp(-xi * cycles / wear.limit_radius(PowerProfile(n), c))
+    node, weight = np.polynomial.legendre.leggauss(80)
+    inner = [c + (1 - c) * 10.0**-k for k in range(9, -1, -1)]
+
+    def integral(term, ends):
+        return sum(
+            0.5
+            * (high - low)
+            * sum(w * term(0.5 * (low + high + (high - low) * t)) for t, w in zip(node, weight, strict=True))
+            for low, high in pairwise(ends)
+        )
+
+    def worn(r, moment):
+        def term(phi):
+            return change(r * np.cos(phi), n, c, rest) * (r * np.sin(phi)) ** (2 * moment)
+
+        return integral(term, [0.0, *(np.arccos(x / r) for x in (*inner[::-1], c) if x < r)])
+
+    limit = wear.limit_radius(PowerProfile(n), c)
+    scar = brentq(lambda r: worn(r, 0), 1.0 + 1e-9, limit) if worn(limit, 0) < 0 else limit
+    load = c - c ** (n + 1) / (n + 1) + integral(lambda x: 1 - x**n - change(x, n, c, rest), [c, *inner])
+    return scar, 4 * worn(scar, 1), 2 * load
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 2.7])
+@pytest.mark.parametrize("cycles", [0.3, 4.0])
+@pytest.mark.parametrize("c", [0.05, 0.455, 0.9])
+def test_the_fast_rule_by_quadrature(exponent, cycles, c):
+    """Compiled cases and single contacts against the rule's own equations, independently integrated."""
+    expected = quadrature(exponent, c, cycles)
+    radius = wear.limit_cases(exponent, c)[0]
+    fast = wear.fast(PowerProfile(exponent), c, cycles, 0.8)
+    single = (fast.contact_radius, fast.wear_volume, fast.normal_force)
+    for found in (wear.fast_cases(exponent, c, cycles, 0.8, radius), single):
+        np.testing.assert_allclose([float(part) for part in found], expected, rtol=2e-6)  # the stated relative error
+
+
+def test_table_of_a_parabola_wears_as_the_parabola():
+    r = np.linspace(0, 3, 301)
+    table = from_table(r, r**2 / 2, 1.0)
+    exact, measured = wear.limit(PARABOLA, 0.455), wear.limit(table, 0.455)
+    assert measured.contact_radius == pytest.approx(exact.contact_radius, rel=1e-8)
+    assert measured.wear_volume == pytest.approx(exact.wear_volume, rel=1e-8)
+    some = np.array([0.2, 0.7, 1.1])
+    np.testing.assert_allclose(
+        wear.fast(table, 0.455, 4.0).height(some), wear.fast(PARABOLA, 0.455, 4.0).height(some), atol=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("radius", "height", "message"),
+    [
+        ([0, 1, 2, 3], [0, 1, 0.5, 2], "must rise with the radius"),
+        ([0, 1, 2, 3], [0, 1, np.nan, 2], "must be finite"),
+        ([1, 2, 3, 4], [0, 1, 2, 3], "must start at 0"),
+        ([0, 1, 2, 3], [0, 1, 2, 3], "beyond the table"),
+        ([0, 1], [0, 1], "at least 4 rows"),
+    ],
+)
+def test_bad_tables(radius, height, message):
+    with pytest.raises(ValueError, match=message):
+        from_table(radius, height, 100.0)
+
+
+def test_scar_beyond_the_table():
+    r = np.linspace(0, 1.1, 60)
+    with pytest.raises(ValueError, match="beyond the table"):
+        wear.limit(from_table(r, r**2 / 2, 1.0), 0.3)
+
+
+@pytest.mark.parametrize("c", [0.0, 1.0, -0.3, np.nan])
+def test_no_partial_slip(c):
+    with pytest.raises(ValueError, match="gross slip"):
+        wear.limit(PARABOLA, c)
+
+
+def test_power_factor_is_consistent():
+    g = forward_transform(lambda r: r / power_factor(2.0) * 2, [1.0]).value
+    assert g[0] == pytest.approx(1.0)

@@ -1,0 +1,74 @@
+"""The one bootstrap: does a 95 % interval hold the truth, with few realisations and with errors of the numbers?"""
+
+import numpy as np
+import pytest
+
+from mdr_dask import bootstrap
+
+
+@pytest.mark.parametrize("count", [5, 12, 60])
+def test_interval_of_a_mean_of_few(count: int) -> None:
+    values = np.random.default_rng(3).normal(2.0, 1.0, (count, 2000))
+    low, high = bootstrap.interval(bootstrap.means(values), count)
+    # 400 resamples and percentiles of five values leave a few per cent
+    assert np.mean((low < 2) & (high > 2)) == pytest.approx(0.95, abs=0.035)
+
+
+def test_interval_of_what_is_positive_is_the_same_for_its_inverse() -> None:
+    samples = bootstrap.means(np.random.default_rng(4).lognormal(0.0, 1.0, (20, 3)))
+    low, high = bootstrap.interval(samples, 20, positive=True)
+    other_low, other_high = bootstrap.interval(1 / samples, 20, positive=True)
+    # percentiles between two resamples are interpolated in logarithms in both
+    assert np.allclose([1 / high, 1 / low], [other_low, other_high], rtol=1e-12)
+    assert np.all(np.isnan(bootstrap.interval(samples, 1)))
+
+
+def test_a_realisation_that_failed_somewhere_is_left_out_everywhere() -> None:
+    values = np.random.default_rng(6).normal(size=(6, 4))
+    values[2, 1] = np.nan
+    found = bootstrap.means(bootstrap.complete(values))
+    assert np.allclose(found[0], np.delete(values, 2, axis=0).mean(axis=0))
+    values[1:, 0] = np.nan  # one realisation is left
+    found = bootstrap.means(bootstrap.complete(values))
+    assert np.allclose(found[0], values[0])
+    assert np.all(np.isnan(found[1:]))
+    assert np.all(np.isnan(bootstrap.interval(found, 6)))
+
+
+@pytest.mark.parametrize("count", [5, 10, 30])
+@pytest.mark.parametrize("size", [0.1, 1.0, 5.0])
+def test_an_error_of_every_realisation_alike_is_held_beside_their_scatter(count: int, size: float) -> None:
+    """The grid is wrong by what it states, and by the same in all realisations: a root of squares would hold 80 %."""
+    error = size * 1.96 / np.sqrt(count)
+    values = np.random.default_rng(5).normal(2.0 + error, 1.0, (count, 2000))
+    stack = bootstrap.means(values)
+    low, high = bootstrap.interval(np.concatenate([stack, stack[:1] + error, stack[:1] - error]), count)
+    assert np.mean((low < 2) & (high > 2)) > 0.94
+
+
+def test_values_are_moved_by_every_error_once() -> None:
+    values, errors = np.arange(70.0).reshape(7, 10), np.full((7, 10), -0.5)
+    errors[3, 3] = np.nan
+    rows = bootstrap.moved(values, errors)
+    assert rows.shape == (2 * bootstrap.GROUPS, 7, 10)
+    total = (rows[0::2] - values).sum(axis=0)
+    assert np.array_equal(rows[1::2] - values, -(rows[0::2] - values))
+    assert total[3, 3] == 0
+    assert np.all(np.delete(total.ravel(), 33) == 0.5)
+    assert bootstrap.moved(values[0, :3], errors[0, :3]).shape == (6, 3)
+
+
+@pytest.mark.parametrize("count", [5, 10, 30])
+def test_a_law_that_holds_is_doubted_as_often_as_it_says(count: int) -> None:
+    """Straight lines through eight cases; lines of their own, and lines that all cases share."""
+    rng, x = np.random.default_rng(9), np.linspace(-1, 1, 8)
+    design = np.vstack([np.ones(8), x]).T
+    left = np.eye(8) - design @ np.linalg.pinv(design)
+    found = []
+    for _ in range(300):
+        values = design @ [1.0, 2.0] + rng.normal(0, 0.3, (count, 8)) + rng.normal(0, 0.5, (count, 1))
+        found.append(bootstrap.chance(bootstrap.means(values) @ left, count))
+    # few lines know their scatter badly, and are given the benefit of the doubt
+    assert np.mean(np.array(found) < 0.05) < 0.07
+    bent = bootstrap.means(values + 2 * x**2) @ left
+    assert bootstrap.chance(bent, count) < 0.05

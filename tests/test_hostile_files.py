@@ -1,0 +1,109 @@
+"""Files of strangers: one sentence at once, nothing for the terminal; and a fault of the program itself."""
+
+import json
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+from mdr_dask import cli, datasets
+from mdr_dask.campaign import loads
+from mdr_dask.cli import main
+from mdr_dask.errors import CampaignError, StoreError
+
+HEAD = "name: a\nmodel: toy\n"
+HOSTILE = {
+    "nested lists": HEAD + "parameters: {position: " + "[" * 5000 + "]" * 5000 + "}\n",
+    "nested mappings": HEAD + "parameters: " + "{a: " * 5000 + "1" + "}" * 5000 + "\n",
+    "a key of aliases": HEAD
+    + "a: &a [x, x]\n"
+    + "".join(f"b{i}: &{chr(98 + i)} [*{chr(97 + i)}, *{chr(97 + i)}]\n" for i in range(24))
+    + "? [*y, *y]\n: 1\n",
+    "a long whole number": HEAD + "seed: " + "9" * 5000 + "\nparameters: {}\n",
+    "a long number": HEAD + "parameters: {position: " + "9" * 5000 + ".5}\n",
+    "a unit that never ends": HEAD + "parameters: {position: 1 m**9**9**9**9}\n",
+    "a number beyond all bounds": HEAD + "parameters: {position: 1e999999999 m}\n",
+    "a null character": HEAD + 'parameters: {}\nstore: {path: "a\\0b"}\n',
+    "a null character in a table": HEAD + 'parameters: {}\nsampling: {table: "a\\0b"}\n',
+    "an endless table": HEAD + "parameters: {}\nsampling: {table: /dev/zero}\n",
+    "a series that ends like a leftover": HEAD + "parameters: {}\nseries: {x.partial: {}}\n",
+    "a series called like metadata": HEAD + "parameters: {}\nseries: {zarr.json: {}}\n",
+    "a series with a long name": HEAD + "parameters: {}\nseries: {" + "x" * 300 + ": {}}\n",
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_campaign_is_refused_at_once(toy, kind):
+    began = time.process_time()
+    with pytest.raises(CampaignError) as caught:
+        loads(HOSTILE[kind], "a.yaml", ".")
+    assert time.process_time() - began < 5
+    lines = str(caught.value).splitlines()
+    assert all(line.startswith("a.yaml:") and len(line) < 600 for line in lines)
+
+
+@pytest.fixture
+def filled(toy, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = HEAD + "realisations: 3\nparameters: {position: [1, 2, 3], fail_above: 2.5}\noutputs: [height]\n"
+    Path("a.yaml").write_text(text)
+    assert main(["run", "a.yaml", "--quiet"]) == 1
+    capsys.readouterr()
+    return Path("results/a.zarr")
+
+
+@pytest.mark.parametrize("harm", ["flip", "delete", "swap"])
+def test_a_damaged_axis_is_named_and_not_read(filled, harm, capsys):
+    chunk = filled / "position/c/0"
+    if harm == "delete":
+        chunk.unlink()
+    elif harm == "swap":
+        zarr.open_array(filled / "position", mode="r+")[:] = np.array([1.0, 3.0, 2.0])
+    else:
+        content = bytearray(chunk.read_bytes())
+        content[len(content) // 2] ^= 1
+        chunk.write_bytes(bytes(content))
+    with pytest.raises(StoreError, match="damaged"):
+        datasets(str(filled))
+    assert main(["show", str(filled)]) == 2
+    assert "damaged" in capsys.readouterr().err
+
+
+def test_messages_speak_to_the_user_and_not_to_the_terminal(filled, capsys):
+    record = next(path for path in (filled / "status/records").glob("*.json") if "fail_above" in path.read_text())
+    text = json.loads(record.read_text())
+    for message in text["messages"]:
+        message["message"] = "\x1b]0;owned\x07 \x1b[31mred"
+    record.write_text(json.dumps(text))
+    assert main(["status", str(filled), "--failures"]) == 0
+    shown = capsys.readouterr().out
+    assert "\x1b" not in shown
+    assert "\\x1b[31mred" in shown
+
+
+def test_a_store_that_would_be_gone_at_the_end_is_refused(filled, capsys):
+    assert main(["run", "a.yaml", "--store", "memory://a"]) == 2
+    assert "expected a store that outlasts this command" in capsys.readouterr().err
+
+
+def test_a_link_to_itself_is_one_sentence(filled, capsys):
+    Path("loop.zarr").symlink_to("loop.zarr")
+    assert main(["run", "a.yaml", "--store", "loop.zarr"]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_a_fault_of_the_program_has_its_own_exit_code_and_a_report(filled, monkeypatch, capsys):
+    def broken(*_):
+        raise RuntimeError("wheels came off")
+
+    monkeypatch.setattr("mdr_dask.store.datasets", broken)
+    assert main(["status", str(filled)]) == cli.BROKE == 3
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert "RuntimeError: wheels came off" in said
+    report = Path(said.split()[-1])
+    assert "Traceback" in report.read_text()
+    assert f"mdr-dask status {filled}" in report.read_text()
+    report.unlink()

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import math
+import re
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mdr_dask import models
+from mdr_dask.campaign.reference import output_rows, parameter_rows
+from mdr_dask.units import expected, registry, to_si
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "value"),
+    [
+        ("20 mm", "m", 0.02),
+        ("20mm", "m", 0.02),
+        ("+2e1 mm", "m", 0.02),
+        ("0.02", "m", 0.02),
+        ("1.1 mm", "m", 0.0011),
+        ("0.7 um", "m", 7e-7),
+        ("0.7 μm", "m", 7e-7),
+        ("0.7 µm", "m", 7e-7),
+        ("0.7 micrometers", "m", 7e-7),
+        ("1 %", "1", 0.01),
+        ("12.5%", "1", 0.125),
+        ("3 ppm", "1", 3e-6),
+        ("180 deg", "rad", math.pi),
+        ("180°", "rad", math.pi),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("20 degC", "K", 293.15),
+        ("-273.15 °C", "K", 0.0),
+        ("300 K", "K", 300.0),
+        ("10 MPa", "Pa", 1e7),
+        ("10 N/mm^2", "Pa", 1e7),
+        ("10 N/mm²", "Pa", 1e7),
+        ("10 mPa s", "Pa s", 0.01),
+        ("10 mPa*s", "Pa*s", 0.01),
+        ("1 cP", "Pa s", 0.001),
+        ("20 1/GPa", "1/Pa", 2e-8),
+        ("20 GPa^-1", "1/Pa", 2e-8),
+        ("5 /ms", "1/s", 5000.0),
+        ("5 kHz", "1/s", 5000.0),
+        ("2 J/(g K)", "J/(kg K)", 2000.0),
+        ("1 cSt", "m^2/s", 1e-6),
+        ("1.5 min", "s", 90.0),
+        ("1 in", "m", 0.0254),
+        ("870 kg/m^3", "kg/m^3", 870.0),
+    ],
+)
+def test_quantities_become_si(written, unit, value):
+    assert to_si(written, unit) == pytest.approx(value, rel=4e-16, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "message"),
+    [
+        ("3 s", "m", r"expected a length \(such as '20 mm'\), got '3 s'"),
+        ("5 %", "rad", r"expected an angle \(such as '5 deg'\), got '5 %'"),
+        ("5 deg", "1", "expected a number, got '5 deg'"),
+        ("1 Hz", "rad/s", r"expected an angular frequency \(such as '10 rad/s'\), got '1 Hz'"),
+        ("3 Mpa", "Pa", r"unknown unit 'Mpa' \(did you mean 'MPa'\?\), got '3 Mpa'"),
+        ("1,5 mm", "m", "expected a length"),
+        ("1 2 mm", "m", "expected a length"),
+        ("3 mm^", "m", "expected a length"),
+        ("3 (", "m", "expected a length"),
+        ("ten mm", "m", "expected a length"),
+        ("1e400 m", "m", "expected a finite number, got '1e400 m'"),
+    ],
+)
+def test_what_is_no_such_quantity_is_refused(written, unit, message):
+    with pytest.raises(ValueError, match=message):
+        to_si(written, unit)
+
+
+@given(st.floats(1e-9, 1e9), st.sampled_from([("nm", -9), ("um", -6), ("mm", -3), ("cm", -2), ("km", 3), ("Gm", 9)]))
+def test_decimal_units_round_once(number, unit):
+    name, power = unit
+    mantissa, _, exponent = f"{number!r}".partition("e")
+    assert to_si(f"{number!r} {name}", "m") == float(f"{mantissa}e{int(exponent or 0) + power}")
+
+
+def test_every_unit_named_in_messages_is_readable():
+    for unit in ("m", "m/s", "s", "N", "N/m", "Pa", "1/Pa", "Pa s", "rad", "K", "kg/m^3", "m^2/s"):
+        example = expected(unit).split("'")[1]
+        assert to_si(example, unit) > 0
+
+
+def test_registry_is_read_once():
+    assert registry() is registry()
+
+
+COHERENT = {"m", "s", "kg", "N", "Pa", "K", "rad", "J", "W", "S", "ohm", "mol", "Hz"}
+
+
+@pytest.mark.parametrize("name", models.NAMES)
+def test_models_declare_units_that_are_si(name):
+    model = pytest.importorskip(f"mdr_dask.models.{name}").MODEL
+    units = {row["unit"] for row in (*parameter_rows(model), *output_rows(model))} - {"", "1"}
+    for unit in units - {"m^(1-n)"}:  # of a power-law coefficient: depends on its exponent, so a number only
+        assert set(re.findall("[A-Za-zµΩ°%]+", unit)) <= COHERENT
+        assert to_si(f"1 {unit}", unit) == 1.0
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "1 m**9**9**9**9",
+        "1 m/s*(9**9**9**9)",
+        "1 m^(9^9^9^9)/s",
+        "1 m^200",
+        "1 " + "x" * 100_000,
+        "1e999999999 m",
+        "1 m**1.5",
+    ],
+)
+def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
+    began = time.process_time()
+    with pytest.raises(ValueError, match="expected"):
+        to_si(value, "m")
+    assert time.process_time() - began < 1
