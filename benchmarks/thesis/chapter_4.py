@@ -6,7 +6,7 @@ from benchmarks.thesis.ledger import Claim, Found, Studies, Verdict, interval, j
 
 RUN, FIT = "mdr-dask run campaigns/kinetics2014.yaml", "mdr-dask fit results/kinetics2014.zarr {}"
 #: A few speeds and Hurst exponents of the thesis's series.
-FEW = {"series_velocity": "{velocity: {geometric: [0.1 mm/s, 10 m/s, 12]}, hurst: [0, 0.3, 0.7, 1]}"}
+FEW = {"series_velocity": "{velocity: {geometric: [10 um/s, 10 m/s, 15]}, hurst: [0, 0.3, 0.7, 1]}"}
 
 
 def _law(name: str):
