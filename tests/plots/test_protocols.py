@@ -67,7 +67,7 @@ def test_an_axis_stands_at_its_first_value() -> None:
 
 def test_missing_outputs_are_named() -> None:
     data = dataset({"shape": "jump"}).drop_vars("friction_coefficient_before")
-    with pytest.raises(DataError, match="expected the outputs friction_coefficient"):
+    with pytest.raises(DataError, match="no series of the store holds friction_coefficient_before"):
         draw_protocols({"": data})
 
 

