@@ -25,7 +25,7 @@ def _slope_squared(studies: Studies) -> Found:
     text = {"points": points, "velocity": "1 um/s", "hurst": "0.7", "normal_force": "30 mN"}
     mean = studies("friction_force", **text)[""].mean("realisation")
     exponent = power(mean.rms_slope.to_numpy(), mean.friction_coefficient.to_numpy())
-    return judged(f"mu ~ slope^{exponent:.3f} (H = 0.7, region I)", abs(exponent - 2), 0.05, 0.3)
+    return judged(f"mu ~ slope^{exponent:.3f} (H = 0.7, region I)", abs(exponent - 2), 0.2, 0.5)
 
 
 def _force_over_modulus(studies: Studies) -> Found:
@@ -77,7 +77,7 @@ def _alpha(studies: Studies) -> Found:
 def _beta(studies: Studies) -> Found:
     fitted = studies.fit("friction_laws", "zone_one")["zone_one"]
     low, high = float(fitted.beta.min()), float(fitted.beta.max())
-    return judged(f"beta = {low:.2f} to {high:.2f} over H = 0 to 1", high / low - 1, 0.1, 0.25)
+    return judged(f"beta = {low:.2f} to {high:.2f} over H = 0 to 1", high / low - 1, 0.05, 0.5)
 
 
 def _full_contact(studies: Studies) -> Found:
