@@ -351,6 +351,20 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
     return found
 
 
+def parameters_at(case: xr.Dataset) -> dict[str, Any]:
+    """Return the parameters of one case: those of its series, with the values that its axes have there."""
+    parameters = parameters_of(case)
+    for axis in case.attrs.get("axes", []):
+        *above, last = axis["path"].split(".")
+        place = parameters
+        for key in above:
+            place = place[key]
+        value = case[axis["name"]].item()
+        labels = axis.get("labels")
+        place[last] = axis["values"][labels.index(value)] if labels else value
+    return parameters
+
+
 def draw(axes: Axes, curve: Curve, x: Any, y: Mean, bars: bool = False) -> None:
     """Draw a curve with its band, or with bars; points that belong on no line have bars."""
     across, value, low, high = (_flat(each) for each in (x, y.value, y.low, y.high))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -25,18 +24,10 @@ BEFORE = 0.08  # of the time shown
 
 def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
     """Return the data at the first value of every axis, the parameters there, and what is left out."""
-    parameters = json.loads(data.attrs["parameters"])
-    dims = set()
-    for axis in data.attrs.get("axes", []):
-        *above, last = axis["path"].split(".")
-        place = parameters
-        for key in above:
-            place = place[key]
-        place[last] = axis["values"][0]
-        dims.add(axis["dim"])
-    held = [dim for dim in curves.axes_of(data, AFTER) if dim in dims]
+    held = curves.axes_of(data, AFTER)
     told = [f"{data.sizes[dim] - 1} of {data.sizes[dim]} values of {dim} (drawn: the first)" for dim in held]
-    return data.isel(dict.fromkeys(held, 0)), VelocityJump.model_validate(parameters), told
+    case = data.isel(dict.fromkeys(held, 0))
+    return case, VelocityJump.model_validate(curves.parameters_at(case)), told
 
 
 def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
