@@ -12,7 +12,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Blocks, blocks_of, patches_at
-from mdr_dask.physics.sliding.steady import steady_sliding
+from mdr_dask.physics.sliding.steady import steady_on_cells
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -37,7 +37,6 @@ EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, 
 class Line(NamedTuple):
     """One periodic line as the sweep takes it and as the march does, with the barriers of some Deborah numbers."""
 
-    cubic: CubicLine
     cells: Cells
     blocks: Blocks
     track: Track
@@ -47,7 +46,7 @@ class Line(NamedTuple):
     def of(cls, line: CubicLine) -> Line:
         """Prepare a line."""
         cells = cut(line)
-        return cls(line, cells, blocks_of(cells), track_of(cells), {})
+        return cls(cells, blocks_of(cells), track_of(cells), {})
 
     def barriers(self, deborah: float) -> Barriers:
         """Return what is known of the barriers at a Deborah number in cells; cases in a row often share it."""
@@ -125,7 +124,7 @@ def ends_on(line: Line, loads: FloatArray, deborah: FloatArray, near: Ends | Non
         On another grid, where the searches for the depth begin; the answer does not depend on it.
     """
     guesses = None if near is None else near.depth.ravel()
-    steady = steady_sliding(line.cubic, deborah.ravel(), np.repeat(loads, 2), guesses)
+    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses)
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
