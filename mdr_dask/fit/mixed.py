@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -17,7 +14,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
 from mdr_dask.models.base import DataFile
-from mdr_dask.units import to_si
+from mdr_dask.tables import Column, read_table
 
 PROBABILITY = "breakthrough_probability"
 ERROR = "standard_error"
@@ -102,8 +99,8 @@ def read_measured(file: DataFile, units: Mapping[str, str]) -> dict[str, FloatAr
     Parameters
     ----------
     file : DataFile
-        CSV with a header; a column is a parameter of the model, ``breakthrough_probability`` or ``standard_error``,
-        each with its unit behind in brackets unless SI: ``temperature [degC]``, ``breakthrough_probability [%]``.
+        A column is a parameter of the model, ``breakthrough_probability`` or ``standard_error``, each with its unit:
+        ``temperature [degC]``, ``breakthrough_probability [%]``.
     units : mapping of str to str
         SI units of the columns allowed.
 
@@ -112,22 +109,8 @@ def read_measured(file: DataFile, units: Mapping[str, str]) -> dict[str, FloatAr
     DataError
         If a column is unknown, missing or holds something else than numbers.
     """
-    rows = [row for row in csv.reader(io.StringIO(file.read_text())) if row and not row[0].startswith("#")]
-    if len(rows) < 2:
-        raise DataError(f"{file.name}: expected a header and at least one row")
-    columns: dict[str, FloatArray] = {}
-    for number, title in enumerate(rows[0]):
-        match = re.fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", title)
-        if match is None or match[1] not in units:
-            raise DataError(f"{file.name}: expected columns of {', '.join(units)}, got {title.strip()!r}")
-        name, unit = match[1], match[2] or ""
-        try:
-            columns[name] = np.array([to_si(f"{row[number].strip()} {unit}", units[name]) for row in rows[1:]])
-        except (ValueError, IndexError) as error:
-            raise DataError(f"{file.name}: column {name}: {error}") from None
-    if PROBABILITY not in columns:
-        raise DataError(f"{file.name}: expected a column {PROBABILITY}")
-    return columns
+    columns = [Column(name, unit, needed=name == PROBABILITY) for name, unit in units.items()]
+    return read_table(file.read_text(), file.name, columns)
 
 
 def fit_breakthrough(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
