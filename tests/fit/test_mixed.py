@@ -151,7 +151,7 @@ def test_a_store_and_a_table_give_the_planted_value(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("speed, breakthrough_probability\n1, 0.5", r"measured\.csv:1:1: .*speed"),
+        ("speed, breakthrough_probability\n1, 0.5", r"measured.csv:1:1: unknown column 'speed' \(known: temperature"),
         ("temperature [degC]\n40\n", "breakthrough_probability"),
         ("temperature, breakthrough_probability\n40, 0.5", r"measured\.csv:1:1: .*temperature"),
         ("temperature [degC], breakthrough_probability\n40, -0.5", r"measured\.csv:2:5: "),
