@@ -76,7 +76,14 @@ def measured_case(generator, shape, path):
         "noise": generator.standard_normal(count),
     }[shape]
     heights = (heights - heights.mean()) / max(float(heights.std()), 1e-3)
-    np.savetxt(path, np.column_stack([np.arange(count) / count, heights]), delimiter=",", fmt="%.17g")
+    np.savetxt(
+        path,
+        np.column_stack([np.arange(count) / count, heights]),
+        delimiter=",",
+        header="x [m],z [m]",
+        comments="",
+        fmt="%.17g",
+    )
     profile = ProfileFile.model_validate({"file": str(path)})
     return SlidingFriction(profile=profile, **random_series(generator), normal_force=10 ** generator.uniform(-3, 3))
 

@@ -85,7 +85,8 @@ def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     for start in range(0, len(flat), step):
         rows = flat[start : start + step].T
         stack = bootstrap.means(rows[:count])
-        stack = np.concatenate([stack, stack[0] + np.nan_to_num(rows[count:])])
+        error = np.nan_to_num(rows[count:])
+        stack = np.concatenate([stack, stack[0] + error, stack[0] - error])
         number = np.isfinite(rows[:count]).sum(axis=0)
         bounds[start : start + step] = np.transpose(bootstrap.interval(stack, number))
     return bounds.reshape(*values.shape[:-1], 2)

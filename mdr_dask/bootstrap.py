@@ -55,14 +55,28 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values moved by errors of unknown sign, one group of neighbours after the other, shape (groups, ...)."""
+    """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...)."""
     flat = np.abs(np.where(np.isfinite(errors), errors, 0.0)).ravel()
     groups = np.array_split(np.arange(flat.size), max(1, min(GROUPS, flat.size)))
-    shifts = np.zeros((len(groups), flat.size))
-    for row, group in zip(shifts, groups, strict=True):
-        row[group] = flat[group]
+    shifts = np.zeros((2 * len(groups), flat.size))
+    for k, group in enumerate(groups):
+        shifts[2 * k, group], shifts[2 * k + 1, group] = flat[group], -flat[group]
     rows: FloatArray = values + shifts.reshape(-1, *values.shape)
     return rows
+
+
+def _reach(shifts: FloatArray) -> FloatArray:
+    """Return how far errors reach up together, from the shifts of every group up and down; NaN is none."""
+    known = np.where(np.isfinite(shifts), shifts, 0.0)
+    reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
+    return reach
+
+
+def regrouped(stack: FloatArray) -> FloatArray:
+    """Return a stack of cases, each with errors of its own, as a stack in which neighbouring cases err together."""
+    shifts = stack[1 + RESAMPLES :] - stack[0]
+    own = np.maximum(_reach(shifts), _reach(-shifts))
+    return np.concatenate([stack[: 1 + RESAMPLES], moved(stack[0], own)]) if np.any(own > 0) else stack[: 1 + RESAMPLES]
 
 
 def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tuple[FloatArray, FloatArray]:
@@ -74,8 +88,8 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
 
     Parameters
     ----------
-    stack : array, shape (1 + RESAMPLES + groups, ...)
-        The value, the resamples, and the values moved by their errors.
+    stack : array, shape (1 + RESAMPLES + 2 groups, ...)
+        The value, the resamples, and the values moved up and down by their errors.
     count : int or array
         Realisations n that were resampled.
     positive : bool
@@ -86,10 +100,11 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     known = np.isfinite(values[0]) & np.any(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) & (np.asarray(count) > 1)
     ends = np.full((2, *values.shape[1:]), np.nan)
     ends[:, known] = np.nanquantile(values[1 : 1 + RESAMPLES, known], _TAILS, axis=0)
-    error = np.abs(values[1 + RESAMPLES :] - values[0]).sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        shifts = values[1 + RESAMPLES :] - values[0]
     wider = widening(count)
-    low = values[0] + wider * np.minimum(ends[0] - values[0], 0.0) - error
-    high = values[0] + wider * np.maximum(ends[1] - values[0], 0.0) + error
+    low = values[0] + wider * np.minimum(ends[0] - values[0], 0.0) - _reach(-shifts)
+    high = values[0] + wider * np.maximum(ends[1] - values[0], 0.0) + _reach(shifts)
     return (np.exp(low), np.exp(high)) if positive else (low, high)
 
 
@@ -105,17 +120,20 @@ def widening(count: ArrayLike) -> FloatArray:
     return wider
 
 
-def chance(residuals: FloatArray, count: int) -> float:
+def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return how often scatter and errors alone leave residuals as large as those of the first row.
 
     Parameters
     ----------
-    residuals : array, shape (1 + RESAMPLES + groups, cases)
+    residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
         Stack of data less law. If the law holds, the first row is to the truth as the resamples are to the first row.
     count : int
         Realisations that were resampled.
+    draws : int
+        Resamples among the rows.
     """
-    size = np.sqrt(np.sum(residuals[0] ** 2))
-    away = np.sqrt(np.sum((residuals[1:] - residuals[0]) ** 2, axis=1))
-    alone = widening(count) * away[:RESAMPLES] + away[RESAMPLES:].sum()
+    flat = residuals.reshape(residuals.shape[0], -1)
+    size = np.sqrt(np.sum(flat[0] ** 2))
+    away = np.sqrt(np.sum((flat[1:] - flat[0]) ** 2, axis=1))
+    alone = widening(count) * away[:draws] + _reach(away[draws:])
     return float(np.mean(alone >= size))

@@ -226,10 +226,16 @@ def _units(headings: Sequence[tuple[Cell, ...]], width: int) -> tuple[tuple[Cell
     for cell in headings[0]:
         match = _WITH_UNIT.match(cell.text)
         names.append(Cell(match[1] if match else cell.text, cell.line, cell.column))
-        units.append((match[2] or match[3] or "").strip() if match else "")
+        units.append(_bracketed(match) if match else "")
     if len(headings) == 2:
         units = [cell.text.strip("[]() ") or unit for cell, unit in zip(headings[1], units, strict=True)]
     return tuple(names), tuple(units)
+
+
+def _bracketed(match: re.Match[str]) -> str:
+    """Return a unit in brackets; what stands in round ones may be a remark."""
+    square, round_ = match[2], (match[3] or "").strip()
+    return (square or "").strip() or (round_ if is_unit(round_) or round_ in _CELSIUS else "")
 
 
 def _separator(first: str, last: str) -> str | None:
@@ -293,7 +299,9 @@ def _matched(sheet: Sheet, columns: Sequence[Column], problems: list[Problem]) -
 
 def _unit(written: str, column: Column) -> str:
     """Return the unit of a column in its table, known to fit; empty for SI."""
-    unit = {"-": "1"}.get(written, written) or column.given_unit
+    unit = written or column.given_unit
+    if unit in ("-", "1") and column.unit == "1":
+        return ""
     if not unit and column.unit != "1":
         raise ValueError(
             f"expected its unit, such as {column.name + f' [{example_unit(column.unit)}]'!r} in the first line"

@@ -42,7 +42,7 @@ def test_an_error_of_every_realisation_alike_is_held_beside_their_scatter(count:
     error = size * 1.96 / np.sqrt(count)
     values = np.random.default_rng(5).normal(2.0 + error, 1.0, (count, 2000))
     stack = bootstrap.means(values)
-    low, high = bootstrap.interval(np.concatenate([stack, stack[:1] + error]), count)
+    low, high = bootstrap.interval(np.concatenate([stack, stack[:1] + error, stack[:1] - error]), count)
     assert np.mean((low < 2) & (high > 2)) > 0.94
 
 
@@ -50,11 +50,12 @@ def test_values_are_moved_by_every_error_once() -> None:
     values, errors = np.arange(70.0).reshape(7, 10), np.full((7, 10), -0.5)
     errors[3, 3] = np.nan
     rows = bootstrap.moved(values, errors)
-    assert rows.shape == (bootstrap.GROUPS, 7, 10)
-    total = (rows - values).sum(axis=0)
+    assert rows.shape == (2 * bootstrap.GROUPS, 7, 10)
+    total = (rows[0::2] - values).sum(axis=0)
+    assert np.array_equal(rows[1::2] - values, -(rows[0::2] - values))
     assert total[3, 3] == 0
     assert np.all(np.delete(total.ravel(), 33) == 0.5)
-    assert bootstrap.moved(values[0, :3], errors[0, :3]).shape == (3, 3)
+    assert bootstrap.moved(values[0, :3], errors[0, :3]).shape == (6, 3)
 
 
 @pytest.mark.parametrize("count", [5, 10, 30])

@@ -52,6 +52,7 @@ FIGURES = (
     "jump_law",
     "relaxation_rate",
     "relaxation_power",
+    "relaxation_course",
 )
 FIT = fits("velocity_jump")
 
@@ -122,16 +123,17 @@ def test_powers_in_both_regimes(groups):
 
 def test_every_figure_says_what_its_bars_are(groups):
     for name in FIGURES:
-        figure = plots("velocity_jump")[name].draw(groups)
+        figure = plots("velocity_jump")[name].figure(groups)
         figure.savefig(io.BytesIO())
         texts = [text.get_text() for text in figure.findobj(lambda artist: hasattr(artist, "get_text"))]
         assert any("95 %" in text or "standard error" in text for text in texts), name
-        assert all(axes.get_xlabel() and axes.get_ylabel() for axes in figure.axes), name
+        panels = [axes for axes in figure.axes if axes.get_label() != "<colorbar>"]
+        assert all(axes.get_xlabel() and axes.get_ylabel() for axes in panels), name
 
 
 def test_figures_of_a_store_with_one_case(groups):
     for name in ("jump_trace", "jump_velocities", "jump_fit", "jump_height"):
-        figure = plots("velocity_jump")[name].draw({"": groups["example"]})
+        figure = plots("velocity_jump")[name].figure({"": groups["example"]})
         figure.savefig(io.BytesIO())
         drawn = [line for axes in figure.axes for line in axes.lines if np.any(np.isfinite(line.get_ydata(orig=False)))]
         assert drawn, name

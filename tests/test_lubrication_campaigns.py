@@ -21,7 +21,7 @@ parameters:
   points: 20000
   roller_radius: 1 mm
   cutoff_force: 100 N
-outputs: [breakthrough_probability, contact_length, film, film_ratio, load_share]
+outputs: [breakthrough_probability, contact_length, film, film_ratio, asperity_load_share]
 """
 LINE = """\
 name: line
@@ -109,6 +109,13 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             "  radius: 20 mm\n  neighbours: true\n",
             "there is no neighbours any more: every case",
         ),
+        (
+            MIXED,
+            "  roller_radius: 1 mm\n",
+            "  roller_radius: 1 mm\n  young_modulus: 1 GPa\n",
+            "write contact_modulus, E*",
+        ),
+        (MIXED, "asperity_load_share]", "load_share]", "there is no load_share any more: write asperity_load_share"),
         (LINE, "outputs: [", "outputs: [discretisation_error, ", "any more: central_film and minimum_film come with"),
     ],
 )
@@ -176,18 +183,21 @@ def test_measured_rollers_roll_and_creep_from_one_file(capsys):
 
 
 def test_ranges_that_are_left_stand_beside_the_results(capsys):
-    """Film formula, film ratio and load on asperities, whatever outputs are asked for."""
+    """Film formula, film ratio and a film that is too thin, whatever outputs are asked for."""
     results(
         MIXED,
         ("normal_force: 100 N", "normal_force: 0.1 N"),
         ("rms_roughness: 0.2 um", "rms_roughness: 20 um"),
-        ("outputs: [breakthrough_probability, contact_length, film, film_ratio, load_share]", "outputs: [film_ratio]"),
+        (
+            "outputs: [breakthrough_probability, contact_length, film, film_ratio, asperity_load_share]",
+            "outputs: [film_ratio]",
+        ),
     )
     results(
         MIXED,
         ("name: mixed", "name: loaded"),
-        ("rms_roughness: 0.2 um", "rms_roughness: 20 um"),
-        ("outputs: [breakthrough_probability, contact_length, film, film_ratio, load_share]",
+        ("  rms_roughness: 0.2 um\n", "  rms_roughness: 20 um\n  film_thickness: 10 nm\n"),
+        ("outputs: [breakthrough_probability, contact_length, film, film_ratio, asperity_load_share]",
          "outputs: [contact_length]"),
     )  # fmt: skip
     results(LINE, ("line_load: 80 kN/m", "line_load: 80 N/m"), ("outputs: [", "outputs: [formula_central_film, "))
@@ -197,6 +207,6 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
         assert main(["status", f"results/{name}.zarr", "--messages"]) == 0
         told[name] = capsys.readouterr().out
     assert "film formula Pan-Hamrock (central): W = " in told["mixed"]
-    assert "film ratio" in told["mixed"]
-    assert "of the load, more than 3%" in told["loaded"]
+    assert "film ratio" in told["loaded"]
+    assert "apart by the given film would carry" in told["loaded"]
     assert "film formula Pan-Hamrock (central): W = " in told["line"]

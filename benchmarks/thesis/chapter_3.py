@@ -25,7 +25,7 @@ def _slope_squared(studies: Studies) -> Found:
     text = {"points": points, "velocity": "1 um/s", "hurst": "0.7", "normal_force": "30 mN"}
     mean = studies("friction_force", **text)[""].mean("realisation")
     exponent = power(mean.rms_slope.to_numpy(), mean.friction_coefficient.to_numpy())
-    return judged(f"mu ~ slope^{exponent:.3f} (H = 0.7, region I)", abs(exponent - 2), 0.05, 0.3)
+    return judged(f"mu ~ slope^{exponent:.3f} (H = 0.7, region I)", abs(exponent - 2), 0.2, 0.5)
 
 
 def _force_over_modulus(studies: Studies) -> Found:
@@ -77,12 +77,13 @@ def _alpha(studies: Studies) -> Found:
 def _beta(studies: Studies) -> Found:
     fitted = studies.fit("friction_laws", "zone_one")["zone_one"]
     low, high = float(fitted.beta.min()), float(fitted.beta.max())
-    return judged(f"beta = {low:.2f} to {high:.2f} over H = 0 to 1", high / low - 1, 0.1, 0.25)
+    return judged(f"beta = {low:.2f} to {high:.2f} over H = 0 to 1", high / low - 1, 0.05, 0.5)
 
 
 def _full_contact(studies: Studies) -> Found:
     """Compare cases wholly in contact with mu = 4 eta v L slope^2 / F."""
-    dataset = studies("friction_force", normal_force="[100 N, 1 kN]", velocity="[1e-5, 1e-3]")[""]
+    grid = {"points": f"{studies.points or 5000}\n  oversampling: 4"}
+    dataset = studies("friction_force", normal_force="[100 N, 1 kN]", velocity="[1e-5, 1e-3]", **grid)[""]
     law = 4 * dataset.shear_modulus * dataset.relaxation_time * dataset.velocity * dataset.length * dataset.rms_slope**2
     whole = dataset.contact_fraction >= 1
     miss = float(abs(dataset.friction_coefficient * dataset.normal_force / law - 1).where(whole).max())
@@ -106,25 +107,23 @@ def _gaussian(_: Studies) -> Found:
 
 
 def _interpolation(studies: Studies) -> Found:
-    """Compare the interpolation law, with alpha = H/(1+H) and the beta of region I, with all loads and speeds."""
+    """Compare the law, with alpha = H/(1+H) and beta = 1.65, with all loads and speeds of regions I to III."""
     mu, force, velocity = _numbers(studies("friction_force")[""])
-    beta = float(studies.fit("friction_laws", "zone_one")["zone_one"].beta.sel(hurst=0.7, method="nearest"))
-    within = (force > 0.01) & (velocity < 10)
-    law = np.sqrt(2) * laws.interpolation(force, velocity, 0.7 / 1.7, beta)
-    miss = (mu / law - 1).where(within)
-    rms, most = float((miss**2).mean() ** 0.5), float(abs(miss).max())
-    return judged(f"{100 * rms:.0f} % rms, {100 * most:.0f} % at most (H = 0.7, F > 0.01 GhL)", rms, 0.03, 0.15)
+    miss = abs(mu / (np.sqrt(2) * laws.interpolation(force, velocity, 0.7 / 1.7, 1.65)) - 1).where(velocity < 2)
+    ends = float(miss.where((force < 0.1) | (force > 50)).max())
+    between = float(miss.where((force > 1) & (force < 30)).max())
+    figure = f"within {100 * ends:.0f} % for F < 0.1 and F > 50 GhL, up to {100 * between:.0f} % between (H = 0.7)"
+    return judged(figure, between, 0.1, 0.3)
 
 
 def _indenter(studies: Studies) -> Found:
-    fitted = studies.fit("scirep2014_cone", "indenter")
-    rows = next(iter(fitted.values()))
-    exponent = rows["exponent" if "exponent" in rows else next(iter(rows.data_vars))]
-    low, high = float(exponent.min()), float(exponent.max())
-    return Found(
-        f"the exponent that fits goes from {low:.2f} to {high:.2f}",
-        Verdict.FAILS if high / low > 1.15 else Verdict.HOLDS,
+    fitted = next(iter(studies.fit("scirep2014_cone", "indenter", ("relaxation",)).values())).dropna("hurst")
+    low, high = (
+        fitted.isel(hurst=which) for which in (fitted.exponent.argmin("hurst"), fitted.exponent.argmax("hurst"))
     )
+    figure = " to ".join(f"{interval(one, 'exponent')} at H = {float(one.hurst):g}" for one in (low, high))
+    ratio = float(high.exponent / low.exponent)
+    return Found(figure, Verdict.FAILS if ratio > 1.1 else Verdict.HOLDS)
 
 
 def _sphere_force(diameter: float) -> float:
@@ -148,87 +147,139 @@ def _heating(_: Studies) -> Found:
 FRICTION_FORCE = RUN.format("friction_force")
 CLAIMS = (
     Claim(
-        "(3.1)-(3.5), fig. 3.3", "Creep and relaxation of an element", "pytest tests/physics/transients",
-        told(Verdict.HOLDS, "exact between contacts"), "Elements are followed by closed forms; no figure is drawn.",
+        "(3.1)-(3.5), fig. 3.3",
+        "Creep and relaxation of an element",
+        "pytest tests/physics/transients",
+        told(Verdict.HOLDS, "exact between contacts"),
+        "Elements are followed by closed forms; no figure is drawn.",
     ),
     Claim(
-        "(3.6)-(3.10)", "Forces and friction of a Kelvin foundation in steady sliding", RUN.format("quickstart"),
-        told(Verdict.HOLDS, "every number with its error"), "The stationary state is found directly, without a run-in.",
+        "(3.6)-(3.10)",
+        "Forces and friction of a Kelvin foundation in steady sliding",
+        RUN.format("quickstart"),
+        told(Verdict.HOLDS, "every number with its error"),
+        "The stationary state is found directly, without a run-in.",
     ),
     Claim(
-        "fig. 3.6", "Friction from the start of sliding", RUN.format("velocity_protocols"),
-        told(Verdict.HOLDS, "series `start`"), "The transient is over after a cut-off wavelength or a relaxation time.",
+        "fig. 3.6",
+        "Friction from the start of sliding",
+        RUN.format("velocity_protocols"),
+        told(Verdict.HOLDS, "series `start`"),
+        "The transient is over after a cut-off wavelength or a relaxation time.",
     ),
     Claim(
-        "3.2.2", "3.5 million simulations in 50 h", RUN.format("prl2013"),
-        told(Verdict.HOLDS, "3.52 million in 54 s (two cores)"), "On the same grid and with the same time steps.",
+        "3.2.2",
+        "3.5 million simulations in 50 h",
+        RUN.format("prl2013"),
+        told(Verdict.HOLDS, "3.52 million in 54 s (two cores)"),
+        "On the same grid and with the same time steps.",
     ),
     Claim(
-        "3.2.2", "In zone 1 mu goes with the square of the slope", FRICTION_FORCE, _slope_squared,
+        "3.2.2",
+        "In zone 1 mu goes with the square of the slope",
+        FRICTION_FORCE,
+        _slope_squared,
         "The slope is changed by the shortest wavelength alone.",
     ),
     Claim(
-        "3.2.2", "mu depends on force and modulus through F/G only", RUN.format("quickstart"), _force_over_modulus,
+        "3.2.2",
+        "mu depends on force and modulus through F/G only",
+        RUN.format("quickstart"),
+        _force_over_modulus,
         "An exact similarity; the solver uses it to solve equal cases once.",
     ),
     Claim(
-        "fig. 3.7, 3.9", "Region I (mu ~ v), plateau, and decay at high speed or light load", FRICTION_FORCE, _regions,
+        "fig. 3.7, 3.9",
+        "Region I (mu ~ v), plateau, and decay at high speed or light load",
+        FRICTION_FORCE,
+        _regions,
         "",
     ),
     Claim("3.2.2", "Region II is a decade wide, and mu doubles in it", FRICTION_FORCE, _transition, ""),
     Claim(
-        "(3.11), (3.13), fig. 3.10", "alpha = H/(1+H)", FIT.format("friction_laws", "zone_one"), _alpha,
+        "(3.11), (3.13), fig. 3.10",
+        "alpha = H/(1+H)",
+        FIT.format("friction_laws", "zone_one"),
+        _alpha,
         "The window of loads alone moves alpha by 0.02.",
     ),
     Claim(
-        "(3.11), fig. 3.10", "beta is a constant of order one", FIT.format("friction_laws", "zone_one"), _beta,
+        "(3.11), fig. 3.10",
+        "beta is a constant of order one",
+        FIT.format("friction_laws", "zone_one"),
+        _beta,
         "The window of loads moves beta by 0.14.",
     ),
     Claim("(3.14)", "In full contact mu = 4 eta v L slope^2 / F", FRICTION_FORCE, _full_contact, "Exact on any grid."),
     Claim(
-        "(3.15), fig. 3.11", "On the plateau mu = sqrt 2 slope for H = 0.2 to 0.8",
-        FIT.format("friction_laws", "plateau"), _plateau, "The lines in contact are steeper where the load is higher.",
+        "(3.15), fig. 3.11",
+        "On the plateau mu = sqrt 2 slope for H = 0.2 to 0.8",
+        FIT.format("friction_laws", "plateau"),
+        _plateau,
+        "The lines in contact are steeper where the load is higher.",
     ),
     Claim(
-        "(3.16)", "The sqrt 2 comes from exponentially distributed slopes", "python -m benchmarks.thesis", _gaussian,
+        "(3.16)",
+        "The sqrt 2 comes from exponentially distributed slopes",
+        "python -m benchmarks.thesis",
+        _gaussian,
         "Slopes of these lines are normally distributed; that the plateau is near sqrt 2 has another reason: the "
         "slopes in contact are not those of the whole line.",
     ),
     Claim(
-        "(3.17)-(3.20), fig. 3.8", "One interpolation law for regions I to III",
+        "(3.17)-(3.20), fig. 3.8",
+        "One interpolation law for regions I to III",
         FIT.format("friction_force", "interpolation"),
-        _interpolation, "Largest errors stand in region II.",
+        _interpolation,
+        "Between the zones the two contact lengths do not simply add.",
     ),
     Claim(
-        "(3.24)-(3.35), (3.37)-(3.39), fig. 3.14", "Rough indenters at low speed follow mu = sqrt 2 slope xi",
+        "(3.24)-(3.35), (3.37)-(3.39), fig. 3.14",
+        "Rough indenters at low speed follow mu = sqrt 2 slope xi",
         FIT.format("scirep2014_cone", "indenter"),
         told(Verdict.WITHIN, "within 5 % where the roughness is small beside the depth; up to 100-fold outside"),
         "Steep cones and barely touching bodies leave the law; the figure marks them.",
     ),
     Claim(
-        "(3.36), (3.40), fig. 3.15", "The exponent 1.5 fits all parameter sets",
+        "(3.36), (3.40), fig. 3.15",
+        "The exponent 1.5 fits all parameter sets",
         FIT.format("scirep2014_cone", "indenter"),
-        _indenter, "It rises with H.",
+        _indenter,
+        "It rises with H.",
     ),
     Claim(
-        "(3.41)-(3.44)", "Curves over force at several speeds are pieces of one curve",
+        "(3.41)-(3.44)",
+        "Curves over force at several speeds are pieces of one curve",
         RUN.format("force_master_curve"),
-        told(Verdict.HOLDS, "see docs/master-curves.md"), "For a rough sphere, its own bulk hysteresis taken off.",
+        told(Verdict.HOLDS, "see docs/master-curves.md"),
+        "For a rough sphere, its own bulk hysteresis taken off.",
     ),
     Claim(
-        "Lee and Radok; u_x = 1.5 mu d", "Depth governs contact; tangential stiffness 2/3 of the normal one", "",
-        told(Verdict.NOT_MODELLED), "Layers and tangential contact of elastomers are not modelled.",
+        "Lee and Radok; u_x = 1.5 mu d",
+        "Depth governs contact; tangential stiffness 2/3 of the normal one",
+        "",
+        told(Verdict.NOT_MODELLED),
+        "Layers and tangential contact of elastomers are not modelled.",
     ),
     Claim(
-        "fig. 3.16-3.19", "1680 measurements on polyurethane form a master curve", "", told(Verdict.NO_DATA),
+        "fig. 3.16-3.19",
+        "1680 measurements on polyurethane form a master curve",
+        "",
+        told(Verdict.NO_DATA),
         "The measurements are not public; `force_master_curve` is a simulation that stands in for them.",
     ),
     Claim(
-        "3.3.4", "At 40 N the contact is as wide as the layer is thick", "python -m benchmarks.thesis", _layer,
+        "3.3.4",
+        "At 40 N the contact is as wide as the layer is thick",
+        "python -m benchmarks.thesis",
+        _layer,
         "By F = (2/3) G D^3/R; the kink at 40 N needs a model of the layer.",
     ),
     Claim(
-        "3.3.4", "The rubber warms by 0.06 K at 100 N and 1 cm/s", "python -m benchmarks.thesis", _heating,
+        "3.3.4",
+        "The rubber warms by 0.06 K at 100 N and 1 cm/s",
+        "python -m benchmarks.thesis",
+        _heating,
         "0.04 mm is the depth at 1 N. For a sphere the factor is 4/3 in place of 2.",
     ),
-)  # fmt: skip
+)

@@ -56,16 +56,23 @@ class Studies:
     folder: str = field(default_factory=tempfile.mkdtemp)
 
     def __call__(self, name: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
-        """Return the series of a campaign, all or those named, with some of its lines `key: value` replaced."""
+        """Return the series of a campaign, all or those named, with some of its lines `key: value` replaced.
+
+        A key `series_NAME` stands for the line of a series.
+        """
         text = (CAMPAIGNS / f"{name}.yaml").read_text()
-        wanted = int(found[1]) if (found := re.search(r"^realisations: (\d+)", text, flags=re.M)) else 1
-        replaced = {"realisations": str(min(self.lines, wanted)), **replaced}
         if self.points:
             text = re.sub(r"\bpoints: 5000\b", f"points: {self.points}", text)
+        head, mark, tail = text.partition("\nseries:")
         for key, value in replaced.items():
-            text, count = re.subn(rf"^(\s*){key}: [^#\n]*", rf"\g<1>{key}: {value} ", text, count=1, flags=re.M)
-            assert count == 1, f"{name} has no line {key}"
+            head, found = _with_line(head, key, value)
+            tail, also = (tail, 0) if found else _with_line(tail, key.removeprefix("series_"), value)
+            assert found + also == 1, f"{name} has no line {key}"
+        text = head + mark + tail
         campaign = loads(text, f"{name}.yaml", str(CAMPAIGNS))
+        most = min(self.lines, campaign.replication.at_most)
+        least = min(most, campaign.replication.at_least)
+        campaign = replace(campaign, replication=replace(campaign.replication, at_least=least, at_most=most))
         if series:
             campaign = replace(campaign, series=tuple(one for one in campaign.series if one.name in series))
         digest = hashlib.sha256(f"{text}{series}".encode()).hexdigest()[:12]
@@ -78,6 +85,11 @@ class Studies:
         groups = self(name, series, **replaced)
         model = next(iter(groups.values())).attrs["model"]
         return available(model)[law].results(groups)
+
+
+def _with_line(text: str, key: str, value: str) -> tuple[str, int]:
+    """Return a text with the value of its first line `key: value` replaced, and whether there was one."""
+    return re.subn(rf"^(\s*){key}: [^#\n]*", rf"\g<1>{key}: {value} ", text, count=1, flags=re.M)
 
 
 @dataclass(frozen=True)
@@ -125,7 +137,8 @@ def power(x: np.ndarray, y: np.ndarray) -> float:
 def interval(fitted: xr.Dataset, name: str, digits: int = 3) -> str:
     """Return a constant with its interval: ``0.41 (0.40, 0.42)``."""
     value, low, high = (float(fitted[name + end]) for end in ("", "_low", "_high"))
-    return f"{value:.{digits}g} ({low:.{digits}g}, {high:.{digits}g})"
+    known = np.isfinite(low) and np.isfinite(high)
+    return f"{value:.{digits}g} ({low:.{digits}g}, {high:.{digits}g})" if known else f"{value:.{digits}g}"
 
 
 def page(chapters: Iterable[tuple[str, Iterable[Claim]]], studies: Studies) -> str:

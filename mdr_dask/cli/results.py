@@ -258,18 +258,32 @@ def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
 @store_argument
 @click.argument("names", nargs=-1)
 @click.option("--all", "everything", is_flag=True, help="Draw every figure that the store has the data for.")
+@click.option("--series", "series", multiple=True, help="Only this series; repeat.")
+@select_option
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
 @format_option
-def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | None, suffix: str) -> None:
+def plot(
+    store: str,
+    names: tuple[str, ...],
+    everything: bool,
+    series: tuple[str, ...],
+    selections: tuple[str, ...],
+    output: Path | None,
+    suffix: str,
+) -> None:
     """Draw figures from a store; without a name, say which figures there are.
+
+    A figure holds axes that it cannot show at one value, and says which; --select chooses another.
 
     \b
     mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
     mdr-dask plot results/friction_force.zarr --all -o figures
+    mdr-dask plot results/friction_force.zarr regions --select 'normal_force=1 N'
     """
     from mdr_dask import plots as room
     from mdr_dask import store as stores
     from mdr_dask.errors import DataError, FitError
+    from mdr_dask.plots import style
 
     model = stores.attributes(store)["model"]
     known = room.available(model)
@@ -279,18 +293,22 @@ def plot(store: str, names: tuple[str, ...], everything: bool, output: Path | No
     _require_known(names, list(known), f"figure of {model}")
     folder, file = _places(output, alone=len(names) == 1 and not everything)
     groups = stores.datasets(store)
+    groups = {name: selection.group(groups, name) for name in series} if series else groups
+    groups = selection.select_all(groups, selections)
     for name in names or tuple(known):
+        path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
         try:
-            figure = known[name].draw(groups)
+            figure = known[name].figure(groups)
         except (DataError, FitError) as error:
             if not everything:
                 raise
             click.echo(f"{name}: left out: {error}", err=True)
             continue
-        path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
         with writing(path):
-            figure.savefig(path, dpi=150)
+            figure.savefig(path, dpi=style.DPI)
         click.echo(str(path))
+        if style.left_out(figure):
+            click.echo(f"{name}: not drawn: {style.left_out(figure)}", err=True)
 
 
 def _places(output: Path | None, alone: bool) -> tuple[Path, Path | None]:

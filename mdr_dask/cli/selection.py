@@ -51,6 +51,16 @@ def select(dataset: xr.Dataset, selections: tuple[str, ...]) -> xr.Dataset:
     return dataset
 
 
+def select_all(datasets: dict[str, xr.Dataset], selections: tuple[str, ...]) -> dict[str, xr.Dataset]:
+    """Apply selections to every series that varies what is selected; a series that does not stays as it is."""
+    for text in selections:
+        name = text.partition("=")[0]
+        varied = [key for key, data in datasets.items() if name in data.coords and data[name].ndim == 1]
+        for key in varied or list(datasets)[:1]:
+            datasets = datasets | {key: select(datasets[key], (text,))}
+    return datasets
+
+
 def _pick(dataset: xr.Dataset, name: str, wanted: str) -> xr.Dataset:
     import numpy as np
 

@@ -18,7 +18,7 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 
-#: Departure of a law, rms, that counts as none: laws of friction are not meant to hold better.
+#: Departure of a law, rms and half of the largest, that counts as none: laws of friction are not meant to hold better.
 WITHIN = 0.05
 #: Probability of the departure by scatter and errors alone, below which the law is doubted.
 DOUBTFUL = 0.05
@@ -86,9 +86,9 @@ class Fitted(NamedTuple):
 
     Attributes
     ----------
-    constants : array, shape (1 + RESAMPLES + groups, p)
+    constants : array, shape (1 + RESAMPLES + 2 groups, p)
         Stack of the constants, for `mdr_dask.bootstrap.interval`.
-    departures : array, shape (cases,)
+    departures : array, shape (...)
         Data less law.
     chance : float
         How often scatter and errors alone leave as much; NaN where one realisation has no scatter.
@@ -101,7 +101,7 @@ class Fitted(NamedTuple):
 
 def fitted(
     fit: Callable[[FloatArray], FloatArray],
-    law: Callable[[FloatArray], FloatArray],
+    left: Callable[[FloatArray, FloatArray], FloatArray],
     data: FloatArray,
     count: int,
 ) -> Fitted:
@@ -110,16 +110,16 @@ def fitted(
     Parameters
     ----------
     fit : callable
-        From data, shape (rows, cases), to constants, shape (rows, p).
-    law : callable
-        From constants to data.
-    data : array, shape (1 + RESAMPLES + groups, cases)
+        From data, shape (rows, ...), to constants, shape (rows, p).
+    left : callable
+        From data and constants to what the law leaves of the data.
+    data : array, shape (1 + RESAMPLES + 2 groups, ...)
         Stack of the data.
     count : int
         Realisations that were resampled.
     """
     constants = fit(data)
-    residuals = data - law(constants)
+    residuals = left(data, constants)
     probability = bootstrap.chance(residuals, count) if count > 1 else np.nan
     if not probability >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])
@@ -142,14 +142,14 @@ def law_holds(
     where : str
         Where the largest departure lies.
     within : float
-        Largest rms departure that counts as none.
+        Departure that counts as none: rms, and half of the largest.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
     rms, largest = np.sqrt(np.mean(departures**2)), np.max(np.abs(departures))
     departs = f"departs by {rms:.2g} rms, at most {largest:.2g}{f' at {where}' if where else ''}"
-    if rms <= within:
-        return f"yes: {departs}, within {within:g}"
+    if max(rms, largest / 2) <= within:
+        return f"yes: {departs}, within {within:g} and {2 * within:g}"
     if np.isnan(chance):
         return f"not tested: one realisation knows no scatter; {departs}"
     if chance >= DOUBTFUL:

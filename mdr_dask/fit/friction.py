@@ -177,7 +177,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     design = np.vstack([-x, np.ones(x.size)])
     found = fitted(
         lambda logs: logs @ np.linalg.pinv(design),
-        lambda constants: constants @ design,
+        lambda logs, constants: logs - constants @ design,
         np.log(table.stack(used) / (np.sqrt(2) * velocity[used])),
         count,
     )
@@ -217,7 +217,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])))
     flat = x[stack[0] > (1 - FLAT) * smooth]
     found = _interval("plateau", top, count, "largest friction coefficient over rms slope")
-    if verdict.startswith("no"):
+    if verdict.startswith("no:"):
         found |= {f"plateau_{end}": xr.Variable((), np.nan, found["plateau"].attrs) for end in ("low", "high")}
     return {
         **found,
@@ -228,11 +228,17 @@ def _plateau(data: xr.Dataset) -> Variables:
     }
 
 
-def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+def _smoothed(mean: FloatArray) -> FloatArray:
+    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
     smooth = mean.copy()
     for _ in range(2):
         smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
+    return smooth
+
+
+def _about_the_top(mean: FloatArray, drop: float) -> slice:
+    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+    smooth = _smoothed(mean)
     at = int(np.argmax(smooth))
     low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
     right = at + int(low[0]) if low.size else mean.size
@@ -273,14 +279,17 @@ def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -
 def _least_squares(
     model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 30
 ) -> FloatArray:
-    """Fit the data of every sample, shape (samples, points), by damped Gauss-Newton; return (samples, constants)."""
+    """Fit the data of every row, shape (rows, points), by damped Gauss-Newton; return (rows, constants)."""
     constants = np.tile(np.array(start), (data.shape[0], 1))
     for _ in range(steps):
         value = model(constants)
         jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * np.eye(len(start))], axis=-1)
-        normal = np.einsum("spi,spj->sij", jacobian, jacobian) + 1e-12 * np.eye(len(start))
-        gradient = np.einsum("spi,sp->si", jacobian, data - value)
-        constants = constants + np.clip(np.linalg.solve(normal, gradient[..., None])[..., 0], -0.3, 0.3)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian + 1e-12 * np.eye(len(start))
+        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
+        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
+        constants = constants + step
+        if np.abs(step).max() < 1e-9:
+            break
     return constants
 
 
@@ -294,13 +303,19 @@ def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
     }
 
 
+def _peak(velocity: FloatArray, mean: FloatArray) -> float:
+    """Return the velocity of the largest friction, where region IV begins."""
+    order = np.argsort(velocity)
+    return float(velocity[order][np.argmax(_smoothed(mean[order]))])
+
+
 def _interpolation(data: xr.Dataset) -> Variables:
     """Fit alpha and beta of eq. 3.18 to regions I to III."""
     _, forces, velocities = numbers(data)
     table = _table(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
     force, velocity = table.columns
     mean = np.nan_to_num(table.mean())
-    peak = {load: velocity[force == load][np.argmax(mean[force == load])] for load in np.unique(force)}
+    peak = {load: _peak(velocity[force == load], mean[force == load]) for load in np.unique(force)}
     used = (force >= LAW_FROM) & (velocity <= np.array([peak[load] for load in force])) & (mean > 0)
     if np.count_nonzero(used) < 5:
         raise FitError(
@@ -315,7 +330,9 @@ def _interpolation(data: xr.Dataset) -> Variables:
     hurst = float(data["hurst"])
     start = (laws.alpha(hurst), float(np.log(laws.BETA)))
     stack = table.stack(used)
-    found = fitted(lambda rows: _least_squares(model, start, rows), model, stack, count)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
+    )
     at = int(np.argmax(np.abs(found.departures)))
     worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
     return {
@@ -403,7 +420,9 @@ def _indenter(data: xr.Dataset) -> Variables:
         return law
 
     start = (math.log(laws.INDENTER_EXPONENT),)
-    found = fitted(lambda rows: _least_squares(model, start, rows), model, logs, count)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count
+    )
     of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
     worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
     return {

@@ -1,15 +1,17 @@
-"""The cases of a series of velocity jumps, with means over resamples of their realisations."""
+"""The cases of a series of velocity jumps, with stacks of their means."""
 
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
+from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 
@@ -42,13 +44,20 @@ class Cases:
         if data.sizes["realisation"] < LEAST:
             raise FitError(f"expected at least {LEAST} realisations, got {data.sizes['realisation']}")
         template = data[LEVELS[0]].isel(realisation=0, drop=True)
-        data = data[[*needed]].load().transpose(*template.dims, "realisation", ...)
+        errors = [str(error.name) for name in needed if (error := companion(data, name)) is not None]
+        data = data[[*needed, *errors]].load().transpose(*template.dims, "realisation", ...)
         return cls(data, template)
 
     @property
-    def count(self) -> int:
-        """Return the number of realisations."""
-        return int(self.data.sizes["realisation"])
+    def counts(self) -> NDArray[np.int64]:
+        """Return the number of realisations of every case that succeeded."""
+        known = np.all(np.isfinite(np.stack([self.output(name) for name in LEVELS])), axis=0)
+        counts: NDArray[np.int64] = known.sum(axis=1)
+        return counts
+
+    def count(self, used: Any = slice(None)) -> int:
+        """Return the least number of realisations that any of some cases has."""
+        return int(self.counts[used].min(initial=self.data.sizes["realisation"]))
 
     def column(self, name: str) -> FloatArray:
         """Return a parameter for every case."""
@@ -59,6 +68,16 @@ class Cases:
         """Return an output, shape (cases, realisations, ...)."""
         array = np.asarray(self.data[name].values, dtype=np.float64)
         return array.reshape(-1, *array.shape[self.template.ndim :])
+
+    def error(self, name: str) -> FloatArray:
+        """Return the error of the grid in the mean of an output, shape (cases, ...); 0 where none is known."""
+        error = companion(self.data, name)
+        if error is None:
+            return np.zeros_like(self.output(name)[:, 0])
+        array = np.abs(self.output(str(error.name)))
+        known = np.isfinite(array)
+        mean: FloatArray = np.where(known, array, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        return mean
 
     def places(self, dims: Sequence[Hashable]) -> NDArray[np.int64]:
         """Return which point of some of the axes every case lies at."""
@@ -88,11 +107,13 @@ class Cases:
         return np.pi * self.column("points") / self.column("length")
 
     def levels(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return means of mu_1, d_mu_0 and mu_2 and of their resamples, shapes (1 + RESAMPLES, cases)."""
-        stacked = np.stack([self.output(name) for name in LEVELS], axis=-1)
-        before, jump, after = np.moveaxis(
-            np.stack([bootstrap.means(bootstrap.complete(case)) for case in stacked], axis=1), -1, 0
-        )
+        """Return stacks of mu_1, d_mu_0 and mu_2, shapes (1 + RESAMPLES + 2 groups, cases)."""
+        outputs = np.stack([self.output(name).T for name in LEVELS], axis=1)
+        stack = bootstrap.means(outputs + 0 * outputs.sum(axis=1, keepdims=True))  # NaN in one is NaN in all three
+        errors = np.stack([self.error(name) for name in LEVELS])
+        if np.any(errors > 0):
+            stack = np.concatenate([stack, bootstrap.moved(stack[0], errors)])
+        before, jump, after = np.moveaxis(stack, 1, 0)
         return before, jump, after
 
     def relaxing(self) -> FloatArray:
@@ -101,10 +122,19 @@ class Cases:
         start = (before + jump - after)[..., None]
         return np.concatenate([start, self.output("friction_coefficient") - after[..., None]], axis=-1)
 
+    def relaxing_error(self) -> FloatArray:
+        """Return the error of the grid in the mean of mu - mu_2, shape (cases, 1 + times).
+
+        The trace stands on mu_2 and shares its error, which is therefore taken off.
+        """
+        after = self.error(LEVELS[2])[:, None]
+        trace = np.maximum(self.error("friction_coefficient") - after, 0.0)
+        return np.concatenate([self.error(LEVELS[1])[:, None], trace], axis=1)
+
     def _like(self, value: xr.DataArray) -> xr.DataArray:
         return value.broadcast_like(self.template).transpose(*self.template.dims)
 
-    def found(self, values: FloatArray, unit: str, meaning: str) -> xr.DataArray:
+    def found(self, values: NDArray[Any], unit: str, meaning: str) -> xr.DataArray:
         """Return what was found for every case over the axes of the series."""
         shaped = np.asarray(values).reshape(self.template.shape)
         axes = {dim: self.template[dim] for dim in self.template.dims if dim in self.template.coords}
@@ -113,10 +143,10 @@ class Cases:
     def constants(
         self, samples: Mapping[str, FloatArray], fields: Mapping[str, tuple[str, str]], positive: tuple[str, ...] = ()
     ) -> dict[str, xr.DataArray]:
-        """Return constants and the ends of their intervals over the axes, from samples of shape (n, cases)."""
+        """Return constants and the ends of their intervals over the axes, from stacks of shape (rows, cases)."""
         result = {}
         for name, (unit, meaning) in fields.items():
-            low, high = bootstrap.interval(samples[name], self.count, name in positive)
+            low, high = bootstrap.interval(samples[name], self.counts, name in positive)
             result[name] = self.found(samples[name][0], unit, meaning)
             result[f"{name}_low"] = self.found(low, unit, f"lower end of the 95 % interval of {name}")
             result[f"{name}_high"] = self.found(high, unit, f"upper end of the 95 % interval of {name}")

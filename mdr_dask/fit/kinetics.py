@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,15 +12,17 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import Fit
-from mdr_dask.fit.kinetic_cases import LEVELS, Cases, law_rate
+from mdr_dask.fit.base import LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fit.kinetic_cases import LEAST, LEVELS, Cases, law_rate
 from mdr_dask.fit.relaxation import (
     AMPLITUDE_FIELDS,
-    GOODNESS_FIELDS,
+    LAWS,
     RATE_FIELDS,
     SHAPE_FIELDS,
-    one_is_enough,
+    Left,
+    enough,
     relaxation_of,
+    window,
 )
 
 Series = Mapping[str, xr.Dataset]
@@ -70,26 +73,61 @@ def _numbers(cases: Cases) -> dict[str, FloatArray]:
     }
 
 
-def _relaxations(cases: Cases, shaped: bool = False) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Fit the relaxation of every case: samples of its constants, and goodness of fit."""
+class Relaxations(NamedTuple):
+    """The relaxation of every case: stacks of its constants, shape (rows, cases), what laws leave, windows.
+
+    The last rows are moved by what one exponential leaves, those before by the errors of the grid.
+    """
+
+    stacks: dict[str, FloatArray]
+    left: list[dict[str, Left]]
+    window: FloatArray
+
+    def measure(self, law: str, name: str) -> FloatArray:
+        """Return an entry of what a law leaves of every case."""
+        return np.array([getattr(left[law], name) if law in left else np.nan for left in self.left])
+
+    def verdicts(self) -> NDArray[np.str_]:
+        """Say of every case whether one exponential is enough."""
+        return np.array([_says(left, "one") for left in self.left])
+
+
+def _says(left: Mapping[str, Left], *laws: str) -> str:
+    """Say which of some laws hold."""
+    if not set(laws) <= set(left):
+        return "not tested: nothing relaxes" if not left else "not tested: one exponential is enough"
+    good = [law for law in laws if enough(left[law])]
+    parts = [
+        f"{LAWS[law]} leaves {left[law].unexplained:.2g} of the square, at most {left[law].largest:.2g} of the"
+        f" relaxing part; by scatter alone with probability {left[law].probability:.2g}"
+        for law in good or laws
+    ]
+    return f"{'yes' if good else 'no'}: {', '.join(parts)}"
+
+
+def _relaxations(cases: Cases, shaped: bool = False) -> Relaxations:
+    """Fit the relaxation of every case."""
     time = np.concatenate([[0.0], cases.data["relaxation_times"].values])
     expected, slope = law_rate(cases.passing, cases.column("hurst")), cases.slope
-    size = expected.size
     fields = RATE_FIELDS | AMPLITUDE_FIELDS | SHAPE_FIELDS
-    samples = {name: np.full((1 + bootstrap.RESAMPLES, size), np.nan) for name in fields}
-    goodness = {name: np.full(size, np.nan) for name in GOODNESS_FIELDS}
-    for k, relaxing in enumerate(cases.relaxing()):
-        traces = bootstrap.means(bootstrap.complete(relaxing))
+    size = 1 + bootstrap.RESAMPLES + 4 * bootstrap.GROUPS + 2
+    stacks = {name: np.full((size, expected.size), np.nan) for name in fields}
+    lefts: list[dict[str, Left]] = []
+    for k, (relaxing, grid) in enumerate(zip(cases.relaxing(), cases.relaxing_error(), strict=True)):
         good = relaxing[np.all(np.isfinite(relaxing), axis=1)]
-        if not np.nanmax(np.abs(traces[0]), initial=0.0) > INSTANT * slope[k]:
+        if len(good) < LEAST or not np.abs(good.mean(axis=0)).max() > INSTANT * slope[k]:
+            lefts.append({})
             continue
+        means = bootstrap.means(bootstrap.complete(relaxing))
+        traces = np.concatenate([means, bootstrap.moved(means[0], grid)])
         error = good.std(axis=0, ddof=1) / np.sqrt(len(good))
-        found, measures = relaxation_of(time, traces, error, float(expected[k]), shaped)
+        found, left = relaxation_of(time, traces, error, len(good), float(expected[k]), shaped)
+        lefts.append(left)
         for name, values in found.items():
-            samples[name][: len(values), k] = values
-        for name, value in measures.items():
-            goodness[name][k] = value
-    return samples, goodness
+            stacks[name][:, k] = values[0]
+            stacks[name][: len(values), k] = values
+    windows = [window(time, rate) if left else np.nan for rate, left in zip(expected, lefts, strict=True)]
+    return Relaxations(stacks, lefts, np.array(windows))
 
 
 def _lengths(cases: Cases, rate: FloatArray) -> dict[str, FloatArray]:
@@ -110,51 +148,73 @@ def _needed() -> tuple[str, ...]:
 def _kinetics(series: Series) -> xr.Dataset:
     """Return the jump of every case."""
     cases = Cases.of(series, *LEVELS, "rms_slope")
-    return xr.Dataset(cases.constants(_numbers(cases), JUMP_FIELDS))
+    result = xr.Dataset(cases.constants(_numbers(cases), JUMP_FIELDS))
+    reason = "not tested: numbers of one jump; jump_law, jump_limits and jump_linearity compare laws with them"
+    return result.assign(law_holds=reason)
 
 
 def _relaxation(series: Series) -> xr.Dataset:
     """Return the rate, length and time of the relaxation of every case, and how good one exponential is."""
     cases = Cases.of(series, *_needed())
-    samples, goodness = _relaxations(cases)
-    samples |= _lengths(cases, samples["rate"])
-    constants = cases.constants(samples, RATE_FIELDS | LENGTH_FIELDS, POSITIVE)
+    found = _relaxations(cases)
+    stacks = found.stacks | _lengths(cases, found.stacks["rate"])
+    constants = cases.constants(stacks, RATE_FIELDS | LENGTH_FIELDS, POSITIVE)
     law = law_rate(cases.passing, cases.column("hurst"))
-    left, probability = goodness["unexplained"], goodness["probability"]
-    enough = np.where(one_is_enough(left, probability), "yes", np.where(np.isnan(left), "nothing relaxes", "no"))
     first = {"passing_number": cases.found(cases.passing, "1", "v_1 tau q_max")}
-    measures = {
-        "law_rate": cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12"),
-        "one_is_enough": cases.found(enough, "1", "whether one exponential is enough"),
-    }
-    measures |= {name: cases.found(goodness[name], *GOODNESS_FIELDS[name]) for name in ("unexplained", "probability")}
+    measures = {"law_rate": cases.found(law, "1", "(v_1 tau q_max)^a with a = 1 below and 1 - H above 1, eq. 4.12")}
+    for name, meaning in LEFT_FIELDS.items():
+        measures[name] = cases.found(found.measure("one", name), "1", f"{meaning} one exponential leaves")
     first |= {name: constants[name] for name in ("rate", "rate_low", "rate_high")}
-    window = {"window": cases.found(goodness["window"], *GOODNESS_FIELDS["window"])}
-    return xr.Dataset(first | measures | constants | window, attrs={"window": WINDOW_TEXT})
+    last = {
+        "window": cases.found(found.window, "1", "last t' of the fit"),
+        "law_holds": cases.found(found.verdicts(), "1", LAW_HOLDS["long_name"]),
+    }
+    return xr.Dataset(first | measures | constants | last, attrs={"window": WINDOW_TEXT})
+
+
+LEFT_FIELDS = {
+    "unexplained": "weighted share of the squared relaxing part that",
+    "largest": "largest part of the relaxing part that",
+    "probability": "how often scatter and errors alone leave as much as",
+}
 
 
 def _shape(series: Series) -> xr.Dataset:
-    """Return a stretched exponential and two exponentials where one is not enough."""
+    """Return more laws of the relaxation where one exponential is not enough; no interval of one that does not hold."""
     cases = Cases.of(series, *_needed())
-    samples, goodness = _relaxations(cases, shaped=True)
-    if np.all(np.isnan(goodness["two_unexplained"])):
+    found = _relaxations(cases, shaped=True)
+    if not any("two" in left for left in found.left):
         raise FitError("one exponential is enough in every case")
-    result = xr.Dataset(cases.constants(samples, SHAPE_FIELDS, POSITIVE))
-    for name in ("unexplained", "stretched_unexplained", "two_unexplained"):
-        result[name] = cases.found(goodness[name], *GOODNESS_FIELDS[name])
+    result = xr.Dataset(cases.constants(found.stacks, SHAPE_FIELDS, POSITIVE))
+    for law, names in SHAPES.items():
+        held = np.array([law in left and enough(left[law]) for left in found.left])
+        for name in (f"{name}_{end}" for name in names for end in ("low", "high")):
+            result[name] = result[name].where(cases.found(held, "1", "")).assign_attrs(result[name].attrs)
+    for law, meaning in LAWS.items():
+        share = found.measure(law, "unexplained")
+        name = "unexplained" if law == "one" else f"{law}_unexplained"
+        result[name] = cases.found(share, "1", f"weighted share of the squared relaxing part that {meaning} leaves")
+    verdicts = np.array([_says(left, "stretched", "two") for left in found.left])
+    result["law_holds"] = cases.found(verdicts, "1", LAW_HOLDS["long_name"])
     result.attrs["window"] = WINDOW_TEXT
     return result
+
+
+SHAPES = {
+    "stretched": ("stretched_rate", "stretched_exponent"),
+    "two": ("fast_rate", "slow_rate", "fast_share"),
+}
 
 
 def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
     """Return the laws fitted to the only case of a series, over rms slope, over t within the window, with a band."""
     cases = Cases.of({"": data}, *_needed())
-    samples, goodness = _relaxations(cases, shaped=True)
-    t = np.append(0.0, np.geomspace(1e-4, 1, 200)) * goodness["window"][0]
-    found = {name: values[:, 0] for name, values in samples.items()}
+    fitted_here = _relaxations(cases, shaped=True)
+    t = np.append(0.0, np.geomspace(1e-4, 1, 200)) * fitted_here.window[0]
+    found = {name: values[:, 0] for name, values in fitted_here.stacks.items()}
     one = found["amplitude"][:, None] * np.exp(-found["rate"][:, None] * t) / cases.slope[0]
     alike = found["amplitude_unweighted"][0] * np.exp(-found["rate_unweighted"][0] * t) / cases.slope[0]
-    low, high = bootstrap.interval(one, cases.count)
+    low, high = bootstrap.interval(one, cases.count())
     curves = {"one": one[0], "one_low": low, "one_high": high, "alike": alike}
     if np.isfinite(found["two_amplitude"][0]):
         share, total = found["fast_share"][0], found["two_amplitude"][0] / cases.slope[0]
@@ -179,30 +239,49 @@ def _jump_law(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *LEVELS, "rms_slope")
     numbers = _numbers(cases)
     before, jump = numbers["before_over_slope"], numbers["jump_over_slope"]
-    known = _rising(cases, numbers) & np.all(before > 0, axis=0) & np.all(jump > 0, axis=0)
+    known = _rising(cases, numbers) & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
         raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
     rows = _rows_of(cases.column("hurst"))
-    table: dict[str, list[float]] = {}
+    table: dict[str, list[float | str]] = {}
     for _, chosen in rows:
-        x, y = before[:, chosen & known], jump[:, chosen & known]
-        samples = _constants(x, y)
-        low, high = bootstrap.interval(samples, cases.count, positive=True)
-        deviation, of_thesis = (_deviation(x[0], y[0], c) for c in (samples[0], LAW))
-        names = ("constant", "constant_low", "constant_high", "constant_of_thesis", "deviation", "deviation_of_thesis")
-        for name, value in zip(names, (samples[0], low, high, LAW, deviation, of_thesis), strict=True):
-            table.setdefault(name, []).append(float(value))
-        table.setdefault("cases", []).append(x.shape[1])
+        for name, value in _constant(before, jump, chosen & known, cases).items():
+            table.setdefault(name, []).append(value)
     result = xr.Dataset({name: ("hurst", column, {"units": "1"}) for name, column in table.items()})
     result["deviation"].attrs["long_name"] = "rms of the relative deviations from the law with the constant fitted"
+    result["law_holds"].attrs |= LAW_HOLDS
     result.attrs["law"] = f"d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2), s = rms_slope; thesis: c = {LAW}"
     result.attrs["window"] = "regions I to III, where friction does not fall; equal weights of the relative deviations"
     return result.assign_coords(hurst=[label for label, _ in rows])
 
 
+def _constant(before: FloatArray, jump: FloatArray, used: NDArray[np.bool_], cases: Cases) -> dict[str, float | str]:
+    """Return a row of the table of `_jump_law`."""
+    pairs = np.log(np.stack([before[:, used], jump[:, used]], axis=1))
+    count = cases.count(used)
+    nothing = f"not tested: no case with mu_1 / rms_slope > {REGION_ONE}, where the law depends on its constant"
+    stated = _left(pairs[:1], np.array([[LAW]]))[0, 1]
+    row: dict[str, float | str] = {"constant_of_thesis": LAW, "deviation_of_thesis": _rms(stated)}
+    if not np.any(pairs[0, 0] > np.log(REGION_ONE)):
+        ends = dict.fromkeys(("constant", "constant_low", "constant_high", "deviation"), np.nan)
+        return ends | row | {"cases": pairs.shape[2], "law_holds": nothing}
+    found = fitted(_constants, _left, pairs, count)
+    low, high = bootstrap.interval(found.constants[:, 0], count, positive=True)
+    worst = f"mu_1 / rms_slope = {np.exp(pairs[0, 0, np.argmax(np.abs(found.departures[1]))]):.2g}"
+    return {
+        "constant": float(found.constants[0, 0]),
+        "constant_low": float(low),
+        "constant_high": float(high),
+        **row,
+        "deviation": _rms(found.departures[1]),
+        "cases": pairs.shape[2],
+        "law_holds": law_holds(found.departures[1], found.chance, 1, worst),
+    }
+
+
 def _rising(cases: Cases, numbers: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
     """Return which cases lie in regions I to III, those of eqs. 4.9-4.11: friction does not fall with velocity."""
-    highest = bootstrap.interval(numbers["xi"], cases.count)[1]
+    highest = bootstrap.interval(numbers["xi"], cases.counts)[1]
     rising: NDArray[np.bool_] = np.isfinite(highest) & (highest >= 0)
     return rising
 
@@ -213,24 +292,25 @@ def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
     return law
 
 
-def _deviation(before: FloatArray, jump: FloatArray, constant: float) -> float:
-    return float(np.sqrt(np.mean(np.log(jump_law(before, constant) / jump) ** 2))) if before.size else np.nan
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan
 
 
-def _constants(before: FloatArray, jump: FloatArray) -> FloatArray:
-    """Return samples of the constant c that fits log d_mu_0 best, by Gauss and Newton's steps in ln c.
+def _left(pairs: FloatArray, constant: FloatArray) -> FloatArray:
+    """Return ln d_mu_0 less the law, shape (rows, 2, cases), beside zeros for ln mu_1, which no law gives."""
+    left = pairs[:, 1] - np.log(jump_law(np.exp(pairs[:, 0]), constant))
+    return np.stack([0 * left, left], axis=1)
 
-    In region I the law does not depend on it: NaN where all cases lie there.
-    """
-    if not np.any(before[0] > REGION_ONE):
-        return np.full(len(before), np.nan)
-    constant = np.full((len(before), 1), LAW)
+
+def _constants(pairs: FloatArray) -> FloatArray:
+    """Return the constant c that fits ln d_mu_0 best in every row of ln mu_1 and ln d_mu_0, by Gauss and Newton."""
+    constant = np.full((len(pairs), 1), LAW)
     for _ in range(30):
-        law = jump_law(before, constant)
-        slope = (law / constant) ** 2  # d ln law / d ln c
-        step = np.sum(slope * np.log(jump / law), axis=1, keepdims=True) / np.sum(slope**2, axis=1, keepdims=True)
+        slope = (jump_law(np.exp(pairs[:, 0]), constant) / constant) ** 2  # d ln law / d ln c
+        left = _left(pairs, constant)[:, 1]
+        step = np.sum(slope * left, axis=1, keepdims=True) / np.sum(slope**2, axis=1, keepdims=True)
         constant = constant * np.exp(np.clip(step, -1, 1))
-    return constant[:, 0]
+    return constant
 
 
 def _jump_limits(series: Series) -> xr.Dataset:
@@ -247,9 +327,13 @@ def _jump_limits(series: Series) -> xr.Dataset:
         raise FitError(f"expected cases with mu_1 / rms_slope below {REGION_ONE} or above {PLATEAU}")
     rows = _rows_of(cases.column("hurst"))
     table = np.full((len(rows), len(limits), len(LIMIT_FIELDS)), np.nan)
+    verdicts = np.empty(table.shape[:2], dtype=object)
     for i, (_, chosen) in enumerate(rows):
         for j, (inside, samples, limit, interpolated) in enumerate(limits.values()):
-            table[i, j] = _limit(samples, inside & chosen, limit, interpolated, cases.count)
+            within = inside & chosen & np.isfinite(samples[0])
+            count = cases.count(within)
+            table[i, j] = _limit(samples, within, limit, interpolated, count)
+            verdicts[i, j] = _limit_holds(samples[:, within] / limit - 1, count)
     result = xr.Dataset(
         {
             name: (("hurst", "limit"), table[..., k], {"units": "1", "long_name": meaning})
@@ -257,6 +341,7 @@ def _jump_limits(series: Series) -> xr.Dataset:
         },
         {"hurst": [label for label, _ in rows], "limit": list(limits)},
     )
+    result["law_holds"] = (("hurst", "limit"), verdicts.astype(str), LAW_HOLDS)
     result.attrs["law"] = f"eq. 4.9: zeta = 1 in region I; eq. 4.10: d_mu_0 v_1 / (dv rms_slope) = {LAW} on the plateau"
     result.attrs["window"] = f"region I: mu_1 / rms_slope < {REGION_ONE}; plateau: > {PLATEAU}, and not falling"
     return result
@@ -278,13 +363,19 @@ def _limit(
     samples: FloatArray, inside: NDArray[np.bool_], limit: float, interpolated: FloatArray, count: int
 ) -> list[float]:
     """Return the entries of `LIMIT_FIELDS` for the cases inside a region."""
-    inside = inside & np.isfinite(samples[0])
     if not np.any(inside):
         return [np.nan, np.nan, np.nan, limit, np.nan, np.nan, np.nan, 0]
     mean = samples[:, inside].mean(axis=1)
     low, high = bootstrap.interval(mean, count)
     ends = samples[0, inside].min(), samples[0, inside].max()
     return [mean[0], float(low), float(high), limit, interpolated[inside].mean(), *ends, np.count_nonzero(inside)]
+
+
+def _limit_holds(departures: FloatArray, count: int) -> str:
+    """Say whether a limit holds in the cases of its region, from the stack of their relative departures."""
+    if not departures.shape[1]:
+        return "not tested: no case in this region"
+    return law_holds(departures[0], bootstrap.chance(departures, count))
 
 
 POWER_FIELDS = {
@@ -306,15 +397,19 @@ def _rate_power(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *_needed())
     along = {dim for name in ("velocity", "relaxation_time", "points", "length") for dim in cases.data[name].dims}
     rows = [dim for dim in cases.template.dims if dim not in along]
-    samples, _ = _relaxations(cases)
+    samples = _relaxations(cases).stacks
+    known = 1 + bootstrap.RESAMPLES + 2 * min(bootstrap.GROUPS, 1 + cases.data["relaxation_times"].size)
+    samples = {name: samples[name][:known] for name in RATE_FIELDS}  # without what one exponential leaves
     x, place = np.log(cases.passing), cases.places(rows)
     hurst = cases.column("hurst")
     table = np.full((place.max() + 1, 2, len(POWER_FIELDS)), np.nan)
+    verdicts = np.empty(table.shape[:2], dtype=object)
     for i in range(len(table)):
         for j, side in enumerate((x < 0, x > 0)):
             inside = side & (place == i)
-            law = (1.0, 1 - hurst[place == i][0])[j]
-            table[i, j] = _powers(x[inside], {name: samples[name][:, inside] for name in RATE_FIELDS}, law, cases.count)
+            law, counts = (1.0, 1 - hurst[place == i][0])[j], cases.counts[inside]
+            rates = {name: samples[name][:, inside] for name in RATE_FIELDS}
+            table[i, j], verdicts[i, j] = _powers(x[inside], rates, law, counts)
     if np.all(np.isnan(table[..., 0])):
         raise FitError("expected three or more rates, known to a factor of 1.6, over different v_1 tau q_max")
     shape = *(cases.template.sizes[dim] for dim in rows), 2
@@ -325,17 +420,21 @@ def _rate_power(series: Series) -> xr.Dataset:
         },
         {dim: cases.template[dim] for dim in rows} | {"regime": ["below", "above"]},
     )
+    result["law_holds"] = ((*rows, "regime"), verdicts.reshape(shape).astype(str), LAW_HOLDS)
     result.attrs["law"] = "b = factor (v_1 tau q_max)^power; thesis: 1 below, 1 - H above v_1 tau q_max = 1"
     result.attrs["window"] = f"{WINDOW_TEXT}; rates whose ln is known within {TRUSTED}"
     return result
 
 
-def _powers(x: FloatArray, rates: Mapping[str, FloatArray], law: float, count: int) -> list[float]:
-    """Return the entries of `POWER_FIELDS` for the rates of one regime."""
-    power, factor, deviation, number = _power(x, rates["rate"], count)
-    alike = _power(x, rates["rate_unweighted"], count)[0]
+def _powers(
+    x: FloatArray, rates: Mapping[str, FloatArray], law: float, counts: NDArray[np.int64]
+) -> tuple[list[float], str]:
+    """Return the entries of `POWER_FIELDS` for the rates of one regime, and whether the power law holds."""
+    power, factor, deviation, number, verdict = _power(x, rates["rate"], counts)
+    alike = _power(x, rates["rate_unweighted"], counts)[0]
+    count = int(counts.min(initial=2**31 - 1))
     ends = [float(end) for samples in (power, alike) for end in bootstrap.interval(samples, count)]
-    return [power[0], *ends[:2], law, factor, deviation, alike[0], *ends[2:], number]
+    return [power[0], *ends[:2], law, factor, deviation, alike[0], *ends[2:], number], verdict
 
 
 def well_known(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
@@ -345,22 +444,31 @@ def well_known(low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
     return known
 
 
-def _power(x: FloatArray, rates: FloatArray, count: int) -> tuple[FloatArray, float, float, int]:
-    """Return samples of the power, the factor, the rms deviation, and how many rates were known well enough."""
-    low, high = bootstrap.interval(rates, count, positive=True)
+def _power(x: FloatArray, rates: FloatArray, counts: NDArray[np.int64]) -> tuple[FloatArray, float, float, int, str]:
+    """Return a stack of the power, factor, rms deviation, how many rates were known well, and whether the law holds."""
+    low, high = bootstrap.interval(rates, counts, positive=True)
     good = well_known(low, high)
     number = int(np.count_nonzero(good))
     if number < 3 or np.ptp(x[good]) < TRUSTED:
-        return np.full(len(rates), np.nan), np.nan, np.nan, number
+        reason = f"not tested: {number} rates known to a factor of 1.6; three over different v_1 tau q_max are needed"
+        return np.full(len(rates), np.nan), np.nan, np.nan, number, reason
     quarter = 0.25 * np.log(high[good] / low[good])
-    y, weights = np.log(rates[:, good]), 1 / (quarter**2 + SURE**2)
+    weights = 1 / (quarter**2 + SURE**2)
     weights /= weights.sum()
     centred = x[good] - weights @ x[good]
-    power = y @ (weights * centred) / (weights @ centred**2)
-    level = float(y[0] @ weights)
-    off = y[0] - level - power[0] * centred
-    factor = float(np.exp(level - power[0] * (weights @ x[good])))
-    return power, factor, float(np.sqrt(np.mean(off**2))), number
+    design = np.stack([centred, np.ones(number)])
+    solve = np.stack([weights * centred / (weights @ centred**2), weights], axis=1)
+    found = fitted(
+        lambda logs: logs @ solve,
+        lambda logs, constants: logs - constants @ design,
+        np.log(bootstrap.regrouped(rates[:, good])),
+        int(counts[good].min()),
+    )
+    power, level = found.constants.T
+    factor = float(np.exp(level[0] - power[0] * (weights @ x[good])))
+    worst = f"v_1 tau q_max = {np.exp(x[good][np.argmax(np.abs(found.departures))]):.2g}"
+    verdict = law_holds(found.departures, found.chance, 2, worst, within=SURE)
+    return power, factor, _rms(found.departures), number, verdict
 
 
 def _rate_and_state(series: Series) -> xr.Dataset:
@@ -368,7 +476,8 @@ def _rate_and_state(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *_needed())
     before, jump, after = cases.levels()
     logarithm = np.log1p(cases.column("velocity_change"))
-    lengths = _lengths(cases, _relaxations(cases)[0]["rate"])
+    relaxing = _relaxations(cases)
+    lengths = _lengths(cases, relaxing.stacks["rate"])
     samples = {
         "direct_effect": jump / logarithm,
         "evolution_effect": (before + jump - after) / logarithm,
@@ -377,6 +486,7 @@ def _rate_and_state(series: Series) -> xr.Dataset:
         "slip_length_times_wavenumber": lengths["length_times_wavenumber"],
     }
     result = xr.Dataset(cases.constants(samples, STATE_FIELDS, POSITIVE))
+    result["law_holds"] = cases.found(relaxing.verdicts(), "1", LAW_HOLDS["long_name"])
     result.attrs["law"] = "mu = mu_1 + a ln(v_2 / v_1) - b ln(v_2 / v_1) (1 - exp(-s / D_c)), s slipped since the jump"
     result.attrs["window"] = WINDOW_TEXT
     return result

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
+from mdr_dask.fit.base import DOUBTFUL, WITHIN
 
 Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 WINDOW = 8.0  # over the expected rate
 FLOOR = 0.01  # of the largest relaxing part: what the grid adds to the standard error of a moment (docs/kinetics.md)
 ENOUGH = 2e-3  # share of the squared trace below which what is left may be the grid's: FLOOR at every moment
-DOUBTFUL = 0.05  # probability below which one exponential is rejected
 GRID = 121
 ROUNDS = 6
 STEPS, STEPS_ON = 25, 8  # from a guess, and from the fit to the trace itself to that of a resample
@@ -37,13 +39,41 @@ SHAPE_FIELDS = {
     "slow_rate": ("1", "smaller rate of two exponentials"),
     "fast_share": ("1", "share of the amplitude that relaxes at the greater rate; negative where it grows first"),
 }
-GOODNESS_FIELDS = {
-    "window": ("1", "last t' of the fit"),
-    "unexplained": ("1", "weighted share of the squared relaxing part that one exponential leaves"),
-    "probability": ("1", "of a residual as large as this if one exponential were true, by bootstrap"),
-    "stretched_unexplained": ("1", "share that the stretched exponential leaves"),
-    "two_unexplained": ("1", "share that two exponentials leave"),
-}
+
+
+class Left(NamedTuple):
+    """What a law leaves of a mean trace.
+
+    Attributes
+    ----------
+    unexplained : float
+        Weighted share of the squared trace.
+    rms, largest : float
+        Residual over the largest relaxing part, every moment of the log-spaced times alike.
+    probability : float
+        How often scatter and errors leave as much, the smaller one of both ways to weigh the moments.
+    """
+
+    unexplained: float
+    rms: float
+    largest: float
+    probability: float
+
+
+LAWS = {"one": "one exponential", "stretched": "a stretched exponential", "two": "two exponentials"}
+
+
+def _left(
+    residuals: FloatArray, trace: FloatArray, weights: FloatArray, count: int, draws: int = bootstrap.RESAMPLES
+) -> Left:
+    relative = np.abs(residuals[0]) / np.abs(trace).max()
+    chances = (bootstrap.chance(residuals * weight, count, draws) for weight in (np.sqrt(weights), 1.0))
+    return Left(
+        float(residuals[0] ** 2 @ weights / (trace**2 @ weights)),
+        float(np.sqrt(np.mean(relative**2))),
+        float(relative.max()),
+        min(chances),
+    )
 
 
 def widths(time: FloatArray) -> FloatArray:
@@ -159,28 +189,28 @@ def least_squares(
 
 
 def _followed(
-    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray
-) -> tuple[FloatArray, float]:
+    law: Law, time: FloatArray, traces: FloatArray, weights: FloatArray, starts: FloatArray, count: int
+) -> tuple[FloatArray, Left]:
     """Fit the first trace from several starts, and the others from what was found."""
     tried, left = least_squares(law, time, np.repeat(traces[:1], len(starts), axis=0), weights, starts)
     best = int(np.argmin(left))
     from_here = np.repeat(tried[best : best + 1], len(traces), axis=0)
     found, _ = least_squares(law, time, traces, weights, from_here, STEPS_ON)
-    return found, float(left[best])
+    return found, _left(traces - law(found, time)[0], traces[0], weights, count, SHAPED)
 
 
 def _shapes(
-    time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float
-) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Fit a stretched exponential and two exponentials: samples of their constants, and shares that they leave."""
+    time: FloatArray, traces: FloatArray, weights: FloatArray, rate: float, count: int
+) -> tuple[dict[str, FloatArray], dict[str, Left]]:
+    """Fit a stretched exponential and two exponentials: stacks of their constants, and what they leave."""
     scale = np.abs(traces[0]).max()
-    scaled = traces[: 1 + SHAPED] / scale
+    used = np.r_[: 1 + SHAPED, 1 + bootstrap.RESAMPLES : len(traces)]
+    scaled = traces[used] / scale
     b = np.log(rate)
-    one, left_one = _followed(
-        stretched, time, scaled, weights, np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
-    )
+    starts = np.array([[1.0, b, 0.0], [1, b + 0.5, -0.7], [1, b, 0.4]])
+    one, left_one = _followed(stretched, time, scaled, weights, starts, count)
     starts = np.array([[0.5, 0.5, b - 0.7, b + 0.7], [0.8, 0.2, b - 0.2, b + 2], [1.2, -0.2, b + 0.2, b + 1.5]])
-    two, left_two = _followed(double, time, scaled, weights, starts)
+    two, left_two = _followed(double, time, scaled, weights, starts, count)
     two = np.where(two[:, 2:3] <= two[:, 3:], two, two[:, [1, 0, 3, 2]])
     samples = {
         "stretched_rate": np.exp(one[:, 1]),
@@ -190,35 +220,40 @@ def _shapes(
         "fast_share": two[:, 1] / two[:, :2].sum(axis=1),
         "two_amplitude": two[:, :2].sum(axis=1) * scale,
     }
-    return samples, {"stretched_unexplained": left_one, "two_unexplained": left_two}
+    return {name: _spread(values, used, len(traces)) for name, values in samples.items()}, {
+        "stretched": left_one,
+        "two": left_two,
+    }
 
 
-def _probability(traces: FloatArray, curves: FloatArray, weights: FloatArray) -> float:
-    """Return how often the scatter alone leaves as much as is left: residuals of the resamples about the residual."""
-    residual = traces - curves
-    by_scatter = (residual[1:] - residual[0]) ** 2 @ weights
-    return float(np.mean(by_scatter >= residual[0] ** 2 @ weights))
+def _spread(values: FloatArray, used: NDArray[np.int64], size: int) -> FloatArray:
+    """Return the rows used at their places in a stack, NaN elsewhere."""
+    stack = np.full(size, np.nan)
+    stack[used] = values
+    return stack
 
 
-def one_is_enough(unexplained: FloatArray, probability: FloatArray | float) -> NDArray[np.bool_]:
-    """Return where what one exponential leaves may be chance, or the grid's."""
-    enough: NDArray[np.bool_] = (unexplained < ENOUGH) | (np.asarray(probability) >= DOUBTFUL)
-    return enough
+def enough(left: Left) -> bool:
+    """Return whether what a law leaves may be chance, or is too small to count."""
+    small = left.unexplained < ENOUGH and left.rms <= WITHIN and left.largest <= 2 * WITHIN
+    return bool(small or left.probability >= DOUBTFUL)
 
 
 def relaxation_of(
-    time: FloatArray, traces: FloatArray, error: FloatArray, expected: float, shaped: bool = False
-) -> tuple[dict[str, FloatArray], dict[str, float]]:
-    """Fit the relaxation of a mean trace and of its resamples.
+    time: FloatArray, traces: FloatArray, error: FloatArray, count: int, expected: float, shaped: bool = False
+) -> tuple[dict[str, FloatArray], dict[str, Left]]:
+    """Fit the relaxation of a mean trace.
 
     Parameters
     ----------
     time : array, shape (m,)
         (t - t_0) / tau from zero on.
-    traces : array, shape (n, m)
-        Mean of mu - mu_2 over the realisations, and the same over resamples of them.
+    traces : array, shape (1 + RESAMPLES + 2 groups, m)
+        Stack of mu - mu_2 over the realisations.
     error : array, shape (m,)
         Standard error of the mean.
+    count : int
+        Realisations.
     expected : float
         Rate of the law, which fixes the window of the fit, 8 / expected.
     shaped : bool
@@ -226,27 +261,40 @@ def relaxation_of(
 
     Returns
     -------
-    samples : dict of array, shape (n,)
+    stacks : dict of array
         The entries of `RATE_FIELDS` and `AMPLITUDE_FIELDS`, and of `SHAPE_FIELDS` where one exponential is not enough.
-    goodness : dict of float
-        The entries of `GOODNESS_FIELDS` that there are.
+        There the last rows of its rate are moved by what it leaves, and to the other rates.
+    left : dict of Left
+        Of ``one`` exponential, and of the laws ``stretched`` and ``two`` that were fitted.
     """
-    early = time[min(8, time.size - 1)]
-    inside = time <= max(WINDOW / expected, early)
+    inside = time <= window(time, expected)
     t, y = time[inside], traces[:, inside]
     weights = point_weights(t, y[0], error[inside])
-    rate, amplitude, left = exponential(t, y, weights)
-    rate_alike, amplitude_alike, _ = exponential(t, y, widths(t))
-    samples = {
+    rate, amplitude, _ = exponential(t, y, weights)
+    residuals = y - amplitude[:, None] * np.exp(-rate[:, None] * t)
+    left = {"one": _left(residuals, y[0], weights, count)}
+    integral = traces[:, 0] / (traces @ widths(time))
+    missed = y if enough(left["one"]) else np.concatenate([y, bootstrap.moved(y[0], residuals[0])])
+    rate, amplitude, _ = exponential(t, missed, weights)
+    rate_alike, amplitude_alike, _ = exponential(t, missed, widths(t))
+    stacks = {
         "rate": rate,
         "rate_unweighted": rate_alike,
         "amplitude": amplitude,
         "amplitude_unweighted": amplitude_alike,
-        "integral_rate": traces[:, 0] / (traces @ widths(time)),
+        "integral_rate": integral,
     }
-    probability = _probability(y, amplitude[:, None] * np.exp(-rate[:, None] * t), weights)
-    goodness = {"window": float(t[-1]), "unexplained": float(left[0]), "probability": probability}
-    if not shaped or one_is_enough(left[0], probability):
-        return samples, goodness
-    shapes, shares = _shapes(t, y, weights, float(rate[0]))
-    return samples | shapes, goodness | shares
+    if enough(left["one"]):
+        return stacks, left
+    for name in ("rate", "rate_unweighted", "integral_rate"):
+        others = [stacks[other][0] for other in ("rate", "rate_unweighted", "integral_rate") if other != name]
+        stacks[name] = np.append(stacks[name], others)
+    if not shaped:
+        return stacks, left
+    shapes, those = _shapes(t, y, weights, float(rate[0]), count)
+    return stacks | shapes, left | those
+
+
+def window(time: FloatArray, expected: float) -> float:
+    """Return the last time of a fit."""
+    return float(time[time <= max(WINDOW / expected, time[min(8, time.size - 1)])][-1])

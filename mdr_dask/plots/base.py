@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from mdr_dask.errors import DataError, MdrDaskError
+from mdr_dask.models.base import Status
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -23,13 +26,53 @@ class Plot:
     models : tuple of str
         Models whose stores it understands.
     summary : str
-        One line: what is over what, and the figure of the thesis it redraws.
+        One line: what against what, and the figure of the thesis it redraws.
     draw : callable, mapping of str to Dataset -> Figure
-        Takes the groups of a store as :class:`mdr_dask.fit.base.Fit` does. Axes carry units; bands carry the
-        standard error or interval and say which.
+        Takes the groups of a store as :class:`mdr_dask.fit.base.Fit` does. Axes carry units, the title what bars mean
+        and what is held fixed; `mdr_dask.plots.style.leave_out` says what is not drawn.
     """
 
     name: str
     models: tuple[str, ...]
     summary: str
     draw: Callable[[Mapping[str, xr.Dataset]], Figure]
+
+    def figure(self, groups: Mapping[str, xr.Dataset]) -> Figure:
+        """Draw it from the groups of a store; results that failed or are missing are counted under it.
+
+        Axes of one value are parameters at a fixed value.
+
+        Raises
+        ------
+        DataError, FitError
+            If the store has not the data for it.
+        """
+        from mdr_dask.plots.style import leave_out
+
+        try:
+            figure = self.draw({name: _prepared(data) for name, data in groups.items()})
+        except MdrDaskError:
+            raise
+        except Exception as error:
+            # a fault of the figure must neither end the others nor the program
+            problem = f"{type(error).__name__}: {error}"
+            raise DataError(f"a fault of this figure, please report it with the campaign: {problem}") from error
+        leave_out(figure, _without_value(groups))
+        return figure
+
+
+def _prepared(data: xr.Dataset) -> xr.Dataset:
+    """Return a series with its coordinates read once, and parameters of one value fixed."""
+    data = data.assign_coords({name: value.copy(data=value.to_numpy()) for name, value in data.coords.items()})
+    if "status" not in data:
+        return data
+    return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])
+
+
+def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
+    """Return how many results of a store have no value, and why."""
+    states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
+    total = sum(state.size for state in states)
+    told = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are not there yet"}
+    counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in told.items()}
+    return [f"{count} of {total} results of the store, which {words}" for words, count in counts.items() if count]

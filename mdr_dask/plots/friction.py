@@ -2,273 +2,437 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from mdr_dask.errors import DataError
+from mdr_dask import aggregation
+from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
+from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from mdr_dask.fit.base import Fit
+
 MODELS = ("sliding_friction",)
-BAND = "bands: standard error over realisations"
-MOST_CURVES = 24
-FIT = {fit.name: fit for fit in FITS}
+MU = "friction_coefficient"
+#: What a title says of a case, where it is fixed.
+CASE = (
+    *("hurst", "normal_force", "velocity", "shear_modulus", "relaxation_time"),
+    *("rms_roughness", "length", "points", "longest_wavelength", "indenter_angle", "indenter_radius"),
+)
+#: Axes that get the colours, the first that varies.
+BY = ("normal_force", "hurst", "shear_modulus", "rms_roughness", "points")
+FIT: dict[str, Fit] = {fit.name: fit for fit in FITS}
 
 
-def _figure(xlabel: str, ylabel: str, title: str) -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7, 4.8), layout="constrained")
-    axes = figure.add_subplot()
-    axes.set(xlabel=xlabel, ylabel=ylabel)
-    axes.set_title(title, fontsize="medium")
-    axes.grid(alpha=0.3)
-    return figure, axes
+def on_generated_line(data: xr.Dataset) -> bool:
+    """Return whether a series has a Kelvin body on a generated line, which the laws are written for."""
+    needed = {"shear_modulus", "relaxation_time", "rms_roughness", "length", "hurst", "points"}
+    return needed <= set(data.coords) and bool((data["rms_roughness"] > 0).all())
 
 
-def _colours(count: int) -> Any:
-    from matplotlib import colormaps
-
-    return colormaps["viridis"](np.linspace(0, 0.9, max(count, 2)))
-
-
-def _moments(value: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Return mean and standard error over realisations."""
-    count = value.count("realisation")
-    error = value.std("realisation", ddof=1) / np.sqrt(count) if value.sizes["realisation"] > 1 else 0 * count
-    return value.mean("realisation"), error
+def is_plane(data: xr.Dataset) -> bool:
+    """Return whether a series has a Kelvin body on a generated line under a plane body."""
+    return on_generated_line(data) and not any(str(name).startswith("indenter_") for name in data.coords)
 
 
-def _curves(data: xr.Dataset, along: str) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield a label and the data of every curve over one dimension, at most `MOST_CURVES` of them."""
-    dims = [str(dim) for dim in data["friction_coefficient"].dims if dim not in (along, "realisation")]
-    cells = list(np.ndindex(*(data.sizes[dim] for dim in dims)))
-    shown = sorted({round(k) for k in np.linspace(0, len(cells) - 1, min(len(cells), MOST_CURVES))})
-    for k in shown:
-        part = data.isel(dict(zip(dims, cells[k], strict=True)))
-        yield ", ".join(_named(part, dim) for dim in dims), part
+class _Shown(NamedTuple):
+    """What stands on the axes: friction over what, velocity times what, and both labels."""
+
+    factor: Any
+    speed: Any
+    x: str
+    y: str
 
 
-def _named(data: xr.Dataset, name: str) -> str:
-    """Return a parameter as it stands in a legend."""
-    value, unit = data[name].values[()], data[name].attrs.get("units", "1")
-    number = f"{value:.3g}" if np.issubdtype(data[name].dtype, np.number) else str(value)
-    symbol = {"hurst": "H", "normal_force": "F_N", "shear_modulus": "G", "rms_roughness": "h"}.get(name, name)
-    return f"{symbol} = {number}" + ("" if unit == "1" else f" {unit}")
+def _in_units(data: xr.Dataset) -> _Shown:
+    """Return friction against velocity: over the rms slope where that of the spectrum is known."""
+    x = style.label("velocity", data["velocity"])
+    if on_generated_line(data):
+        return _Shown(1 / spectral_slope(data), 1.0, x, r"$\mu$ / rms slope")
+    return _Shown(1.0, 1.0, x, r"coefficient of friction $\mu$")
 
 
-def _with_dimension(series: Mapping[str, xr.Dataset], *names: str) -> tuple[str, xr.Dataset]:
-    """Return the first group whose friction varies along all of some parameters."""
-    for name, data in series.items():
-        if set(names) <= set(data["friction_coefficient"].dims):
-            return name, data
-    wanted = " and ".join(names)
-    raise DataError(f"expected a series whose axes include {wanted}, got {', '.join(series) or 'none'}")
+def _in_numbers(data: xr.Dataset) -> _Shown:
+    """Return friction against velocity as the interpolation law has them, where it is meant to hold."""
+    if not is_plane(data):
+        return _in_units(data)
+    _, _, number = numbers(data)
+    factor = 1 / (np.sqrt(2) * spectral_slope(data))
+    x = r"velocity number $v \tau \nabla z / (\sqrt{2} h)$"
+    return _Shown(factor, number / data["velocity"], x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
 
 
-def _constants(data: xr.Dataset) -> tuple[Any, float]:
-    return laws.alpha(data["hurst"]), laws.BETA
+def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, curves.Mean]:
+    """Return where the points of a curve lie and their means."""
+    shown = how(data)
+    return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
 
 
-def _caption(name: str, what: str) -> str:
-    return f"{what}{f', series {name}' if name else ''} ({BAND})"
+def _small(data: xr.Dataset) -> xr.Dataset:
+    """Return what figures of friction need, so that nothing else is read."""
+    wanted = [name for name in (MU, f"{MU}_error", "rms_slope", "status") if name in data]
+    return data[wanted]
 
 
-def _legend(axes: Axes, count: int) -> None:
-    if count:
-        axes.legend(fontsize="x-small", ncols=1 + count // 13, loc="best")
+def _against_velocity(
+    groups: Mapping[str, xr.Dataset],
+    subject: str,
+    how: Callable[[xr.Dataset], _Shown],
+    by: tuple[str, ...],
+    scales: str,
+    varied: tuple[str, ...] = (),
+    law: bool = False,
+) -> Figure:
+    """Draw friction against velocity, one panel for each series."""
+    found = {name: _small(data) for name, data in curves.with_outputs(groups, [MU], "velocity", *varied).items()}
+    found, told = curves.few(found)
+    figure, panels = style.panels(len(found))
+    families = []
+    for axes, (name, data) in zip(panels, found.items(), strict=True):
+        one = curves.family(data, MU, "velocity", by)
+        families.append(one)
+        told += [f"{name}: {each}" if name else each for each in one.left_out]
+        for curve in one.curves:
+            curves.draw(axes, curve, *_mean_of(curve.data, how))
+            if law and one.joined and is_plane(curve.data):
+                _draw_law(axes, curve)
+        shown = how(one.curves[0].data)
+        axes.set(xlabel=shown.x, ylabel=shown.y)
+        style.logarithmic(axes, scales)
+        if "y" not in scales:
+            axes.set_ylim(bottom=0)
+        if law and one.joined and is_plane(data):
+            axes.plot([], [], "k-", lw=0.8, label="law (eq. 3.18)")
+        curves.finish(figure, axes, one)
+    _titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
+    style.leave_out(figure, told)
+    return figure
 
 
-def _draw_regions(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figure 3.7: mu / slope over velocity for one case, with the regions of the law."""
-    name, data = _with_dimension(series, "velocity")
-    middle = {
-        dim: data.sizes[dim] // 2 for dim in data["friction_coefficient"].dims if dim not in ("velocity", "realisation")
-    }
-    data = data.isel(middle)
-    slope = spectral_slope(data)
-    mean, error = _moments(data["friction_coefficient"] / slope)
-    velocity = data["velocity"].values
-    where = ", ".join(_named(data, str(dim)) for dim in middle)
-    figure, axes = _figure("velocity v (m/s)", "μ / rms slope", _caption(name, where or "friction over velocity"))
-    axes.set_xscale("log")
-    axes.fill_between(velocity, (mean - error).values, (mean + error).values, alpha=0.3)
-    axes.plot(velocity, mean.values, "o-", ms=3, label="simulated")
-    _, force, velocity_number = numbers(data)
-    exponent, beta = _constants(data)
-    fine = np.geomspace(velocity.min(), velocity.max(), 300)
-    scale = float(np.ravel((velocity_number / data["velocity"]).values)[0])
-    law = np.sqrt(2) * laws.interpolation(float(force), fine * scale, float(exponent), beta)
+def _titles(
+    figure: Figure, panels: list[Axes], names: list[str], families: list[curves.Family], subject: str, bars: str
+) -> None:
+    """Write what all panels hold fixed over the figure, and over each panel its series and what it alone holds."""
+    alike = curves.fixed_by_all([each.held for each in families])
+    style.title(figure, subject, curves.fixed_text(alike, CASE), bars)
+    for axes, name, one in zip(panels, names, families, strict=True):
+        own = {key: value for key, value in one.held.items() if key not in alike}
+        text = ", ".join(part for part in (name, curves.fixed_text(own, CASE)) if part)
+        if text:
+            axes.set_title(text, fontsize="small", wrap=True)
+
+
+def _draw_law(axes: Axes, curve: curves.Curve) -> None:
+    """Draw the interpolation law of one case through the range of its velocities."""
+    _, force, velocity = numbers(curve.data)
+    fine = np.geomspace(float(velocity.min()), float(velocity.max()), 200)
+    law = laws.interpolation(_number(force), fine, _number(laws.alpha(curve.data["hurst"])), laws.BETA)
+    axes.plot(fine, law, "-", lw=0.8, alpha=0.6, color=curve.colour)
+
+
+def _number(value: Any) -> float:
+    return float(np.ravel(np.asarray(value))[0])
+
+
+def draw_velocity(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw friction against velocity in the numbers of the interpolation law, with the law (figure 3.8)."""
+    by = ("hurst", "normal_force", "temperature")
+    return _against_velocity(groups, "friction against velocity", _in_numbers, by, "x", law=True)
+
+
+def draw_forces(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw friction against velocity, both logarithmic, for many loads (figure 3.9)."""
+    subject = "friction against velocity for every load"
+    return _against_velocity(groups, subject, _in_units, BY, "xy", ("normal_force",))
+
+
+def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw friction against velocity for one case of each series, with the regions of the law (figure 3.7)."""
+    found = curves.with_outputs(groups, [MU], "velocity", where=is_plane)
+    found = {name: _small(data) for name, data in found.items() if "velocity" in data[MU].dims}
+    if not found:
+        raise DataError("expected velocity as an axis of its own: regions follow one case through the velocities")
+    found, told = curves.few(found)
+    figure, panels = style.panels(len(found))
+    families = []
+    for axes, (name, data) in zip(panels, found.items(), strict=True):
+        one, more = curves.hold(data, [dim for dim in curves.axes_of(data, MU) if dim != "velocity"])
+        told += [f"{name}: {each}" if name else each for each in more]
+        families.append(curves.family(one, MU, "velocity"))
+        _draw_regions(axes, families[-1].curves[0])
+    bars = curves.meaning_of_bars(*found.values(), outputs=[MU])
+    _titles(figure, panels, list(found), families, "regions of friction against velocity", bars)
+    style.leave_out(figure, told)
+    return figure
+
+
+def _draw_regions(axes: Axes, curve: curves.Curve) -> None:
+    data = curve.data
+    velocity, value = _mean_of(data, _in_units)
+    curves.draw(axes, curve._replace(label="simulated"), velocity, value)
+    _, force, number = numbers(data)
+    scale = _number(number / data["velocity"])
+    exponent = _number(laws.alpha(data["hurst"]))
+    speeds = np.asarray(velocity.values)
+    fine = np.geomspace(speeds.min(), speeds.max(), 300)
+    law = np.sqrt(2) * laws.interpolation(_number(force), fine * scale, exponent, laws.BETA)
     axes.plot(fine, law, "k--", lw=1, label="law (eq. 3.18)")
-    edges = [edge / scale for edge in laws.regions(float(force), float(exponent), beta)]
-    edges.append(_fall(velocity, mean.values))
-    bounds = [velocity.min(), *edges, velocity.max()]
+    edges = [edge / scale for edge in laws.regions(_number(force), exponent, laws.BETA)]
+    edges.append(_fall(speeds, value.value.values))
+    bounds = [speeds.min(), *edges, speeds.max()]
     for left, right, region in zip(bounds[:-1], bounds[1:], ("I", "II", "III", "IV"), strict=True):
         if right > left > 0 and np.isfinite(right):
-            centre = np.sqrt(max(left, velocity.min()) * min(right, velocity.max()))
+            centre = np.sqrt(max(left, speeds.min()) * min(right, speeds.max()))
             axes.text(centre, 0.02, region, transform=axes.get_xaxis_transform(), ha="center")
     for edge in edges:
-        if velocity.min() < edge < velocity.max():
+        if speeds.min() < edge < speeds.max():
             axes.axvline(edge, color="grey", lw=0.8, ls=":")
-    axes.set_ylim(bottom=0)
-    _legend(axes, 2)
-    return figure
+    shown = _in_units(data)
+    axes.set(xlabel=shown.x, ylabel=shown.y, ylim=(0, None))
+    style.logarithmic(axes, "x")
+    style.legend(axes)
 
 
 def _fall(velocity: Any, mean: Any) -> float:
     """Return the velocity beyond the maximum at which friction has lost a twentieth of it, the start of region IV."""
+    if not np.isfinite(mean).any():
+        return float(velocity.max())
     peak = int(np.nanargmax(mean))
     below = np.flatnonzero(mean[peak:] < 0.95 * mean[peak])
     return float(velocity[peak + below[0]]) if below.size else float(velocity.max())
 
 
-def _draw_velocity(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figure 3.8: mu / (sqrt 2 slope) over the velocity number, several Hurst exponents, with the law."""
-    name, data = _with_dimension(series, "velocity")
-    figure, axes = _figure("v τ · slope / (√2 h)", "μ / (√2 · slope)", _caption(name, "friction over velocity"))
-    axes.set_xscale("log")
-    curves = list(_curves(data, "velocity"))
-    for colour, (label, part) in zip(_colours(len(curves)), curves, strict=True):
-        slope = spectral_slope(part)
-        mean, error = _moments(part["friction_coefficient"] / (np.sqrt(2) * slope))
-        _, force, velocity = numbers(part)
-        axes.fill_between(velocity.values, (mean - error).values, (mean + error).values, color=colour, alpha=0.25)
-        axes.plot(velocity.values, mean.values, "o", ms=3, color=colour, label=label)
-        law = laws.interpolation(force, velocity, *_constants(part))
-        axes.plot(velocity.values, law.values, "-", lw=1, color=colour)
-    axes.plot([], [], "k-", lw=1, label="law (eq. 3.18)")
-    _legend(axes, len(curves) + 1)
+def _fitted(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return the constants of a law for every series that has the data for it."""
+    known = {key: _small(data) for key, data in groups.items() if MU in data and _has_hurst(data)}
+    if not known:
+        raise DataError("expected one Hurst exponent or an axis of them: each has constants of its own")
+    return curves.results(FIT[name].compute, known)
+
+
+def _has_hurst(data: xr.Dataset) -> bool:
+    """Return whether the Hurst exponent is fixed or an axis of its own, not drawn along with other parameters."""
+    return "hurst" in data.coords and data["hurst"].dims in ((), ("hurst",))
+
+
+def constants(found: xr.Dataset, name: str) -> curves.Mean:
+    """Return fitted constants with their intervals."""
+    return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
+
+
+class _Panel(NamedTuple):
+    """A constant of a law against the Hurst exponent, and what it is compared with."""
+
+    constant: str
+    label: str
+    law: Callable[[Any], Any]
+    law_label: str
+
+
+def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, rows: tuple[_Panel, ...]) -> Figure:
+    """Draw constants of a law against the Hurst exponent, one panel for each, all series in it."""
+    found = _fitted(name, groups)
+    figure, panels = style.panels(len(rows), sharex=True)
+    fine, told, held = np.linspace(0, 1, 101), [], []
+    for axes, row in zip(panels, rows, strict=True):
+        families = {key: curves.family(each, row.constant, "hurst", BY) for key, each in found.items()}
+        for number, (key, one) in enumerate(families.items()):
+            alone = len(found) == 1
+            told += [each if alone else f"{key}: {each}" for each in one.left_out]
+            held.append(one.held)
+            for curve in one.curves:
+                text = ", ".join(part for part in ("" if alone else key, curve.label) if part)
+                colour = curve.colour if alone else style.COLOURS[number % len(style.COLOURS)]
+                drawn = curve._replace(label=text, colour=colour, line="", marker=style.MARKERS[number % 4])
+                curves.draw(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
+        axes.plot(fine, row.law(fine), "k-", lw=1, label=row.law_label)
+        axes.set(xlabel=style.label("hurst"), ylabel=row.label, ylim=(0, None))
+        curves.finish(figure, axes, next(iter(families.values())) if len(families) == 1 else curves.NO_FAMILY)
+    fixed = curves.fixed_by_all(held)
+    bars = "; ".join(part for part in ("bars: 95 % intervals", curves.verdict(found.values())) if part)
+    style.title(figure, subject, curves.fixed_text(fixed, CASE), bars)
+    style.leave_out(figure, told)
     return figure
 
 
-def _draw_forces(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figure 3.9: mu / slope over velocity, both logarithmic, for many loads."""
-    name, data = _with_dimension(series, "velocity", "normal_force")
-    inner = {dim: data.sizes[dim] // 2 for dim in data["friction_coefficient"].dims}
-    for dim in ("velocity", "normal_force", "realisation"):
-        inner.pop(dim, None)
-    data = data.isel(inner)
-    fixed = ", ".join(_named(data, str(dim)) for dim in inner)
-    figure, axes = _figure("velocity v (m/s)", "μ / rms slope", _caption(name, fixed or "friction over velocity"))
-    axes.set(xscale="log", yscale="log")
-    curves = list(_curves(data, "velocity"))
-    for colour, (label, part) in zip(_colours(len(curves)), curves, strict=True):
-        mean, error = _moments(part["friction_coefficient"] / spectral_slope(part))
-        low = (mean - error).where(mean > error)
-        axes.fill_between(part["velocity"].values, low.values, (mean + error).values, color=colour, alpha=0.3)
-        axes.plot(part["velocity"].values, mean.values, "-", lw=1.2, color=colour, label=label)
-    _legend(axes, len(curves))
-    return figure
-
-
-def _errorbars(axes: Axes, found: xr.Dataset, name: str, label: str, over: str = "hurst") -> None:
-    """Draw a fitted constant with its interval."""
-    low, high = found[name] - found[f"{name}_low"], found[f"{name}_high"] - found[name]
-    bars = np.clip([low.values, high.values], 0, None)
-    axes.errorbar(found[over].values, found[name].values, bars, fmt="o", ms=4, capsize=2, label=label)
-
-
-def _over_hurst(name: str, series: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-    """Fit every series that varies the Hurst exponent; return the results by a suffix for the legend."""
-    found = {key: fit for key, fit in FIT[name].results(series).items() if "hurst" in fit.dims}
-    if not found:
-        raise DataError("expected a store with an axis hurst, to draw over it")
-    return {f" ({key})" if len(found) > 1 else "": fit for key, fit in found.items()}
-
-
-def _draw_zone_one(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figure 3.10: alpha and beta over the Hurst exponent, with H / (1 + H)."""
-    found = _over_hurst("zone_one", series)
-    figure, axes = _figure("Hurst exponent H", "α", "law of zone 1: μ/slope = β (v τ slope/h) (GhL/F)^α (bars: 95 %)")
-    other = axes.twinx()
-    for suffix, part in found.items():
-        _errorbars(axes, part, "alpha", f"α{suffix}")
-        other.errorbar(
-            part["hurst"].values,
-            part["beta"].values,
-            [(part["beta"] - part["beta_low"]).values, (part["beta_high"] - part["beta"]).values],
-            fmt="s",
-            ms=4,
-            mfc="none",
-            capsize=2,
-            color="tab:red",
-            label=f"β{suffix}",
-        )
-    fine = np.linspace(0, 1, 101)
-    axes.plot(fine, laws.alpha(fine), "k-", label="H / (1 + H) (eq. 3.13)")
-    axes.set(ylim=(0, 0.6))
-    other.set(ylabel="β", ylim=(0, 2.4))
-    lines, labels = axes.get_legend_handles_labels()
-    more, more_labels = other.get_legend_handles_labels()
-    axes.legend(lines + more, labels + more_labels, fontsize="small", loc="lower right")
-    return figure
-
-
-def _draw_plateau(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figure 3.11: the plateau over the Hurst exponent, one curve for every load."""
-    found = _over_hurst("plateau", series)
-    figure, axes = _figure("Hurst exponent H", "largest μ / rms slope", "plateau of friction (bars: 95 %)")
-    curves = []
-    for suffix, part in found.items():
-        others = [str(dim) for dim in part["plateau"].dims if dim != "hurst"]
-        for index in np.ndindex(*(part.sizes[dim] for dim in others)):
-            one = part.isel(dict(zip(others, index, strict=True)))
-            curves.append((", ".join(_named(one, dim) for dim in others) + suffix or "simulated", one))
-    shown = curves[:: max(1, len(curves) // 10)]
-    axes.set_prop_cycle(color=_colours(len(shown)))
-    for label, one in shown:
-        _errorbars(axes, one, "plateau", label)
-    axes.axhline(np.sqrt(2), color="k", lw=1, ls="--", label="√2 (eq. 3.15)")
-    axes.set_ylim(bottom=0)
-    _legend(axes, len(shown) + 1)
-    return figure
-
-
-def _draw_indenter(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Figures 3.14 and 3.15: mu / (sqrt 2 slope) over xi of rough indenters, with the law."""
-    figure, axes = _figure(
-        "ξ = 8 G a τ v · slope / (√2 F_N)", "μ / (√2 · slope)", f"rough indenters against their law ({BAND})"
+def draw_zone_one(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw alpha and beta against the Hurst exponent, with H / (1 + H) (figure 3.10)."""
+    rows = (
+        _Panel("alpha", r"$\alpha$", laws.alpha, "H / (1 + H) (eq. 3.13)"),
+        _Panel("beta", r"$\beta$", lambda hurst: np.full_like(hurst, laws.BETA), f"{laws.BETA} of the docs"),
     )
-    axes.set(xscale="log", yscale="log")
-    drawn, left_out = [], 0
-    for (name, data), colour in zip(series.items(), _colours(len(series)), strict=False):
-        slope = spectral_slope(data)
-        mean, error = _moments(data["friction_coefficient"] / (np.sqrt(2) * slope))
-        columns = xr.broadcast(indenter_xi(data, slope), mean, error, within_indenter_law(data, slope))
-        xi, height, bar, within = (column.values.ravel() for column in columns)
-        known = np.isfinite(height) & (height > 0)
-        beyond, known = known & ~within, known & within
-        left_out += int(beyond.sum())
-        axes.plot(xi[beyond], height[beyond], ".", ms=2, color="0.85", zorder=1)
-        axes.errorbar(
-            xi[known], height[known], bar[known], fmt="o", ms=3, lw=0.8, color=colour, label=name or "simulated"
+    subject = r"law of zone 1: $\mu$ / slope = $\beta$ (v $\tau$ slope / h) (G h L / $F_N)^\alpha$"
+    return _against_hurst("zone_one", groups, subject, rows)
+
+
+def draw_plateau(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw the plateau against the Hurst exponent (figure 3.11)."""
+    row = _Panel(
+        "plateau", r"largest $\mu$ / rms slope", lambda hurst: np.full_like(hurst, np.sqrt(2)), "√2 (eq. 3.15)"
+    )
+    return _against_hurst("plateau", groups, "plateau of friction", (row,))
+
+
+def _indenter_points(data: xr.Dataset) -> dict[str, np.ndarray]:
+    """Return the points of one series of indenters, flat."""
+    slope = spectral_slope(data)
+    value = curves.measured(data, MU, 1 / (np.sqrt(2) * slope))
+    within = within_indenter_law(data, slope)
+    columns = xr.broadcast(indenter_xi(data, slope), *value, within)
+    names = ("xi", "value", "low", "high", "within")
+    return {
+        name: np.asarray(column.values, dtype=np.float64).ravel() for name, column in zip(names, columns, strict=True)
+    }
+
+
+def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw friction of rough indenters against xi, with their law (figures 3.14 and 3.15)."""
+    points, reasons = {}, []
+    for name, data in curves.with_outputs(groups, [MU]).items():
+        try:
+            points[name] = _indenter_points(_small(data))
+        except FitError as error:
+            reasons.append(f"{name}: {error}" if name else str(error))
+    if not points:
+        raise FitError("; ".join(dict.fromkeys(reasons)))
+    figure, (axes,) = style.panels(1)
+    inside = 0
+    for (name, one), colour in zip(points.items(), style.scale(len(points)), strict=True):
+        known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
+        within = known & (one["within"] > 0)
+        inside += int(within.sum())
+        axes.plot(
+            one["xi"][known & ~within], one["value"][known & ~within], ".", ms=2, color="0.8", zorder=1, gid=style.DATA
         )
-        drawn.append(xi[known | beyond])
-    if left_out:
-        axes.plot([], [], ".", color="0.7", label="steep or barely touching body, region IV")
-    span = np.concatenate(drawn)
+        value = curves.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
+        curves.scatter(axes, one["xi"][within], value, colour, "o", name or "simulated")
+    spans = [one["xi"][np.isfinite(one["xi"]) & (one["xi"] > 0)] for one in points.values()]
+    span = np.concatenate(spans)
     if not span.size:
-        raise DataError("expected a store with friction of a rough indenter, got none")
+        raise DataError("expected friction of a rough indenter, got no case that succeeded")
+    axes.plot([], [], ".", color="0.8", label="outside the law: steep or barely touching body, region IV")
     fine = np.geomspace(span.min(), span.max(), 300)
-    axes.plot(fine, laws.indenter(fine), "k-", lw=1, label="law (eq. 3.40), α = 1.5")
+    axes.plot(fine, laws.indenter(fine), "k-", lw=1, label=r"law (eq. 3.40), $\alpha$ = 1.5")
     axes.plot(fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
-    _legend(axes, len(drawn) + 3)
+    axes.set(xlabel=r"$\xi = 8 G a \tau v \nabla z / (\sqrt{2} F_N)$", ylabel=r"$\mu$ / ($\sqrt{2}$ rms slope)")
+    style.logarithmic(axes, "xy")
+    style.legend(axes)
+    held = curves.fixed_by_all([{str(k): v for k, v in groups[name].coords.items() if v.ndim == 0} for name in points])
+    total = sum(int(np.isfinite(one["value"]).sum()) for one in points.values())
+    bars_text = curves.meaning_of_bars(*(groups[name] for name in points), outputs=[MU])
+    subject = f"rough indenters against their law: {inside} of {total} cases lie within it"
+    style.title(figure, subject, curves.fixed_text(held, CASE), bars_text)
+    style.leave_out(figure, reasons)
     return figure
+
+
+def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw length and slope of the contact against the load, with F^(1 / (1 + H)) (eq. 3.12, 3.21)."""
+    found = curves.with_outputs(groups, GROWTH, "normal_force", where=is_plane)
+    found, told = curves.few(found, 3)
+    figure, panels = style.panels(2 * len(found), columns=2)
+    families = []
+    for k, (name, data) in enumerate(found.items()):
+        for axes, output in zip(panels[2 * k : 2 * k + 2], GROWTH, strict=True):
+            one = curves.family(data, output, "normal_force", ("hurst", "velocity"))
+            families.append(one)
+            for curve in one.curves:
+                _draw_contact(axes, curve, output, one.joined)
+            style.logarithmic(axes, "xy" if output == GROWTH[0] else "x")
+            curves.finish(figure, axes, one)
+        told += [f"{name}: {each}" if name else each for each in families[-1].left_out]
+    bars = curves.meaning_of_bars(*found.values(), outputs=GROWTH)
+    names = [name for name in found for _ in GROWTH]
+    subject = r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load"
+    _titles(figure, panels, names, families, subject, bars)
+    style.leave_out(figure, told)
+    return figure
+
+
+GROWTH = ("contact_fraction", "contact_slope")
+
+
+def _draw_contact(axes: Axes, curve: curves.Curve, output: str, joined: bool) -> None:
+    """Draw length or slope of the contact of one family's curve against the force number."""
+    data = curve.data
+    keys = ("normal_force", "shear_modulus", "rms_roughness", "length")
+    force = laws.force_number(*(data[key] for key in keys))
+    is_length = output == GROWTH[0]
+    value = curves.measured(data, output, 1.0 if is_length else 1 / spectral_slope(data))
+    curves.draw(axes, curve, force, value)
+    axes.set_xlabel("force number $F_N / (G h L)$")
+    axes.set_ylabel("contact length / L" if is_length else "rms slope in contact / rms slope")
+    if is_length and joined:
+        _draw_growth(axes, curve, np.asarray(force.values), np.asarray(value.value.values))
+
+
+def _draw_growth(axes: Axes, curve: curves.Curve, force: Any, fraction: Any) -> None:
+    """Draw the power law of eq. 3.12 through the lightest load that is known."""
+    known = np.flatnonzero(np.isfinite(fraction) & (fraction > 0))
+    if known.size:
+        first = known[np.argmin(force[known])]
+        law = fraction[first] * (force / force[first]) ** (1 / (1 + _number(curve.data["hurst"])))
+        axes.plot(force, np.minimum(law, 1), "--", lw=0.8, color=curve.colour)
+
+
+def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw all friction of planes on the scales of eq. 3.23: velocity over crossover, friction over plateau."""
+    found = curves.with_outputs(groups, [MU], where=is_plane)
+    figure, (axes,) = style.panels(1)
+    points = []
+    for data in found.values():
+        one = _small(data)
+        ratio, number, velocity = numbers(one)
+        crossover = laws.crossover(number, laws.alpha(one["hurst"]), laws.BETA)
+        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], number)
+        points.append([np.asarray(column.values, dtype=np.float64).ravel() for column in columns])
+    x, y, hurst, force = (np.concatenate(column) for column in zip(*points, strict=True))
+    known = np.isfinite(y) & (y > 0)
+    if not known.any():
+        raise DataError("expected friction of a rough plane, got no case that succeeded")
+    by, values = (style.label("hurst"), hurst) if np.ptp(hurst) > 0 else (r"force number $F_N / (G h L)$", force)
+    how, norm = style.shades(values[known])
+    drawn = axes.scatter(x[known], y[known], c=values[known], s=8, cmap=how, norm=norm)
+    drawn.set_gid(style.DATA)
+    fine = np.geomspace(x[known].min(), x[known].max(), 300)
+    axes.plot(fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label="interpolation law (eq. 3.18)")
+    off = y[known] / (1 + x[known] ** -2.0) ** -0.5
+    axes.set_xlabel(r"velocity number / crossover: $v \tau \nabla z / (\sqrt{2} h) / f(F_N / G h L)$")
+    axes.set_ylabel(r"$\mu$ / ($\sqrt{2}$ rms slope)")
+    style.logarithmic(axes, "xy")
+    figure.colorbar(drawn, ax=axes, label=by)
+    style.legend(axes)
+    spread = f"{int(known.sum())} cases; half of them deviate from the law by less than {_half(off):.0%}"
+    style.title(figure, "collapse of friction on the scales of eq. 3.23", spread)
+    return figure
+
+
+def _half(ratio: Any) -> float:
+    """Return the relative deviation that half of the cases stay within."""
+    return float(np.median(np.abs(ratio - 1)))
 
 
 PLOTS: tuple[Plot, ...] = (
-    Plot("regions", MODELS, "friction over velocity with regions I to IV (Fig. 3.7)", _draw_regions),
-    Plot("velocity", MODELS, "friction over velocity and the law, e.g. for several H (Fig. 3.8)", _draw_velocity),
-    Plot("force", MODELS, "friction over velocity for many loads, logarithmic (Fig. 3.9)", _draw_forces),
-    Plot("zone_one", MODELS, "alpha and beta over the Hurst exponent (Fig. 3.10)", _draw_zone_one),
-    Plot("plateau", MODELS, "plateau of friction over the Hurst exponent (Fig. 3.11)", _draw_plateau),
-    Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", _draw_indenter),
+    Plot("regions", MODELS, "friction against velocity with regions I to IV (Fig. 3.7)", draw_regions),
+    Plot("velocity", MODELS, "friction against velocity and the law, e.g. for several H (Fig. 3.8)", draw_velocity),
+    Plot("force", MODELS, "friction against velocity for many loads, logarithmic (Fig. 3.9)", draw_forces),
+    Plot("zone_one", MODELS, "alpha and beta against the Hurst exponent (Fig. 3.10)", draw_zone_one),
+    Plot("plateau", MODELS, "plateau of friction against the Hurst exponent (Fig. 3.11)", draw_plateau),
+    Plot("collapse", MODELS, "all friction of planes on the scales of the general law (eq. 3.22, 3.23)", draw_collapse),
+    Plot(
+        "contact_growth",
+        MODELS,
+        "length and slope of the contact against the load (eq. 3.12, 3.21)",
+        draw_contact_growth,
+    ),
+    Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", draw_indenter),
 )

@@ -3,174 +3,233 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from mdr_dask.errors import DataError
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.plots import curves, style
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BEFORE = r"$\mu_1$ / rms slope"
+JUMP = r"$\Delta\mu_0\,v_1/\Delta v$ / rms slope"
+INTERVALS = "bars: 95 % intervals"
+HELD = ("hurst", "normal_force", "velocity", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness")
 
-INTERVALS = "bars: 95 % intervals, bootstrap over the realisations"
 
-
-def _fitted(series: Mapping[str, xr.Dataset], name: str) -> xr.Dataset:
+def _fitted(groups: Mapping[str, xr.Dataset], name: str) -> dict[str, xr.Dataset]:
     from mdr_dask.fit.kinetics import FITS
 
-    return next(fit for fit in FITS if fit.name == name).compute(series)
+    fit = next(fit for fit in FITS if fit.name == name)
+    return curves.results(fit.compute, groups)
 
 
-def _meant(series: Mapping[str, xr.Dataset]) -> Mapping[str, xr.Dataset]:
-    """Return the series of most velocities and, of those, most Hurst exponents, as in Figs. 4.5-4.7."""
-    if not series:
+def _constants(found: xr.Dataset, name: str) -> curves.Mean:
+    return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
+
+
+def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, xr.Dataset], list[str]]:
+    """Return the series that varies along most of some parameters, those with most values, and which are left out."""
+    if not groups:
         raise DataError("expected a store with at least one series, got none")
-    both = {name: data for name, data in series.items() if {"velocity", "hurst"} <= set(data.dims)} or series
-    return dict([max(both.items(), key=lambda item: [item[1].sizes.get(dim, 1) for dim in ("velocity", "hurst")])])
+
+    def rank(data: xr.Dataset) -> list[int]:
+        sizes = [data[name].size if name in data.coords else 1 for name in varied]
+        return [sum(size > 1 for size in sizes), *sizes]
+
+    best = max(groups, key=lambda name: rank(groups[name]))
+    rest = [name for name in groups if name != best]
+    return {best: groups[best]}, [f"series {', '.join(rest)}"] if rest else []
 
 
-def _colours(values: np.ndarray) -> list[Any]:
-    """Return one colour for every value, by rank."""
-    from matplotlib import colormaps
-
-    places = np.linspace(0, 0.92, values.size) if values.size > 1 else np.array([0.3])
-    return [colormaps["viridis"](place) for place in places]
+def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str, *fits: xr.Dataset) -> None:
+    text = subject + (f", series {name}" if name else "")
+    bars = "; ".join(part for part in (INTERVALS, curves.verdict(fits)) if part)
+    style.title(figure, text, curves.fixed_text(held, HELD), bars)
 
 
-def _bars(found: xr.Dataset, name: str) -> np.ndarray:
-    """Return the lengths of error bars down and up to the ends of the intervals."""
-    value = found[name].values
-    bars: np.ndarray = np.clip([value - found[f"{name}_low"].values, found[f"{name}_high"].values - value], 0, None)
-    return bars
-
-
-def draw_jump(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw mu_1 and d_mu_0 v_1 / dv over the velocity for every load, with eq. 4.11 (Fig. 4.4)."""
-    from matplotlib.figure import Figure
-
+def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw mu_1 and d_mu_0 v_1 / dv against the velocity for every load, with eq. 4.11 (Fig. 4.4)."""
     from mdr_dask.fit.kinetics import LAW, jump_law
 
-    data = next(
-        (data for data in series.values() if {"velocity", "normal_force"} <= set(data.dims)),
-        next(iter(series.values())),
-    )
-    spare = set(data["friction_coefficient_before"].dims) - {"realisation", "velocity", "normal_force"}
-    data = data.isel(dict.fromkeys(spare, 0))
-    for axis in ("normal_force", "velocity"):
-        data = data if axis in data.dims else data.expand_dims(axis)
-    found = _fitted({"": data}, "kinetics")
-    figure = Figure(figsize=(9.5, 4), layout="constrained")
-    labels = r"$\mu_1/\nabla z$", r"$\Delta\mu_0\,v_1/(\Delta v\,\nabla z)$"
-    loads, speed = found["normal_force"].values, found["velocity"].values
+    series, told = _choose(groups, "velocity", "normal_force")
+    ((name, found),) = _fitted(series, "kinetics").items()
+    figure, panels = style.panels(2, sharey=True)
     names = "before_over_slope", "jump_over_slope"
-    for axes, name, label in zip(figure.subplots(1, 2, sharey=True), names, labels, strict=True):
-        for k, colour in enumerate(_colours(loads)):
-            line = found.isel(normal_force=k).transpose("velocity")
-            axes.errorbar(speed, line[name].values, _bars(line, name), color=colour, lw=1, marker=".", ms=3)
-            if name == names[1]:
-                axes.plot(speed, jump_law(line[names[0]].values, LAW), ":", color=colour, lw=1)
-        axes.set(xscale="log", yscale="log", xlabel=r"$v_1$ (m/s)", ylabel=label)
-    figure.axes[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
-    figure.axes[1].legend(frameon=False, fontsize=8)
-    figure.suptitle(f"$F_N$ from {loads.min():.2g} (dark) to {loads.max():.2g} N (light); {INTERVALS}", fontsize=10)
+    family = curves.family(found, names[0], "velocity", ("normal_force", "hurst"))
+    for axes, output, label in zip(panels, names, (BEFORE, JUMP), strict=True):
+        for curve in family.curves:
+            speed = curve.data["velocity"]
+            curves.draw(axes, curve, speed, _constants(curve.data, output), bars=True)
+            if output == names[1] and family.joined:
+                law = jump_law(np.asarray(curve.data[names[0]].values), LAW)
+                axes.plot(speed, law, ":", color=curve.colour, lw=1)
+        axes.set(xlabel=style.label("velocity", found["velocity"]), ylabel=label)
+        style.logarithmic(axes, "xy")
+    panels[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
+    curves.finish(figure, panels[1], family)
+    _title(figure, "friction before the jump, and the jump", family.held, name)
+    style.leave_out(figure, [*family.left_out, *told])
     return figure
 
 
-def _by_hurst(found: xr.Dataset) -> Iterator[tuple[float, Any, xr.Dataset]]:
-    """Yield Hurst exponent, colour, and what was found with it, its other axes flattened."""
-    found = found if "hurst" in found.dims else found.expand_dims("hurst")
-    values = np.atleast_1d(found["hurst"].values)
-    for k, colour in enumerate(_colours(values)):
-        part = found.isel(hurst=k)
-        dims = list(part.sizes)
-        yield float(values[k]), colour, part.stack(case=dims) if dims else part.expand_dims("case")
+class _Cases(NamedTuple):
+    """The cases of a series with one Hurst exponent."""
+
+    hurst: float
+    colour: Any
+    data: xr.Dataset
+
+    def column(self, name: str) -> FloatArray:
+        """Return one number for every case."""
+        return np.ravel(np.asarray(self.data[name].values, dtype=np.float64))
+
+    def constant(self, name: str, where: Any = slice(None)) -> curves.Mean:
+        """Return one constant of some of the cases, with its interval."""
+        columns = (self.column(f"{name}{end}")[where] for end in ("", "_low", "_high"))
+        return curves.Mean(*(xr.DataArray(column, dims="case") for column in columns))
 
 
-def draw_jump_law(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw d_mu_0 v_1 / dv over mu_1, both over the rms slope, with eq. 4.11 (Fig. 4.5)."""
-    from matplotlib.figure import Figure
+def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
+    """Yield the cases of every Hurst exponent: of an axis, of a sampled design in up to seven classes, or of all."""
+    if "hurst" not in found.coords:
+        raise DataError("expected a Hurst exponent in the store")
+    hurst = np.atleast_1d(found["hurst"].values)
+    how, norm = style.shades(hurst)
+    for k, value in enumerate(np.unique(hurst)):
+        colour = how(norm(float(value))) if np.unique(hurst).size > len(style.COLOURS) else style.COLOURS[k]
+        where = found.isel({found["hurst"].dims[0]: np.flatnonzero(hurst == value)}) if found["hurst"].ndim else found
+        yield _Cases(float(value), colour, where)
 
+
+def _name_hursts(figure: Figure, axes: Axes, found: xr.Dataset) -> None:
+    """Draw the colour bar of many Hurst exponents, and the legend of the rest."""
+    values = np.unique(np.atleast_1d(found["hurst"].values))
+    many = values.size > len(style.COLOURS)
+    bar = ("hurst", xr.DataArray(values)) if many else None
+    curves.finish(figure, axes, curves.NO_FAMILY._replace(bar=bar))
+
+
+def _hurst_label(found: xr.Dataset, cases: _Cases) -> str | None:
+    few = np.unique(np.atleast_1d(found["hurst"].values)).size <= len(style.COLOURS)
+    return f"H = {cases.hurst:.3g}" if few else None
+
+
+def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw d_mu_0 v_1 / dv against mu_1, both over the rms slope, with eq. 4.11 (Fig. 4.5)."""
     from mdr_dask.fit.kinetics import LAW, jump_law
 
-    series = _meant(series)
-    cases, law = _fitted(series, "kinetics"), _fitted(series, "jump_law").isel(hurst=-1)
-    figure = Figure(figsize=(6, 4.6), layout="constrained")
-    axes = figure.subplots()
-    for value, colour, part in _by_hurst(cases):
-        x, y = part["before_over_slope"].values, part["jump_over_slope"].values
-        across, up = _bars(part, "before_over_slope"), _bars(part, "jump_over_slope")
-        axes.errorbar(x, y, up, across, fmt=".", color=colour, ms=4, lw=0.6, label=f"H = {value:.3g}")
-    ends = [float(cases["before_over_slope"].min()), float(cases["before_over_slope"].max())]
-    x = np.geomspace(ends[0], ends[1], 200)
-    fitted, low, high = (float(law[f"constant{end}"]) for end in ("", "_low", "_high"))
-    axes.plot(x, jump_law(x, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
-    axes.plot(x, jump_law(x, fitted), "C3--", lw=1.2, label=f"fitted {fitted:.3f} ({low:.3f}, {high:.3f})")
-    axes.fill_between(x, jump_law(x, low), jump_law(x, high), color="C3", alpha=0.25, lw=0)
-    axes.plot(x, x, "k:", lw=0.8, label="eq. 4.9")
-    axes.set(xscale="log", yscale="log", xlabel=r"$\mu_1/\nabla z$", ylabel=r"$\Delta\mu_0\,v_1/(\Delta v\,\nabla z)$")
-    axes.set_ylim(top=3 * float(cases["jump_over_slope"].max()))
-    axes.set_title(INTERVALS, fontsize=9)
-    axes.legend(frameon=False, fontsize=7, ncols=2)
+    series, told = _choose(groups, "velocity", "hurst")
+    ((name, found),) = _fitted(series, "kinetics").items()
+    ((_, law),) = _fitted(series, "jump_law").items()
+    fitted, low, high = (float(law[f"constant{end}"][-1]) for end in ("", "_low", "_high"))
+    figure, (axes,) = style.panels(1)
+    x, y = "before_over_slope", "jump_over_slope"
+    for cases in by_hurst(found):
+        across = cases.constant(x)
+        label = _hurst_label(found, cases)
+        curves.scatter(axes, across.value, cases.constant(y), cases.colour, ".", label, across)
+    known = np.ravel(found[x].values)
+    fine = np.geomspace(known[known > 0].min(), np.nanmax(known), 200)
+    axes.plot(fine, jump_law(fine, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
+    axes.plot(fine, jump_law(fine, fitted), "C3--", lw=1.2, label=f"fitted {fitted:.3f} ({low:.3f}, {high:.3f})")
+    axes.fill_between(fine, jump_law(fine, low), jump_law(fine, high), color="C3", alpha=0.25, lw=0)
+    axes.plot(fine, fine, "k:", lw=0.8, label="eq. 4.9")
+    axes.set(xlabel=BEFORE, ylabel=JUMP)
+    jumps = np.ravel(found[y].values)
+    axes.set_ylim(jumps[jumps > 0].min() / 2, 3 * np.nanmax(jumps))
+    style.logarithmic(axes, "xy")
+    _name_hursts(figure, axes, found)
+    _title(figure, "the jump against friction before it", curves.scalars(found), name, law)
+    style.leave_out(figure, told)
     return figure
 
 
-def draw_rate(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw b over v_1 tau q_max for every Hurst exponent, with the powers fitted (Fig. 4.6)."""
-    from matplotlib.figure import Figure
-
+def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw b against v_1 tau q_max for every Hurst exponent, with the powers fitted (Fig. 4.6)."""
     from mdr_dask.fit.kinetics import well_known
 
-    series = _meant(series)
-    cases, powers = _fitted(series, "relaxation"), _fitted(series, "rate_power")
-    powers = powers if "hurst" in powers.dims else powers.expand_dims("hurst")
-    figure = Figure(figsize=(6.4, 5.2), layout="constrained")
-    axes = figure.subplots()
-    for k, (value, colour, part) in enumerate(_by_hurst(cases)):
-        known = part.isel(case=np.flatnonzero(well_known(part["rate_low"].values, part["rate_high"].values)))
-        x = known["passing_number"].values
-        bars = _bars(known, "rate")
-        axes.errorbar(x, known["rate"], yerr=bars, color=colour, fmt=".", ms=4, lw=0.6, label=f"H = {value:.3g}")
-        for regime in ("below", "above"):
-            fit = powers.isel(hurst=k).sel(regime=regime)
-            inside = x[(x < 1) == (regime == "below")]
-            if np.isfinite(fit["power"]) and inside.size:
-                line = np.array([inside.min(), inside.max()])
-                axes.plot(line, float(fit["factor"]) * line ** float(fit["power"]), color=colour, lw=1)
-        whole = np.sort(part["passing_number"].values)
-        axes.plot(whole, np.where(whole < 1, whole, whole ** (1 - value)), ":", color=colour, lw=0.8)
-    axes.plot([], [], "k-", lw=1, label="power fitted")
+    series, told = _choose(groups, "velocity", "hurst")
+    ((name, found),) = _fitted(series, "relaxation").items()
+    powers = _powers(series)
+    figure, (axes,) = style.panels(1)
+    left = 0
+    for cases in by_hurst(found):
+        good = well_known(cases.column("rate_low"), cases.column("rate_high"))
+        left += int(np.count_nonzero(~good))
+        x = cases.column("passing_number")
+        label = _hurst_label(found, cases)
+        curves.scatter(axes, x[good], cases.constant("rate", good), cases.colour, ".", label)
+        _draw_powers(axes, powers, cases, x[good])
+        whole = np.sort(x)
+        axes.plot(whole, np.where(whole < 1, whole, whole ** (1 - cases.hurst)), ":", color=cases.colour, lw=0.8)
+    if powers is not None:
+        axes.plot([], [], "k-", lw=1, label="power fitted")
     axes.plot([], [], "k:", lw=0.8, label="eq. 4.12")
     axes.axvline(1, color="0.7", lw=0.8)
-    axes.set(xscale="log", yscale="log", xlabel=r"$v_1 \tau q_{max}$", ylabel="$b$")
-    axes.set_title(f"{INTERVALS}; rates known to a factor of 1.6", fontsize=9)
-    axes.legend(frameon=False, fontsize=7, ncols=2)
+    axes.set(xlabel=r"$v_1 \tau q_{max}$", ylabel="rate of relaxation $b$")
+    style.logarithmic(axes, "xy")
+    _name_hursts(figure, axes, found)
+    _title(figure, "rate of relaxation, one exponential", curves.scalars(found), name, found)
+    unknown = f"{left} rates not known to a factor of 1.6" if left else ""
+    style.leave_out(figure, [unknown, *told])
     return figure
 
 
-def draw_power(series: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw the power of b over v_1 tau q_max over the Hurst exponent (Fig. 4.7)."""
-    from matplotlib.figure import Figure
+def _powers(series: Mapping[str, xr.Dataset]) -> xr.Dataset | None:
+    """Return the powers of the rate, or None where too few rates are known for them."""
+    try:
+        ((_, powers),) = _fitted(series, "rate_power").items()
+    except FitError:
+        return None
+    return powers if "hurst" in powers.coords else None
 
-    powers = _fitted(_meant(series), "rate_power")
-    powers = powers if "hurst" in powers.dims else powers.expand_dims("hurst")
-    figure = Figure(figsize=(5.4, 4), layout="constrained")
-    axes = figure.subplots()
-    for regime, name, style, label in (
-        ("above", "power", "C0o", r"$v_1\tau q_{max} > 1$"),
-        ("above", "power_unweighted", "C7x", r"$v_1\tau q_{max} > 1$, all times alike"),
-        ("below", "power", "C1s", r"$v_1\tau q_{max} < 1$"),
-    ):
-        fit = powers.sel(regime=regime)
-        fit = fit.isel(hurst=np.flatnonzero(np.isfinite(fit[name].values)))
-        axes.errorbar(
-            fit["hurst"].values, fit[name].values, yerr=_bars(fit, name), fmt=style, ms=4, capsize=2, label=label
-        )
+
+def _draw_powers(axes: Axes, powers: xr.Dataset | None, cases: _Cases, x: FloatArray) -> None:
+    """Draw the powers fitted to the rates of one Hurst exponent, one line for each value of the other axes."""
+    if powers is None:
+        return
+    for row in by_hurst(powers):
+        if row.hurst != cases.hurst:
+            continue
+        for regime, below in (("below", True), ("above", False)):
+            part = row.data.sel(regime=regime)
+            inside = x[(x < 1) == below]
+            for power, factor in zip(np.ravel(part["power"].values), np.ravel(part["factor"].values), strict=True):
+                if np.isfinite(power) and inside.size:
+                    line = np.array([inside.min(), inside.max()])
+                    axes.plot(line, factor * line**power, color=cases.colour, lw=1)
+
+
+def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw the power of b against the Hurst exponent (Fig. 4.7)."""
+    series, told = _choose(groups, "velocity", "hurst")
+    ((name, found),) = _fitted(series, "rate_power").items()
+    if "hurst" not in found.coords:
+        raise DataError("expected one Hurst exponent or an axis of them: each has a power of its own")
+    figure, (axes,) = style.panels(1)
+    rows = (
+        ("above", "power", r"$v_1\tau q_{max} > 1$"),
+        ("above", "power_unweighted", r"$v_1\tau q_{max} > 1$, all times alike"),
+        ("below", "power", r"$v_1\tau q_{max} < 1$"),
+    )
+    for number, (regime, power, label) in enumerate(rows):
+        for cases in by_hurst(found.sel(regime=regime)):
+            known = np.isfinite(cases.column(power))
+            value = cases.constant(power, known)
+            across = np.full(value.value.size, cases.hurst)
+            curves.scatter(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
+        axes.plot([], [], style.MARKERS[number], color=style.COLOURS[number], ms=4, label=label)
     line = np.array([0.0, 1.0])
     axes.plot(line, 1 - line, "k-", lw=1, label="1 - H")
     axes.plot(line, [1, 1], "k:", lw=1, label="1")
-    axes.set(xlabel="Hurst exponent H", ylabel="power of $b$")
-    axes.set_title(INTERVALS, fontsize=9)
-    axes.legend(frameon=False, fontsize=8)
+    axes.set(xlabel=style.label("hurst"), ylabel="power of $b$")
+    style.legend(axes)
+    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name, found)
+    style.leave_out(figure, told)
     return figure

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from mdr_dask import aggregation
 from mdr_dask.errors import DataError
+from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -16,112 +18,234 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MODELS = ("fretting_wear",)
-_LINES = {"exact": "--", "fast": "-", "literal": "-.", "limit": ":"}
-_MOST_PANELS = 12
+RULE = "wear_rule"
+LINES = {"exact": "--", "fast": "-", "limit": ":"}
+#: What a title says of a case; rules and shapes come from the parameters of the series.
+CASE = (
+    *("shape", RULE, "hold", "stick_radius", "cycles", "xi", "curvature_radius", "angle", "modulus", "friction"),
+    *("amplitude", "load", "depth"),
+)
+PROFILES = (("worn_profile", "radius"), ("worn_image", "position"))
 
 
-def development(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw f(r) and g(x) for growing numbers of cycles at one stick radius (figure 6.1)."""
-    data = _first(groups, ("worn_profile", "worn_image", "cycles"))
-    chosen = {dim: 0 for dim in data.worn_profile.dims if dim not in {"cycles", "radius"}}
-    figure = _figure(10.0, 4.2)
-    left, right = figure.subplots(1, 2)
-    for axes, name, place in ((left, "worn_profile", "radius"), (right, "worn_image", "position")):
-        curves = data[name].isel({dim: at for dim, at in chosen.items() if dim in data[name].dims})
-        for number, cycles in enumerate(data.cycles.values):
-            axes.plot(
-                data[place], curves.sel(cycles=cycles), color=_shade(number, data.cycles.size), label=f"{cycles:g}"
-            )
-        _label(axes, name, data)
-    _limit(groups, (left, right), data, chosen)
-    left.legend(title="cycles", fontsize=8)
-    stick = float(np.ravel(data.stick_radius)[0]) if "stick_radius" in data.coords else np.nan
-    if np.isfinite(stick):
-        figure.suptitle(f"Development of the worn shape, c = {stick:g} $a_0$")
+def _named_rules(data: xr.Dataset) -> xr.Dataset:
+    """Return a series with its rule, shape and load condition as coordinates, where they are fixed."""
+    parameters = curves.parameters_of(data)
+    words = {name: parameters.get(name) for name in (RULE, "shape", "hold")}
+    fixed = {name: word for name, word in words.items() if isinstance(word, str) and name not in data.coords}
+    return data.assign_coords(fixed)
+
+
+def _series(groups: Mapping[str, xr.Dataset], outputs: Sequence[str], *varied: str) -> dict[str, xr.Dataset]:
+    return {name: _named_rules(data) for name, data in curves.with_outputs(groups, outputs, *varied).items()}
+
+
+def _rules(data: xr.Dataset) -> list[str]:
+    return [str(rule) for rule in np.ravel(data[RULE].values)] if RULE in data.coords else [""]
+
+
+def _prefer(data: xr.Dataset, rule: str) -> xr.DataArray | None:
+    """Return where a rule stands on its axis, to hold it there."""
+    return (data[RULE] == rule).astype(float) if RULE in data.dims else None
+
+
+def draw_development(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw f(r) and g(x) for growing numbers of cycles in one case (figure 6.1)."""
+    found = _series(groups, ["worn_profile", "worn_image"], "cycles")
+    name, data = next(((n, d) for n, d in found.items() if "exact" in _rules(d)), next(iter(found.items())))
+    rest = [other for other in found if other != name]
+    if "cycles" not in data["worn_profile"].dims:
+        raise DataError("expected cycles as an axis of its own: a shape develops in one case")
+    others = [dim for dim in curves.axes_of(data, "worn_profile") if dim != "cycles"]
+    data, told = curves.hold(data, others, _prefer(data, "exact"))
+    figure, panels = style.panels(2)
+    for axes, (output, place) in zip(panels, PROFILES, strict=True):
+        one = curves.family(data, output, place, ("cycles",))
+        for curve in one.curves:
+            curves.draw(axes, curve._replace(marker=""), data[place], curves.measured(curve.data, output))
+        _draw_limit(axes, groups, data, output, place)
+        _label(axes, output, data)
+        if axes is panels[0] or one.bar:
+            curves.finish(figure, axes, one)
+    text = curves.fixed_text(curves.scalars(data), CASE)
+    style.title(figure, f"development of the worn shape{f', series {name}' if name else ''}", text)
+    style.leave_out(figure, [*told, f"series {', '.join(rest)}" if rest else ""])
     return figure
 
 
-def profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw f(r) and g(x) by all methods at every stick radius (figures 6.2 and 6.3)."""
-    chosen = {name: data for name, data in groups.items() if data.sizes.get("method", 0) > 1 and "worn_profile" in data}
-    if not chosen:
-        raise DataError("no series varies the method and holds worn_profile; see campaigns/fretting2014.yaml")
-    rows = [(name, data, at) for name, data in chosen.items() for at in _places(data, "stick_radius")][:_MOST_PANELS]
-    figure = _figure(10.0, 2.9 * len(rows))
-    panels = figure.subplots(len(rows), 2, squeeze=False)
-    for (name, data, stick), (left, right) in zip(rows, panels, strict=True):
-        for axes, output, place in ((left, "worn_profile", "radius"), (right, "worn_image", "position")):
-            if output in data:
-                _methods(axes, _at(data[output], "stick_radius", stick), data[place])
-                _label(axes, output, data)
-        left.set_title(f"{name}, c = {stick:g} $a_0$", fontsize=10)
-    panels[0, 0].legend(fontsize=8)
-    return figure
-
-
-def volume(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw the worn volume over the cycles; the band holds 95 % of the realisations."""
-    figure = _figure(6.5, 4.6)
-    axes = figure.subplots()
-    drawn = 0
-    for name, data in groups.items():
-        if "wear_volume" not in data or "cycles" not in data.dims:
+def _draw_limit(axes: Axes, groups: Mapping[str, xr.Dataset], data: xr.Dataset, output: str, place: str) -> None:
+    """Add the limit of the same case, dotted, from any series that holds it."""
+    for other in groups.values():
+        named = _named_rules(other)
+        if output not in named or "limit" not in _rules(named) or not _alike(named, data):
             continue
-        others = [dim for dim in data.wear_volume.dims if dim not in {"cycles", "realisation"}]
-        stacked = data.wear_volume.stack(case=others) if others else data.wear_volume.expand_dims("case")
-        stacked = stacked.transpose("case", "cycles", "realisation")
-        for number in range(min(stacked.sizes["case"], 8)):
-            one = stacked.isel(case=number)
-            label = ", ".join(f"{dim} {np.ravel(one[dim])[0]}" for dim in others) or name or "volume"
-            line = axes.plot(data.cycles, one.median("realisation"), label=label)[0]
-            if one.sizes["realisation"] > 1:
-                low, high = one.quantile([0.025, 0.975], "realisation").values
-                axes.fill_between(data.cycles, low, high, alpha=0.2, color=line.get_color(), linewidth=0)
-            drawn += 1
-    if not drawn:
-        raise DataError("no series holds wear_volume over cycles")
-    axes.set_xscale("log")
-    axes.set_xlabel("cycles")
-    axes.set_ylabel(_axis_text("worn volume V", "m³", "a_0^2 d_0", next(iter(groups.values()))))
-    axes.legend(fontsize=8)
-    axes.set_title("Median over realisations; band: 95 % of them", fontsize=10)
+        limit = named.isel({RULE: _rules(named).index("limit")}) if RULE in named.dims else named
+        keys = [key for key in ("stick_radius", "amplitude", "load", "depth") if key in limit.dims]
+        limit = limit.sel({key: data[key] for key in keys if key in data.coords}, method="nearest")
+        rest = [dim for dim in curves.axes_of(limit, output) if limit.sizes[dim] > 1 and dim != "cycles"]
+        if any(not np.allclose(limit[key], data[key]) for key in keys if key in data.coords) or rest:
+            continue
+        limit = limit.isel(dict.fromkeys(curves.axes_of(limit, output), -1))
+        axes.plot(limit[place], aggregation.mean(limit[output]), "k:", label="limit")
+        return
+
+
+def _alike(one: xr.Dataset, other: xr.Dataset) -> bool:
+    """Return whether two series have the same shape and load condition."""
+    return all(
+        str(one[name].values) == str(other[name].values)
+        for name in ("shape", "hold")
+        if name in one.coords and name in other.coords
+    )
+
+
+def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw f(r) and g(x) by all rules, a row for each stick radius or other parameter (figures 6.2 and 6.3)."""
+    found = _series(groups, ["worn_profile"])
+    several = {name: data for name, data in found.items() if len(_rules(data)) > 1}
+    rest = [name for name in found if several and name not in several]
+    told = [f"series {', '.join(rest)}" if rest else ""]
+    rows = [row for name, data in (several or found).items() for row in _rows(name, data)]
+    chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), style.MOST_PANELS)).round().astype(int))
+    if chosen.size < len(rows):
+        told.append(f"{len(rows) - chosen.size} of {len(rows)} cases ({chosen.size} drawn, spread evenly)")
+    figure, panels = style.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
+    alike = curves.fixed_by_all([_without(curves.scalars(rows[number][1]), ("cycles", RULE)) for number in chosen])
+    for k, number in enumerate(chosen):
+        name, part = rows[number]
+        for axes, (output, place) in zip(panels[2 * k : 2 * k + 2], PROFILES, strict=True):
+            if output in part:
+                _draw_rules(figure, axes, part, output, place, named=k == 0)
+                _label(axes, output, part)
+        text = curves.fixed_text(_without(curves.scalars(part), ("cycles", RULE, *alike)), CASE)
+        panels[2 * k].set_title(", ".join(part for part in (name, text) if part), fontsize="small", wrap=True)
+    style.title(figure, "worn shapes by rule and cycles", curves.fixed_text(alike, CASE))
+    style.leave_out(figure, told)
     return figure
 
 
-def fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
+def _without(held: Mapping[str, xr.DataArray], names: Sequence[str]) -> dict[str, xr.DataArray]:
+    return {name: value for name, value in held.items() if name not in names}
+
+
+def _rows(name: str, data: xr.Dataset) -> list[tuple[str, xr.Dataset]]:
+    """Return a series apart by every axis but rule and cycles."""
+    over = curves.along_dim(data, "cycles", "worn_profile")
+    dims = [dim for dim in curves.axes_of(data, "worn_profile") if dim not in (RULE, "cycles") and dim != over]
+    cells = np.ndindex(*(data.sizes[dim] for dim in dims))
+    return [(name, data.isel(dict(zip(dims, cell, strict=True)))) for cell in cells]
+
+
+def _draw_rules(figure: Figure, axes: Axes, data: xr.Dataset, output: str, place: str, named: bool) -> None:
+    """Draw all rules and cycles: exact dashed, fast full, the limit dotted."""
+    for rule in _rules(data):
+        one = data.isel({RULE: _rules(data).index(rule)}) if RULE in data.dims else data
+        over = curves.along_dim(one, "cycles", output)
+        if rule == "limit" and over:
+            one = one.isel({over: -1})
+        family = curves.family(one, output, place, ("cycles",))
+        line = LINES.get(rule, "-")
+        for curve in family.curves:
+            drawn = curve._replace(line=line, marker="", label="", colour="k" if rule == "limit" else curve.colour)
+            curves.draw(axes, drawn, one[place], curves.measured(curve.data, output))
+            if rule in ("exact", "") and named and curve.label:
+                axes.plot([], [], color=curve.colour, label=curve.label)
+        if named:
+            axes.plot([], [], line, color="k", label=rule or None)
+        if rule in ("exact", "") and family.bar:
+            curves.finish(figure, axes, family)
+    if named:
+        style.legend(axes)
+
+
+def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
+    """Draw the worn volume against the cycles or the path; the band holds 95 % of the realisations."""
+    found = {
+        name: (data, along)
+        for name, data in _series(groups, ["wear_volume"]).items()
+        for along in ("cycles", "path")
+        if along in data.coords and data[along].size > 1
+    }
+    if not found:
+        raise DataError("no series holds wear_volume over cycles or path")
+    shown, told = curves.few({name: data for name, (data, _) in found.items()})
+    figure, panels = style.panels(len(shown))
+    families, most = [], 1
+    for axes, (name, data) in zip(panels, shown.items(), strict=True):
+        along = found[name][1]
+        one = curves.family(data, "wear_volume", along, ("stick_radius", "load", "amplitude", RULE))
+        families.append(one)
+        most = max(most, data.sizes["realisation"])
+        told += [f"{name}: {each}" if name else each for each in one.left_out]
+        for curve in one.curves:
+            curves.draw(axes, curve, curve.data[along], _spread(curve.data))
+        axes.set_xlabel(_over(along, data))
+        axes.set_ylabel(
+            style.with_unit("worn volume $V$", "m³") if not dimensionless(data) else "worn volume $V/(a_0^2 d_0)$"
+        )
+        values = np.asarray(data[along].values, dtype=np.float64)
+        if style.is_geometric(values):
+            style.logarithmic(axes, "x")
+        curves.finish(figure, axes, one)
+        own = curves.fixed_text(_without(one.held, ("cycles",)), CASE)
+        axes.set_title("\n".join(part for part in (name, own) if part), fontsize="small", wrap=True)
+    band = f"median of {most} realisations; bands hold 95 % of them" if most > 1 else "one realisation: no bands"
+    style.title(figure, "worn volume", band)
+    style.leave_out(figure, told)
+    return figure
+
+
+def _spread(data: xr.Dataset) -> curves.Mean:
+    """Return the median of the realisations and what 95 % of them lie within."""
+    volume = data["wear_volume"]
+    if volume.sizes["realisation"] < 2:
+        return curves.measured(data, "wear_volume")
+    known = volume.notnull().any("realisation")
+    ends = volume.where(known, 0.0).quantile([0.025, 0.5, 0.975], "realisation", skipna=True).where(known)
+    low, middle, high = (ends.isel(quantile=k) for k in range(3))
+    return curves.Mean(middle, low, high)
+
+
+def _over(along: str, data: xr.Dataset) -> str:
+    """Return the label of cycles or path."""
+    if along == "path":
+        return r"sliding path $k E^* l / (\sigma_0 a_0)$" if dimensionless(data) else style.label("path")
+    return "cycles $N/N_0$" if dimensionless(data) else "cycles $N$"
+
+
+def draw_fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the largest error of the fast rule over stick radius and cycles, and the xi that makes it least."""
-    error, volume_error = compare(groups)
+    error, volume_error, told = compare(groups)
     usual = float(error.xi.sel(xi=0.8, method="nearest"))
     overall = (error["rms"] ** 2).mean(["stick_radius", "cycles"]) ** 0.5
-    figure = _figure(12.5, 7.4)
-    axes = figure.subplots(2, 2).ravel()
-    x, y = error.cycles.values, error.stick_radius.values
-    best = error.xi.isel(xi=error["rms"].argmin("xi"))
+    figure, panels = style.panels(4, columns=2)
+    best = error.xi.isel(xi=error["rms"].fillna(np.inf).argmin("xi"))
     maps = (
-        (error["largest"].sel(xi=usual), f"largest |Δf| / $d_0$ at ξ = {usual:g}", "viridis"),
-        (best, "ξ of the least rms error of f", "cividis"),
-        (100 * volume_error.sel(xi=usual), f"error of the volume at ξ = {usual:g}, %", "RdBu"),
+        (error["largest"].sel(xi=usual), rf"largest $|\Delta f|/d_0$ at $\xi$ = {usual:g}", "viridis"),
+        (best, r"$\xi$ of the least rms error of f", "cividis"),
+        (100 * volume_error.sel(xi=usual), rf"error of the volume at $\xi$ = {usual:g} [%]", "RdBu"),
     )
-    for panel, (values, title, colours) in zip(axes, maps, strict=False):
+    for panel, (values, text, colours) in zip(panels, maps, strict=False):
         bound = {"vmin": -abs(values).max(), "vmax": abs(values).max()} if colours == "RdBu" else {}
-        mesh = panel.pcolormesh(
-            x, y, values.transpose("stick_radius", "cycles"), cmap=colours, shading="nearest", **bound
-        )
+        shown = values.transpose("stick_radius", "cycles")
+        mesh = panel.pcolormesh(error.cycles, error.stick_radius, shown, cmap=colours, shading="nearest", **bound)
+        mesh.set_gid(style.DATA)
         figure.colorbar(mesh, ax=panel)
-        panel.set_title(title, fontsize=10)
-        panel.set_xscale("log")
-        panel.set_xlabel("cycles N")
-        panel.set_ylabel("stick radius c / $a_0$")
-    axes[3].plot(error.xi, overall, "o-")
-    least = float(error.xi[int(np.argmin(overall.values))])
-    axes[3].axvline(least, color="0.6", linewidth=1)
-    axes[3].set_xlabel("ξ")
-    axes[3].set_ylabel("rms error of f over the map / $d_0$")
-    axes[3].set_title(f"least at ξ = {least:.3g}", fontsize=10)
+        panel.set_title(text, fontsize="small")
+        panel.set(xlabel="cycles $N/N_0$", ylabel=style.label("stick_radius"))
+        if style.is_geometric(error.cycles):
+            style.logarithmic(panel, "x")
+    panels[3].plot(error.xi, overall, "o-", color=style.COLOURS[0], gid=style.DATA)
+    least = float(error.xi[int(np.nanargmin(overall.values))])
+    panels[3].axvline(least, color="0.6", linewidth=1)
+    panels[3].set(xlabel=style.label("xi"), ylabel="rms error of $f/d_0$ over the map")
+    panels[3].set_title(rf"least at $\xi$ = {least:.3g}", fontsize="small")
+    style.title(figure, "error of the fast rule against the exact one", curves.fixed_text(curves.scalars(error), CASE))
+    style.leave_out(figure, told)
     return figure
 
 
-def compare(groups: Mapping[str, xr.Dataset]) -> tuple[xr.Dataset, xr.DataArray]:
+def compare(groups: Mapping[str, xr.Dataset]) -> tuple[xr.Dataset, xr.DataArray, list[str]]:
     """Compare a series ``fast``, which varies xi, with a series ``exact``.
 
     Returns
@@ -130,107 +254,49 @@ def compare(groups: Mapping[str, xr.Dataset]) -> tuple[xr.Dataset, xr.DataArray]
         ``largest`` and ``rms`` of the difference of f over the radius, by stick radius, cycles and xi.
     volume : DataArray
         Relative error of the volume.
+    told : list of str
+        What else varies and is held.
 
     Raises
     ------
     DataError
-        If the two series are not there.
+        If the two series are not there, or do not vary stick radius and cycles.
     """
+    needed = {"stick_radius", "cycles"}
     if not {"exact", "fast"} <= set(groups) or "xi" not in groups["fast"].dims:
         raise DataError("expected the series exact and fast, the latter over xi; see campaigns/fast_wear_error.yaml")
-    exact, fast = (groups[name].isel(realisation=0, drop=True) for name in ("exact", "fast"))
-    difference = fast.worn_profile - exact.worn_profile.drop_vars("xi", errors="ignore")
+    both = [groups[name][["worn_profile", "wear_volume"]] for name in ("exact", "fast")]
+    if any(not needed <= set(data["worn_profile"].dims) for data in both):
+        raise DataError("expected the series exact and fast over the axes stick_radius and cycles")
+    told, held = [], []
+    for data in both:
+        other = [dim for dim in curves.axes_of(data, "worn_profile") if dim not in (*needed, "xi")]
+        one, sentences = curves.hold(data.isel(realisation=0, drop=True), other)
+        held.append(one)
+        told += sentences
+    exact, fast = held[0].drop_vars("xi", errors="ignore"), held[1]
+    difference = fast.worn_profile - exact.worn_profile
     error = xr.Dataset({"largest": abs(difference).max("radius"), "rms": (difference**2).mean("radius") ** 0.5})
-    volume = fast.wear_volume / exact.wear_volume.drop_vars("xi", errors="ignore") - 1.0
-    return error, volume
+    return error, fast.wear_volume / exact.wear_volume - 1.0, told
 
 
-def _first(groups: Mapping[str, xr.Dataset], names: tuple[str, ...]) -> xr.Dataset:
-    """Return the first series that holds all names."""
-    for data in groups.values():
-        if all(name in data for name in names) and "cycles" in data.dims:
-            return data
-    raise DataError(f"no series holds {', '.join(names)} over cycles")
+def _label(axes: Axes, output: str, data: xr.Dataset) -> None:
+    profile = output == "worn_profile"
+    axes.set_xlabel("$r/a_0$" if profile else "$x/a_0$")
+    name = "f(r)" if profile else "g(x)"
+    axes.set_ylabel(f"${name}/d_0$" if dimensionless(data) else f"${name}$ [m]")
 
 
-def _places(data: xr.Dataset, name: str) -> list[float]:
-    return [float(value) for value in np.ravel(data[name])]
-
-
-def _at(data: xr.DataArray, name: str, value: float) -> xr.DataArray:
-    """Choose a value of an axis, if it is one, and the first entry of every axis that a panel cannot show."""
-    chosen = data.sel({name: value}) if name in data.dims else data
-    rest = {dim: 0 for dim in chosen.dims if dim not in {"method", "cycles", "radius", "position"}}
-    return chosen.isel(rest)
-
-
-def _methods(axes: Axes, curves: xr.DataArray, place: xr.DataArray) -> None:
-    """Draw all methods and cycles: exact dashed, fast full, the limit dotted."""
-    cycles = np.ravel(curves.cycles)
-    for method in np.ravel(curves.method):
-        numbers = range(cycles.size if str(method) != "limit" else 1)
-        for number in numbers:
-            curve = _method(curves, str(method))
-            curve = curve.isel(cycles=number) if "cycles" in curve.dims else curve
-            colour = "k" if str(method) == "limit" else _shade(number, cycles.size)
-            text = str(method) + (f", N = {', '.join(f'{n:g}' for n in cycles)}" if str(method) == "exact" else "")
-            axes.plot(place, curve, _LINES[str(method)], color=colour, label=text if number == 0 else None)
-
-
-def _method(curves: xr.DataArray, name: str) -> xr.DataArray:
-    return curves.isel(method=[str(method) for method in curves.method.values].index(name))
-
-
-def _limit(
-    groups: Mapping[str, xr.Dataset], panels: tuple[Axes, Axes], data: xr.Dataset, chosen: dict[str, int]
-) -> None:
-    """Add the limit of the same stick radius, dotted, from any series that holds it."""
-    stick = data.stick_radius.isel({dim: at for dim, at in chosen.items() if dim in data.stick_radius.dims})
-    for other in groups.values():
-        if "method" not in other.dims or "limit" not in [str(m) for m in other.method.values]:
-            continue
-        near = [value for value in _places(other, "stick_radius") if abs(value - float(stick)) < 1e-9]
-        if near:
-            for axes, name, place in zip(panels, ("worn_profile", "worn_image"), ("radius", "position"), strict=True):
-                curve = _at(_method(other[name], "limit"), "stick_radius", near[0])
-                curve = curve.isel(cycles=-1) if "cycles" in curve.dims else curve
-                axes.plot(other[place], curve, "k:", label="limit")
-            return
-
-
-def _label(axes: Axes, name: str, data: xr.Dataset) -> None:
-    profile = name == "worn_profile"
-    axes.set_xlabel("r / $a_0$" if profile else "x / $a_0$")
-    axes.set_ylabel(_axis_text("f(r)" if profile else "g(x)", "m", "d_0", data))
-    if _dimensionless(data):
-        deepest = float(data["block_depth"].max()) if "block_depth" in data else 1.0
-        axes.set_ylim(0.0, deepest + 0.25)
-
-
-def _axis_text(what: str, unit: str, symbol: str, data: xr.Dataset) -> str:
-    return f"{what} / ${symbol}$" if _dimensionless(data) else f"{what}, {unit}"
-
-
-def _dimensionless(data: xr.Dataset) -> bool:
-    if "wear_volume" in data and data.wear_volume.attrs.get("units") == "1":
-        return True
+def dimensionless(data: xr.Dataset) -> bool:
+    """Return whether a series is of pure numbers."""
+    if "wear_volume" in data and "units" in data.wear_volume.attrs:
+        return bool(data.wear_volume.attrs["units"] == "1")
     return "stick_radius" in data.coords and bool(np.all(np.isfinite(np.ravel(data.stick_radius).astype(float))))
 
 
-def _shade(number: int, count: int) -> tuple[float, float, float]:
-    share = number / max(count - 1, 1)
-    return (0.1 + 0.75 * share, 0.3 * (1.0 - share) + 0.15, 0.75 * (1.0 - share) + 0.1)
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 PLOTS: tuple[Plot, ...] = (
-    Plot("wear_development", MODELS, "f(r) and g(x) for growing cycles (thesis figure 6.1)", development),
-    Plot("wear_profiles", MODELS, "f(r) and g(x), exact, fast and limit (thesis figures 6.2 and 6.3)", profiles),
-    Plot("wear_volume", MODELS, "worn volume over cycles with the scatter of realisations", volume),
-    Plot("fast_wear_error", MODELS, "error of the fast rule over c and N, and the best xi", fast_error),
+    Plot("wear_development", MODELS, "f(r) and g(x) for growing cycles (thesis figure 6.1)", draw_development),
+    Plot("wear_profiles", MODELS, "f(r) and g(x), exact, fast and limit (thesis figures 6.2 and 6.3)", draw_profiles),
+    Plot("wear_volume", MODELS, "worn volume against cycles or path, with the scatter of realisations", draw_volume),
+    Plot("fast_wear_error", MODELS, "error of the fast rule over c and N, and the best xi", draw_fast_error),
 )

@@ -107,3 +107,39 @@ def test_the_fit_says_how_well_it_holds():
 def test_missing_file_is_named():
     with pytest.raises(ValidationError, match=r"no such file: .*nowhere.csv"):
         material(dma_table={"file": "nowhere.csv"})
+
+
+def moduli(tmp_path, text, **options):
+    (tmp_path / "dma.csv").write_text(text)
+    options = {"file": str(tmp_path / "dma.csv"), **options}
+    return solid_of(Material.model_validate({"dma_table": options}))
+
+
+ROWS = [(10.0**k, 1e6 * (1 + 0.4 * k), 1e5 * (1 + 0.1 * k)) for k in range(-1, 4)]
+
+
+def test_columns_of_a_table_go_by_their_names(tmp_path):
+    """The order of the columns does not matter; tan delta stands for the loss modulus; Hz and rad/s are told apart."""
+    plain = "frequency [rad/s],storage modulus [Pa],loss modulus [Pa]\n"
+    solid = moduli(tmp_path, plain + "\n".join(f"{f!r},{s!r},{loss!r}" for f, s, loss in ROWS))
+    turned = "loss modulus [Pa],frequency [rad/s],E' [Pa]\n"
+    again = moduli(tmp_path, turned + "\n".join(f"{loss!r},{f!r},{s!r}" for f, s, loss in ROWS))
+    np.testing.assert_array_equal(again.moduli, solid.moduli)
+    tangent = "frequency [rad/s],G' [MPa],tan delta [-]\n"
+    close = moduli(tmp_path, tangent + "\n".join(f"{f!r},{s / 1e6!r},{loss / s!r}" for f, s, loss in ROWS))
+    np.testing.assert_allclose(close.moduli, solid.moduli, rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("f [Hz],E' [MPa],tan delta [MPa]\n1,2,0.1\n", "column tan delta: expected a number"),
+        ("f [Hz],E' [MPa]\n1,2\n", "expected a column loss modulus or tan delta"),
+        ("1,2,3\n4,5,6\n", "column frequency: expected its unit"),
+        ("f [Hz],E' [MPa],E'' [MPa],T [K]\n1,2,3,-10\n", "column temperature: expected a value above 0, got '-10 K'"),
+        ("T [C],f [Hz],E' [MPa],E'' [MPa]\n20,1,2,\n", r"dma.csv:2:8: column loss modulus: expected a number"),
+    ],
+)
+def test_a_table_that_is_no_dma_is_refused(tmp_path, text, message):
+    with pytest.raises(DataError, match=message):
+        moduli(tmp_path, text)

@@ -10,7 +10,7 @@ from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 HEIGHT = np.sin(2 * np.pi * np.arange(16) / 16)
 
 
-def write(path, header="", separator=","):
+def write(path, header="x [m],z [m]\n", separator=","):
     rows = [f"{i}{separator}{z:.17g}" for i, z in enumerate(HEIGHT)]
     path.write_text(header + "\n".join(rows) + "\n")
     return ProfileFile.model_validate(str(path))
@@ -32,11 +32,25 @@ def test_header_units_comments_and_mark_are_tolerated(tmp_path, separator):
 
 
 def test_unit_can_be_given(tmp_path):
-    write(tmp_path / "line.csv")
+    write(tmp_path / "line.csv", header="")
     line = line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "um"}))
     assert line.length == pytest.approx(16e-6)
-    with pytest.raises(DataError, match=r"expected one of the units .* got 'inch'"):
-        line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "inch"}))
+    with pytest.raises(DataError, match="unknown unit 'ich'"):
+        line_of(ProfileFile.model_validate({"file": str(tmp_path / "line.csv"), "unit": "ich"}))
+
+
+def test_a_line_without_units_is_no_road_of_20_metres(tmp_path):
+    write(tmp_path / "line.csv", header="x,z\n")
+    with pytest.raises(DataError, match=r"line.csv:1:1: column x: expected its unit, such as 'x \[mm\]'"):
+        line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
+
+
+def test_columns_go_by_their_names(tmp_path):
+    rows = "\n".join(f"{z:.17g},{i}" for i, z in enumerate(HEIGHT))
+    (tmp_path / "line.csv").write_text(f"height [um],position [mm]\n{rows}\n")
+    line = line_of(ProfileFile.model_validate(str(tmp_path / "line.csv")))
+    assert line.length == pytest.approx(16e-3)
+    assert line.height.max() == pytest.approx(1e-6)
 
 
 def test_a_changed_file_is_refused(tmp_path):
@@ -49,11 +63,12 @@ def test_a_changed_file_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("# nothing\n", "expected rows of numbers, got none"),
-        ("x,z\n", "expected rows of numbers, got only names"),
-        ("1\n2\n", "expected two columns x, z, got one"),
-        ("1,2\n3,?\n", "line.csv:2: expected 2 numbers"),
-        ("1,2\n3,4\n", "8 or more pairs"),
+        ("# nothing\n", "expected a line of names and at least one line of values"),
+        ("x,z\n", "expected a line of names and at least one line of values"),
+        ("x [m]\n1\n2\n", "expected a column z"),
+        ("x [m],z [m]\n1,2\n3,?\n", r"line.csv:3:3: column z: expected a number, got '\?'"),
+        ("x [m],z [m]\n1,2\n3,4\n", "8 or more pairs"),
+        ("x [m],z [s]\n1,2\n3,4\n", "expected a length"),
     ],
 )
 def test_files_that_hold_no_line(tmp_path, text, message):
@@ -73,8 +88,8 @@ CONTEXT = {"to_si": lambda value, unit: float(value)}
 
 
 def test_a_campaign_refuses_a_bad_file_before_it_runs(tmp_path):
-    (tmp_path / "line.csv").write_text("x,z\n1,2\n3,nothing\n")
-    with pytest.raises(ValidationError, match=r"line.csv:3: expected 2 numbers, got \['3', 'nothing'\]"):
+    (tmp_path / "line.csv").write_text("x [m],z [m]\n1,2\n3,nothing\n")
+    with pytest.raises(ValidationError, match=r"line.csv:3:3: column z: expected a number, got 'nothing'"):
         ProfileFile.model_validate(str(tmp_path / "line.csv"), context=CONTEXT | {"directory": tmp_path})
 
 
@@ -87,6 +102,8 @@ def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
     assert line.length == pytest.approx(64e-6)
     np.testing.assert_allclose(line.height, 1e-6 * height, atol=1e-15)
     topography.UniformLineScan(height, 64.0).to_netcdf(str(tmp_path / "bare.nc"))
+    with pytest.raises(DataError, match="does not say its unit"):
+        line_of(ProfileFile.model_validate(str(tmp_path / "bare.nc")))
     bare = line_of(ProfileFile.model_validate({"file": str(tmp_path / "bare.nc"), "unit": "mm"}))
     assert bare.length == pytest.approx(64e-3)
     topography.Topography(np.outer(height, height), (64.0, 64.0), unit="um").to_netcdf(str(tmp_path / "map.nc"))
@@ -111,4 +128,4 @@ def test_decimal_commas_and_units_behind_names_are_understood(tmp_path, names, s
 
 
 def test_brackets_without_a_unit_are_names(tmp_path):
-    assert line_of(write(tmp_path / "line.csv", "x (left),z (top)\n")).length == 16
+    assert line_of(write(tmp_path / "line.csv", "x (left),z (top)\nm,m\n")).length == 16

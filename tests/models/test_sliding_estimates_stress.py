@@ -151,7 +151,14 @@ def test_measured_lines_are_right_to_their_own_estimates(tmp_path, shape):
             }[shape]
         )
         assume(np.ptp(z) > 0)
-        np.savetxt(path, np.column_stack([np.arange(count) / count, z]), delimiter=",", fmt="%.17g")
+        np.savetxt(
+            path,
+            np.column_stack([np.arange(count) / count, z]),
+            delimiter=",",
+            header="x [m],z [m]",
+            comments="",
+            fmt="%.17g",
+        )
         line = samples(z - z.mean())
         heights = line(4097)
         body, parameters = material

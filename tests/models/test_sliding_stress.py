@@ -163,7 +163,7 @@ def test_spikes_and_steps_of_a_measured_file(tmp_path_factory, kind, seed, heigh
         "noise": random.standard_normal(200),
     }[kind] * 10**height
     path = tmp_path_factory.mktemp("line") / "line.csv"
-    np.savetxt(path, np.column_stack([x, z]), delimiter=",")
+    np.savetxt(path, np.column_stack([x, z]), delimiter=",", header="x [m],z [m]", comments="")
     profile = ProfileFile.model_validate({"file": str(path), **options})
     material = {"material": SOLID} if general else KELVIN
     result = solved(material | {"normal_force": 10**force, "velocity": 10**velocity, "profile": profile}, accuracy=0.05)

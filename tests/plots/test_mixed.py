@@ -6,6 +6,7 @@ import xarray as xr
 
 from mdr_dask.errors import DataError
 from mdr_dask.plots.mixed import PLOTS
+from mdr_dask.plots.style import DATA
 
 DRAW = {plot.name: plot.draw for plot in PLOTS}
 REALISATIONS = 4
@@ -36,24 +37,28 @@ def lines_of(panel):
     return [line for line in panel.get_lines() if len(line.get_xdata()) > 2]
 
 
+def data_of(panel):
+    return [line for line in panel.get_lines() if line.get_gid() == DATA]
+
+
 def test_temperature_shows_celsius_per_cent_and_one_line_a_load():
     data = dataset(OPERATION, ["breakthrough_probability"])
     figure = DRAW["temperature"]({"operation": data})
     assert len(figure.axes) == 3
-    lines = figure.axes[0].containers
+    lines = data_of(figure.axes[0])
     assert len(lines) == 2
-    np.testing.assert_allclose(lines[0].lines[0].get_xdata(), [40, 60, 80])
+    np.testing.assert_allclose(lines[0].get_xdata(), [40, 60, 80])
     expected = 100 * data["breakthrough_probability"].isel(normal_force=0, rotation_speed=0).mean("realisation")
-    np.testing.assert_allclose(lines[0].lines[0].get_ydata(), expected)
+    np.testing.assert_allclose(lines[0].get_ydata(), expected)
     assert figure.axes[0].get_xlabel() == "temperature [°C]"
-    assert "standard error" in figure.axes[0].get_ylabel()
+    assert "95 % intervals" in figure.get_suptitle()
 
 
 def test_realisations_that_were_not_needed_do_not_count():
     data = dataset({"temperature": [313.15, 333.15]}, ["breakthrough_probability"])
     data["breakthrough_probability"][0, 1:] = np.nan
     figure = DRAW["temperature"]({"": data})
-    y = figure.axes[0].containers[0].lines[0].get_ydata()
+    y = data_of(figure.axes[0])[0].get_ydata()
     assert y[0] == pytest.approx(100 * float(data["breakthrough_probability"][0, 0]))
 
 
@@ -67,15 +72,17 @@ def test_sensitivity_has_a_panel_for_every_series_that_varies_something():
     }
     figure = DRAW["sensitivity"](groups)
     labels = [panel.get_xlabel() for panel in figure.axes if panel.get_visible()]
-    assert labels == ["rms height of each roller [µm]", "Hurst exponent $H$"]
-    np.testing.assert_allclose(figure.axes[0].containers[0].lines[0].get_xdata(), [0.1, 0.2, 0.4])
+    assert labels == ["rms height $h$ [µm]", "Hurst exponent $H$"]
+    np.testing.assert_allclose(data_of(figure.axes[0])[0].get_xdata(), [0.1, 0.2, 0.4])
 
 
 def test_trace_is_over_the_time_of_a_turn():
     angle = np.linspace(0, 2 * np.pi, 50, endpoint=False)
     data = dataset({"temperature": [313.15, 333.15]}, [], {"contact_length_trace": ("angle", angle)})
     figure = DRAW["trace"]({"temperature": data})
-    assert [panel.get_title()[:17] for panel in figure.axes] == ["temperature 40 °C", "temperature 60 °C"]
+    titles = [panel.get_title() for panel in figure.axes]
+    assert ["temperature = 40 °C" in title for title in titles] == [True, False]
+    assert ["temperature = 60 °C" in title for title in titles] == [False, True]
     np.testing.assert_allclose(figure.axes[0].get_lines()[0].get_xdata(), angle / 10.0 * 1e3)
 
 
@@ -99,7 +106,7 @@ def test_stribeck_has_four_panels_and_a_line_a_load():
 @pytest.mark.parametrize("name", sorted(DRAW))
 def test_a_store_without_the_outputs_is_told_what_is_missing(name):
     with pytest.raises(DataError, match="no series of the store"):
-        DRAW[name]({"": dataset({"normal_force": [1.0, 2.0]}, ["load_share"])})
+        DRAW[name]({"": dataset({"normal_force": [1.0, 2.0]}, ["asperity_load_share"])})
 
 
 def test_figures_can_be_saved(tmp_path):

@@ -16,6 +16,7 @@ from mdr_dask.physics.lubrication.film_formulas import (
     PAN_HAMROCK_CENTRAL,
     PAN_HAMROCK_MINIMUM,
     moes_parameters,
+    square_of_half_width,
     thick_film,
 )
 from mdr_dask.physics.lubrication.line_contact import Estimate, LineContact, LineSolution, line_contact, solve
@@ -62,7 +63,7 @@ def _estimates(
     case: EhlLineParameters, W: float, solution: LineSolution, outputs: tuple[str, ...]
 ) -> dict[str, Estimate]:
     """Return those outputs asked for that the solution decides, each with its error, in their units."""
-    film, p0 = 8 * W / np.pi, 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
+    film, p0 = square_of_half_width(W), 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
     metres = film * (np.nan if case.radius is None else case.radius)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
@@ -142,7 +143,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
             for name, estimate in estimates.items():
                 found |= {name: estimate.value, f"{name}_error": estimate.error}
             found["load_error"] = solution.load_error
-            film = float(solution.central_film.value) * 8 * float(parameters.W[index]) / np.pi
+            film = float(solution.central_film.value) * square_of_half_width(float(parameters.W[index]))
             notes += [_missed(solution, estimates, accuracy), thick_film(film)]
         else:
             result.status[index] = Status.NOT_CONVERGED

@@ -1,134 +1,218 @@
-"""What a case is before its roughness: contact, film, oil, layer; and the friction that follows."""
+"""What a case is before its roughness: contact, oil, and the load shared between film and asperities; its friction."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
+from mdr_dask.models.mixed_lubrication.declaration import MixedLubrication
 from mdr_dask.models.mixed_lubrication.lines import Source
-from mdr_dask.models.mixed_lubrication.parameters import MixedLubrication
+from mdr_dask.physics.lubrication import breakthrough, film_formulas, line_contact, oil
+from mdr_dask.physics.lubrication.film_formulas import HertzLine
+from mdr_dask.physics.lubrication.load_sharing import Asperities, SharedLoad, share_load
+from mdr_dask.physics.outcome import Outcome
 
-if TYPE_CHECKING:
-    from mdr_dask.physics.lubrication.film_formulas import Groups, HertzLine
-    from mdr_dask.physics.lubrication.line_contact import LineContact
+#: Relative error of a film of the EHL solution where the campaign names none.
+ACCURACY = 1e-3
+
+
+class NoFilmError(Exception):
+    """The reason why a case has no film."""
 
 
 class Film(NamedTuple):
-    """Thickness over R*, a warning, and why there is none (then it is NaN)."""
+    """Thickness of a film in m, and its estimated relative error."""
 
     thickness: float
-    warning: str = ""
-    problem: str = ""
+    error: float = 0.0
 
 
 @dataclass(frozen=True)
 class Operation:
-    """What a case is before any roughness: contact, film, and how the layer stands to the unit lines."""
+    """What a case is before any roughness: contact, film, and how the layer stands to the unit lines.
+
+    `shared` has the film in m; `film_error` is its relative error, and `strength` that of the layer for lines in units
+    of `scale`, the heights of the lines in m.
+    """
 
     case: MixedLubrication
     source: Source
     contact: HertzLine
-    E_star: float
-    film: float
     viscosity: float
     alpha: float
-    scale: float  # heights of the lines in m
+    shared: SharedLoad
+    film_error: float
+    scale: float
     spacing: float
     window: int
-    strength: float  # of the layer, for lines in units of `scale`
+    strength: float
     warning: str
-    problem: str
+
+    @property
+    def film(self) -> float:
+        """Film thickness in m."""
+        return self.shared.film
 
     @property
     def level(self) -> float:
         """Film thickness in units of the lines."""
         return self.film / self.scale
 
+    @property
+    def rms(self) -> float:
+        """Rms height of both lines together in m."""
+        return self.scale * self.source.combined_rms()
 
-def operation_of(case: MixedLubrication) -> Operation:
-    """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours."""
-    from mdr_dask.physics.lubrication import breakthrough, oil
-    from mdr_dask.physics.lubrication import film_formulas as film
 
+def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Operation:
+    """Return the smooth contact of a case and its film, case by case: the value must not know its neighbours.
+
+    Raises
+    ------
+    NoFilmError
+        If the EHL solution is asked for and not found.
+    """
     data, source = case.oil_data(), case.source()
     viscosity = float(data.dynamic(case.temperature))
     alpha = case.pressure_viscosity
     if isinstance(alpha, str):
         correlation = data.correlation if alpha == "oil" else alpha
         alpha = float(oil.pressure_viscosity(correlation, data.kinematic(case.temperature), viscosity))
-    E_star = case.contact_modulus()
-    radius = case.roller_radius / 2
-    velocity = case.rotation_speed * case.roller_radius
-    line_load = case.normal_force / case.roller_width
-    groups = film.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
-    smooth = Film(case.film_thickness / radius) if case.film_thickness else _film(case, groups, E_star, viscosity)
     contact = case.dry_contact(case.normal_force)
     spacing = source.spacing(case.perimeter)
     scale = case.rms_roughness or 1.0
+    asperities = Asperities(scale * source.combined_rms(), case.longest(), case.contact_modulus)
+    accuracy = accuracy or ACCURACY
+    film_of = _film_of(case, viscosity, alpha, accuracy)
+    shared, error, warning = _shared_load(case, asperities, film_of, accuracy)
     return Operation(
         case=case,
         source=source,
         contact=contact,
-        E_star=E_star,
-        film=case.film_thickness or smooth.thickness * radius,
         viscosity=viscosity,
         alpha=alpha,
+        shared=shared,
+        film_error=error,
         scale=scale,
         spacing=spacing,
         window=breakthrough.window_points(float(contact.half_width), spacing, source.points),
-        strength=float(breakthrough.layer_strength(case.layer_shear_strength, E_star, case.layer_thickness)) / scale,
-        warning=smooth.warning,
-        problem=smooth.problem,
+        strength=float(
+            breakthrough.layer_strength(case.layer_shear_strength, case.contact_modulus, case.layer_thickness)
+        )
+        / scale,
+        warning="; ".join(note for note in (warning, film_formulas.thick_film(shared.film / _radius(case))) if note),
     )
 
 
-def _film(case: MixedLubrication, groups: Groups, E_star: float, viscosity: float) -> Film:
-    from mdr_dask.physics.lubrication import film_formulas as film
-    from mdr_dask.physics.lubrication import line_contact
+def _radius(case: MixedLubrication) -> float:
+    """Return the reduced radius of two equal rollers in m."""
+    return case.roller_radius / 2
 
+
+def _mean_pressure(case: MixedLubrication) -> float:
+    """Return the normal force over the area of the Hertzian contact in Pa."""
+    return case.normal_force / (2 * float(case.dry_contact(case.normal_force).half_width) * case.roller_width)
+
+
+def _shared_load(
+    case: MixedLubrication, asperities: Asperities, film_of: tuple[Callable[[float], Film], str], accuracy: float
+) -> tuple[SharedLoad, float, str]:
+    """Return film and shares of the load, the film's relative error, and a warning."""
+    pressure = _mean_pressure(case)
+
+    def asperity_share(film: float) -> float:
+        return asperities.pressure(film) / pressure
+
+    if case.film_thickness is not None:
+        share = asperity_share(case.film_thickness)
+        warning = "" if share <= 1 else f"asperities apart by the given film would carry {share:.2g} times the load"
+        return SharedLoad(case.film_thickness, max(0.0, 1 - share), min(share, 1.0)), 0.0, warning
+    film_at, warning = film_of
+    tolerance = accuracy / 10 if case.film_formula == "ehl" else accuracy / 1e6
+    shared = share_load(lambda share: film_at(share).thickness, asperity_share, tolerance)
+    if not shared.film > 0:
+        raise NoFilmError("the film is too thin for the EHL solution, even where the asperities carry all of the load")
+    return shared, film_at(shared.film_share).error, warning
+
+
+def _film_of(
+    case: MixedLubrication, viscosity: float, alpha: float, accuracy: float
+) -> tuple[Callable[[float], Film], str]:
+    """Return the film over the share of the load that it carries, and a warning if a formula leaves its range."""
+    E_star, radius = case.contact_modulus, _radius(case)
+    velocity = case.rotation_speed * case.roller_radius
+    line_load = case.normal_force / case.roller_width
+    groups = film_formulas.dimensionless_groups(line_load, viscosity, velocity, alpha, E_star, radius)
     W, U, G = (float(group) for group in groups)
+
+    def by_solution(share: float) -> Film:
+        contact = line_contact.line_contact(
+            W, U / share, G * share, E_star * share, viscosity_law=case.viscosity_law, viscosity=viscosity
+        )
+        found = _solved(contact, accuracy)
+        return Film(found.thickness * film_formulas.square_of_half_width(W) * radius, found.error)
+
+    def by_formula(share: float) -> Film:
+        return Film(float(formula(W, U / share, G * share)) * radius)
+
     if case.film_formula == "ehl":
-        law = case.viscosity_law
-        return _solved(line_contact.line_contact(W, U, G, E_star, viscosity_law=law, viscosity=viscosity), W)
-    formula = film.FORMULAS[case.film_formula]
-    return Film(float(formula(W, U, G)), formula.outside(W, U, G))
+        return by_solution, ""
+    formula = film_formulas.FORMULAS[case.film_formula]
+    return by_formula, formula.outside(W, U, G)
 
 
 @lru_cache(maxsize=1024)
-def _solved(contact: LineContact, W: float) -> Film:
-    """Return the central film of the EHL solution, once for all realisations: Hertz units are ``a^2/R^2 = 8 W/pi``."""
-    from mdr_dask.physics.lubrication import line_contact
-
-    solution = line_contact.solve(contact)
+def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
+    """Return the central film of the EHL solution in ``a^2/R``, once for all realisations, and its relative error."""
+    solution = line_contact.solve(contact, accuracy)
+    if solution.outcome == Outcome.FILM_COLLAPSED:
+        return Film(0.0)  # too thin for the grids; the asperities will carry most of the load
     if solution.reason:
-        return Film(np.nan, problem=solution.reason)
-    return Film(float(solution.central_film.value) * 8 * W / np.pi)
+        raise NoFilmError(solution.reason)
+    film = solution.central_film
+    return Film(float(film.value), float(film.error / film.value))
 
 
 def fixed_values(operation: Operation) -> dict[str, float]:
-    """Return the outputs that no roughness enters."""
-    rms = operation.scale * operation.source.combined_rms()
-    half_width = float(operation.contact.half_width)
-    return {"film": operation.film, "film_ratio": operation.film / rms, "contact_half_width": half_width}
+    """Return the outputs that no realisation of the roughness changes, each with its error."""
+    film, share, error = operation.film, operation.shared.asperity_share, operation.film_error
+    values = {
+        "film": film,
+        "film_ratio": film / operation.rms,
+        "asperity_load_share": share,
+        "friction_coefficient": friction(operation, film, share),
+    }
+    errors = dict.fromkeys(values, 0.0)
+    if error > 0:
+        # the asperities feel the film's error in full: their share is that of a film thinner by it
+        asperities = Asperities(operation.rms, operation.case.longest(), operation.case.contact_modulus)
+        loaded = asperities.pressure(film * (1 - error)) / _mean_pressure(operation.case)
+        errors = {
+            "film": error * film,
+            "film_ratio": error * film / operation.rms,
+            "asperity_load_share": abs(loaded - share),
+            "friction_coefficient": abs(
+                friction(operation, film * (1 - error), min(loaded, 1.0)) - values["friction_coefficient"]
+            ),
+        }
+    values |= {f"{name}_error": value for name, value in errors.items()}
+    return values | {"contact_half_width": float(operation.contact.half_width)}
 
 
-def friction(operation: Operation, share: float) -> float:
-    """Return the coefficient of friction: solid over the share of the width in intimate contact, film elsewhere."""
-    from mdr_dask.physics.lubrication import film_formulas as film
-    from mdr_dask.physics.lubrication import oil
-
+def friction(operation: Operation, film: float, asperity_share: float) -> float:
+    """Return the coefficient of friction: boundary friction of the asperities, and shear of the film between them."""
     case = operation.case
     sliding = case.slide_roll_ratio * case.rotation_speed * case.roller_radius
     if sliding == 0:
         return 0.0
-    liquid = film.fluid_friction(
+    liquid = film_formulas.fluid_friction(
         operation.contact,
-        operation.film,
+        film,
         sliding,
         lambda pressure: oil.log_viscosity(case.viscosity_law, pressure, operation.viscosity, operation.alpha),
         case.eyring_stress,
+        1 - asperity_share,
     )
-    return share * case.boundary_friction + (1 - share) * liquid
+    return case.boundary_friction * asperity_share + liquid

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.mixed_lubrication.operation import Operation, friction
+from mdr_dask.models.mixed_lubrication.declaration import POSITIONS
+from mdr_dask.models.mixed_lubrication.operation import Operation
+from mdr_dask.physics.lubrication import breakthrough, film_formulas
+from mdr_dask.physics.lubrication.breakthrough import Excursions
 
-if TYPE_CHECKING:
-    from mdr_dask.physics.lubrication.breakthrough import Excursions
-
-STRIDES = 8  # windows with creep that overlap by more than 1 - 1/8 tell the same
-#: Places of the profiles in half widths of the contact.
-POSITIONS = np.linspace(-1.5, 1.5, 1501)
+#: Windows with creep that overlap by more than one part in this many tell the same.
+STRIDES = 8
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,6 @@ class Turn:
     """One realisation of a case: what the window meets while the rollers turn once."""
 
     contact_points: NDArray[np.int32] | NDArray[np.int64]
-    overlap: float  # mean sum in the window, in units of the lines
     apart: int  # positions after which windows share no point
 
     @property
@@ -33,30 +30,30 @@ class Turn:
         """Share of windows in intimate contact."""
         return np.count_nonzero(self.contact_points) / self.contact_points.size
 
+    def contact_length(self, spacing: float) -> float:
+        """Return the mean length in intimate contact in m, of points that far apart."""
+        return float(self.contact_points.sum(dtype=np.int64)) / self.contact_points.size * spacing
+
 
 def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:
     """Return a turn of pure rolling, from the excursions of the combined line above the film or less.
 
     With ``coarser = 2`` it is that of every second point.
     """
-    from mdr_dask.physics.lubrication import breakthrough
-
     points = above if coarser == 1 else above.every_second()
     window = _window(operation, coarser)
     clusters = breakthrough.find_clusters(points, operation.level, coarser * operation.spacing, operation.strength)
     contact_points = breakthrough.contact_points(clusters, window, operation.case.edge_rule)
-    return Turn(contact_points, breakthrough.mean_overlap(clusters, window), window)
+    return Turn(contact_points, window)
 
 
 def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], coarser: int = 1) -> Turn:
     """Return a turn with creep, from windows an eighth of their width apart, or that of every second point."""
-    from mdr_dask.physics.lubrication import breakthrough
-
     even = lines[0].size // coarser * coarser
     line_1, line_2 = (np.ascontiguousarray(line[:even:coarser]) for line in lines)
     stride = max(2, operation.window // STRIDES // 2 * 2) // coarser
     window = _window(operation, coarser)
-    found = breakthrough.judge_windows(
+    contact_points = breakthrough.judge_windows(
         line_1,
         line_2,
         operation.level,
@@ -66,7 +63,7 @@ def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], coarser
         breakthrough.creep_positions(np.arange(0, line_1.size, stride), line_1.size, operation.case.slide_roll_ratio),
         operation.case.edge_rule,
     )
-    return Turn(found.contact_points, float(found.overlap.mean()), -(-window // stride))
+    return Turn(contact_points, -(-window // stride))
 
 
 def _window(operation: Operation, coarser: int) -> int:
@@ -76,35 +73,36 @@ def _window(operation: Operation, coarser: int) -> int:
 def turn_values(
     operation: Operation, turn: Turn, halved: Callable[[], Turn], wanted: Collection[str]
 ) -> dict[str, float]:
-    """Return those scalar outputs of a realisation that are wanted; `halved` gives the turn of every second point."""
-    from mdr_dask.physics.lubrication import breakthrough
-
-    case = operation.case
-    length = float(turn.contact_points.sum(dtype=np.int64)) / turn.contact_points.size * operation.spacing
-    force = operation.E_star * operation.spacing * operation.scale * turn.overlap
-    share = length / (operation.window * operation.spacing)
+    """Return the scalar outputs of a realisation that are wanted, and errors: the change from every second point."""
+    resistivity = operation.case.resistivity
+    length = turn.contact_length(operation.spacing)
     found: dict[str, Callable[[], float]] = {
         "breakthrough_probability": lambda: turn.probability,
         "contact_length": lambda: length,
-        "load_share": lambda: force / case.normal_force,
-        "discretisation_error": lambda: turn.probability - halved().probability,
         "turn_error": lambda: breakthrough.probability_interval(turn.contact_points > 0, turn.apart).error,
-        "contact_conductance": lambda: length / case.resistivity,
-        "contact_resistance": lambda: float(breakthrough.contact_resistance(case.resistivity, length)),
-        "friction_coefficient": lambda: friction(operation, share),
+        "contact_conductance": lambda: length / resistivity,
+        "contact_resistance": lambda: float(breakthrough.contact_resistance(resistivity, length)),
     }
-    return {name: value() for name, value in found.items() if name in wanted}
+    values = {name: value() for name, value in found.items() if name in wanted}
+    if {f"{name}_error" for name in values} & set(wanted):
+        coarse = halved()
+        other = coarse.contact_length(2 * operation.spacing)
+        values |= {
+            "breakthrough_probability_error": abs(turn.probability - coarse.probability),
+            "contact_length_error": abs(length - other),
+            "contact_conductance_error": abs(length - other) / resistivity,
+            "contact_resistance_error": abs(resistivity / length - resistivity / other) if length * other else np.inf,
+        }
+    return values
 
 
 def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]) -> FloatArray:
     """Return the contact length at the angles of the trace."""
-    from mdr_dask.physics.lubrication import breakthrough
-
     case, points = operation.case, operation.source.points
     way = np.arange(case.trace_points) * points // case.trace_points
     if case.slide_roll_ratio == 0:
         return np.asarray(turn.contact_points[way] * operation.spacing, dtype=np.float64)
-    windows = breakthrough.judge_windows(
+    contact_points = breakthrough.judge_windows(
         *lines,
         operation.level,
         operation.spacing,
@@ -113,14 +111,11 @@ def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]
         breakthrough.creep_positions(way, points, case.slide_roll_ratio),
         case.edge_rule,
     )
-    return np.asarray(windows.contact_points * operation.spacing, dtype=np.float64)
+    return np.asarray(contact_points * operation.spacing, dtype=np.float64)
 
 
 def profiles(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]) -> dict[str, FloatArray]:
     """Return both surfaces around the contact at the moment when most of it is in intimate contact."""
-    from mdr_dask.physics.lubrication import breakthrough
-    from mdr_dask.physics.lubrication import film_formulas as film
-
     case, points = operation.case, operation.source.points
     way = np.linspace(0, points, turn.contact_points.size, endpoint=False)
     moment = np.array([way[np.argmax(turn.contact_points)]])
@@ -131,5 +126,5 @@ def profiles(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArr
         operation.scale * np.interp(steps + start[0], np.arange(points), line, period=points)
         for start, line in zip(breakthrough.creep_positions(moment, points, case.slide_roll_ratio), lines, strict=True)
     )
-    gap = operation.film + film.hertz_gap(x, half_width, case.roller_radius / 2)
+    gap = operation.film + film_formulas.hertz_gap(x, half_width, case.roller_radius / 2)
     return {"upper_profile": gap - upper, "lower_profile": lower}

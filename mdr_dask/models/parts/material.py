@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
-from mdr_dask.models.parts.tables import Table, parse_table
+from mdr_dask.tables import Column, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid, SeriesFit
@@ -64,11 +64,11 @@ class PowerLaw(Parameters):
 class ModulusTable(Parameters):
     """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
 
-    file: NamedFile = Field(description="table with columns frequency, storage modulus, loss modulus[, temperature]")
-    frequency_unit: str = Field(
-        default="Hz", description="unit of the frequencies, where the table has no row of units"
+    file: NamedFile = Field(
+        description="table with columns frequency, storage modulus, loss modulus or tan delta, and perhaps temperature"
     )
-    modulus_unit: str = Field(default="Pa", description="unit of the moduli, where the table has no row of units")
+    frequency_unit: str = Field(default="", description="unit of the frequencies, where the table does not say")
+    modulus_unit: str = Field(default="", description="unit of the moduli, where the table does not say")
     table_temperature: float | None = quantity(
         "K",
         "measured temperature to use; tables of several are otherwise superposed at `reference`",
@@ -231,16 +231,15 @@ def _moduli(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _columns(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
     """Return angular frequency, storage and loss modulus and perhaps temperature in SI, as the file has them."""
-    table = parse_table(chosen.file.read_text(), chosen.file.name)
-    if table.values.shape[1] < 3:
-        raise DataError(
-            f"{chosen.file.name}: expected frequency, storage and loss modulus, got {table.values.shape[1]} columns"
-        )
-    scales = [table.scale(0, chosen.frequency_unit), *(table.scale(column, chosen.modulus_unit) for column in (1, 2))]
-    omega, storage, loss = (table.values[:, column] * scale for column, scale in enumerate(scales))
-    if not all(np.all(np.isfinite(column) & (column > 0)) for column in (omega, storage, loss)):
-        raise DataError(f"{chosen.file.name}: frequencies and moduli must be positive and finite")
-    temperature = _temperatures(table)
+    table = read_table(chosen.file.read_text(), chosen.file.name, _dma_columns(chosen))
+    omega, storage, loss = (table.get(name) for name in ("frequency", "storage modulus", "loss modulus"))
+    assert omega is not None
+    assert storage is not None
+    if loss is None and "tan delta" in table:
+        loss = storage * table["tan delta"]
+    if loss is None:
+        raise DataError(f"{chosen.file.name}: expected a column loss modulus or tan delta")
+    temperature = table.get("temperature")
     if temperature is not None and np.ptp(temperature) >= SAME_TEMPERATURE:
         if chosen.table_temperature is None and chosen.reference is None:
             raise DataError(
@@ -252,11 +251,20 @@ def _columns(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, 
     return omega, storage, loss, temperature
 
 
-def _temperatures(table: Table) -> FloatArray | None:
-    if table.values.shape[1] < 4:
-        return None
-    unit = table.units[3].strip("[]() ").lower() if table.units else ""
-    return np.asarray(table.values[:, 3] + (0.0 if unit in ("", "k") else 273.15), dtype=np.float64)
+def _dma_columns(chosen: ModulusTable) -> tuple[Column, ...]:
+    """Return the columns of a dynamic-mechanical analysis, by the names that machines and people give them."""
+    storage = ("E'", "G'", "storage", "E stor", "G stor", "Estor", "Gstor", "E1", "G1")
+    loss = ("E''", "G''", "loss", "E loss", "G loss", "Eloss", "Gloss", "E2", "G2")
+    temperature = ("T", "temp", "temp.", "sample temperature")
+    frequency = ("f", "freq", "freq.", "omega", "angular frequency", "w", "ω")
+    return (
+        Column("frequency", "rad/s", frequency, above=0, given_unit=chosen.frequency_unit),
+        Column("storage modulus", "Pa", storage, above=0, given_unit=chosen.modulus_unit),
+        Column("loss modulus", "Pa", loss, needed=False, above=0, given_unit=chosen.modulus_unit),
+        Column("temperature", "K", temperature, needed=False, above=0),
+        Column("tan delta", "1", ("tan(delta)", "tan d", "tand", "loss factor", "tan δ"), needed=False, above=0),
+        Column("set", "1", ("segment", "point", "index", "no"), needed=False),
+    )
 
 
 def _superposed(

@@ -11,7 +11,8 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
-from mdr_dask.models.parts.tables import SCALES, parse_table
+from mdr_dask.tables import Column, read_table
+from mdr_dask.units import to_si
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
@@ -25,7 +26,7 @@ class ProfileFile(Parameters):
     file: NamedFile = Field(
         description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
     )
-    unit: str = Field(default="m", description="unit of both columns, where the file has no row of units")
+    unit: str = Field(default="", description="unit of both columns, where the file does not say")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
     taper: float = quantity("1", "part of the line brought to its mean so that it closes", default=0.0, ge=0, le=1)
     shortest_wavelength: float | None = quantity(
@@ -66,11 +67,12 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
 
 
 def _columns(profile: ProfileFile) -> tuple[Any, Any]:
-    table = parse_table(profile.file.read_text(), profile.file.name)
-    if table.values.shape[1] < 2:
-        raise DataError(f"{profile.file.name}: expected two columns x, z, got one")
-    x, z = (table.values[:, column] * table.scale(column, profile.unit) for column in (0, 1))
-    return x, z
+    columns = (
+        Column("x", "m", ("position", "distance", "length", "X"), given_unit=profile.unit),
+        Column("z", "m", ("height", "h", "y", "profile"), given_unit=profile.unit),
+    )
+    table = read_table(profile.file.read_text(), profile.file.name, columns)
+    return table["x"], table["z"]
 
 
 def _topography(profile: ProfileFile) -> tuple[Any, Any]:
@@ -93,7 +95,12 @@ def _topography(profile: ProfileFile) -> tuple[Any, Any]:
             "save one of its lines as x, z"
         )
     x, z = (line if line.unit is None else line.to_unit("m")).positions_and_heights()
-    scale = SCALES.get(profile.unit.lower()) if line.unit is None else 1.0
-    if scale is None:
-        raise DataError(f"expected one of the units {', '.join(SCALES)}, got {profile.unit!r}")
+    if line.unit is not None:
+        return x, z
+    if not profile.unit:
+        raise DataError(f"{profile.file.name}: does not say its unit: give `unit`, such as um")
+    try:
+        scale = to_si(f"1 {profile.unit}", "m")
+    except ValueError as error:
+        raise DataError(f"{profile.file.name}: unit: {error}") from None
     return x * scale, z * scale

@@ -58,11 +58,12 @@ class SlidingProblems:
     def groups(self, *columns: list[Any]) -> Iterator[tuple[Setting, tuple[Any, ...], IntArray]]:
         """Yield the cases that share a setting, and what else the columns hold."""
         members: dict[Any, list[int]] = {}
-        for j, key in enumerate(zip(self.settings, *columns, strict=True)):
-            if j not in self.faults:
-                members.setdefault(key, []).append(j)
-        for (setting, *others), cases in members.items():
-            yield setting, tuple(others), np.array(cases)
+        for j, key in enumerate(zip(map(id, self.settings), *columns, strict=True)):  # equal settings are one object
+            members.setdefault(key, []).append(j)
+        for (_, *others), cases in members.items():
+            sound = [j for j in cases if j not in self.faults]
+            if sound:
+                yield self.settings[sound[0]], tuple(others), np.array(sound)
 
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
@@ -105,10 +106,13 @@ def _lines(block: Block[Any], faults: dict[int, str]) -> tuple[list[Roughness], 
             for wavelength in (_numbers(block, "rolloff_wavelength"), _numbers(block, "longest_wavelength"))
         ]
     columns = block.column("hurst").tolist(), block.column("points").tolist(), *corners
-    lines: list[Roughness] = [
-        Smooth(numbers[1]) if smooth else Generated(*numbers)
-        for smooth, *numbers in zip(flat.tolist(), *columns, strict=True)
-    ]
+    distinct: dict[Any, Roughness] = {}
+    lines: list[Roughness] = []
+    for smooth, *numbers in zip(flat.tolist(), *columns, strict=True):
+        key = (smooth, *numbers)
+        if key not in distinct:
+            distinct[key] = Smooth(numbers[1]) if smooth else Generated(*numbers)
+        lines.append(distinct[key])
     for j, profile in enumerate(each(block, "profile")):
         if profile is not None:
             try:
@@ -145,19 +149,26 @@ def _settings(
     velocity: FloatArray,
     faults: dict[int, str],
 ) -> list[Setting]:
-    """Return what the cases share, in units of length and height."""
+    """Return what the cases share, in units of length and height; equal settings are one object."""
     from mdr_dask.physics.sliding.problem import Arms
 
-    indenters = [indenter.line() for indenter in each(block, "indenter")]
+    indenters = each(block, "indenter")
+    bodies = {id(indenter): indenter.line() for indenter in {id(one): one for one in indenters}.values()}
+    known: dict[Any, Setting] = {}
+    equal: dict[Setting, Setting] = {}
     settings = []
-    for j, (line, body) in enumerate(zip(roughness, indenters, strict=True)):
-        scaled, travelling = body, None
-        if body is not None and j not in faults:
-            scaled = body.scaled(length[j], height[j])
-            scaled = replace(scaled, **{name: float(canonical(number)) for name, number in vars(scaled).items()})
-        if arms[j] is not None and j not in faults:
-            moduli, times = arms[j]
-            numbers = canonical(moduli), canonical(times * velocity[j] / length[j])
-            travelling = Arms(*(tuple(column.tolist()) for column in numbers))
-        settings.append(Setting(line, scaled, travelling))
+    columns = roughness, indenters, arms, length.tolist(), height.tolist(), velocity.tolist()
+    for j, (line, indenter, arm, unit, rms, pace) in enumerate(zip(*columns, strict=True)):
+        key = (id(line), id(indenter), unit, rms) if arm is None else (id(line), id(indenter), unit, rms, id(arm), pace)
+        if key not in known:
+            body, travelling = bodies[id(indenter)], None
+            if body is not None and j not in faults:
+                body = body.scaled(unit, rms)
+                body = replace(body, **{name: float(canonical(number)) for name, number in vars(body).items()})
+            if arm is not None and j not in faults:
+                numbers = canonical(arm[0]), canonical(arm[1] * pace / unit)
+                travelling = Arms(*(tuple(column.tolist()) for column in numbers))
+            setting = Setting(line, body, travelling)
+            known[key] = equal.setdefault(setting, setting)
+        settings.append(known[key])
     return settings

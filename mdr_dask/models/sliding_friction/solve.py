@@ -15,14 +15,14 @@ from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
-from mdr_dask.physics.sliding.problem import COARSEST, Aim, Line, solve
+from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, Line, solve
 from mdr_dask.physics.sliding.steady import Steady
 
 ACCURACY = 0.01  # where the campaign does not say
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
 POINT_LINE, POINT_SAMPLED = 1.2e-7, 1.5e-8  # and for every Nyquist point gone along from node to node
 NODE_ARM, NODE_GENERAL, GENERAL = 1e-8, 1e-7, 3e-4  # for every node and arm of a general solid, and to begin with
-ARRAYS = 30  # arrays of the length of the line that a solution holds
+ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
 
 #: Outputs that have errors, and the column of a steady state that each is.
 COLUMNS = {
@@ -190,6 +190,11 @@ def _seconds_of_line(
 
 def memory(block: Block[SlidingFriction]) -> float:
     """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
-    grid = [2 * (SETTINGS.finest if value == "auto" else int(value)) for value in block.column("oversampling")]
-    points = [setting.roughness.points for setting in sliding_problems(block).settings]
-    return float(np.max(np.array(grid) * np.array(points)) * 8 * ARRAYS)
+    largest = 0.0
+    for setting, oversampling in zip(
+        sliding_problems(block).settings, block.column("oversampling").tolist(), strict=True
+    ):
+        kelvin = setting.arms is None
+        grid = oversampling if oversampling != "auto" else SETTINGS.finest if kelvin else FINEST
+        largest = max(largest, setting.roughness.points * grid * (2 * ARRAYS if kelvin else ARRAYS_GENERAL))
+    return 8 * largest

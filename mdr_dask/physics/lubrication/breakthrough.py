@@ -246,11 +246,6 @@ def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArr
     return trace
 
 
-def mean_overlap(clusters: Clusters, window: int) -> float:
-    """Return the mean over all positions of the sum of overlaps inside the window in m; E* dx times it is a force."""
-    return float(clusters.total.sum()) * window / clusters.points
-
-
 @njit(nogil=True, cache=True)
 def _beyond(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped-def]
     """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
@@ -277,8 +272,8 @@ def _fill(line_1, line_2, level, p, q, overlap):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, contact, total_overlap):  # type: ignore[no-untyped-def]
-    """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` room for a window."""
+def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, contact):  # type: ignore[no-untyped-def]
+    """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` the workspace of a window."""
     points, window = line_1.size, overlap.size
     for w in range(first_1.size):
         p, q = first_1[w], first_2[w]
@@ -293,7 +288,6 @@ def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, cont
             while k < window and overlap[k] > 0.0:
                 total += overlap[k]
                 k += 1
-            total_overlap[w] += total
             n = inside = k - begin
             if begin == 0 and rule != _PART:
                 more, extra = _beyond(line_1, line_2, level, p - 1, q - 1, -1, points - n)
@@ -305,13 +299,6 @@ def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, cont
                 contact[w] += inside if rule == _CLIP else n
 
 
-class Windows(NamedTuple):
-    """Points in intimate contact and sum of overlaps (m) of each window."""
-
-    contact_points: IntArray
-    overlap: FloatArray
-
-
 def judge_windows(
     line_1: FloatArray,
     line_2: FloatArray,
@@ -321,7 +308,7 @@ def judge_windows(
     window: int,
     positions: tuple[IntArray, IntArray],
     rule: str = "part",
-) -> Windows:
+) -> NDArray[np.int64]:
     """Judge windows one by one: the reference for pure rolling, and the way of rolling with creep.
 
     Parameters
@@ -336,13 +323,18 @@ def judge_windows(
         Point of each line at the window's first place; see `creep_positions`.
     rule : str
         One of `EDGE_RULES`.
+
+    Returns
+    -------
+    int array, shape (n,)
+        Points in intimate contact of each window.
     """
     first_1, first_2 = positions
-    contact, total = np.zeros(first_1.size, dtype=np.int64), np.zeros(first_1.size)
+    contact = np.zeros(first_1.size, dtype=np.int64)
     if line_1.max() + line_2.max() > level:
-        limit, room = strength * spacing**2, np.empty(window)
-        _windows(line_1, line_2, level, limit, first_1, first_2, EDGE_RULES.index(rule), room, contact, total)
-    return Windows(contact, total)
+        limit, overlap = strength * spacing**2, np.empty(window)
+        _windows(line_1, line_2, level, limit, first_1, first_2, EDGE_RULES.index(rule), overlap, contact)
+    return contact
 
 
 def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tuple[IntArray, IntArray]:

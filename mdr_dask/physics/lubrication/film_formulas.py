@@ -83,8 +83,9 @@ def fluid_friction(
     sliding_velocity: float,
     log_viscosity: Callable[[FloatArray], FloatArray],
     eyring_stress: float,
+    film_share: float = 1.0,
 ) -> float:
-    """Return the coefficient of friction of a uniform film under the Hertzian pressure.
+    """Return the shear of a uniform film under the Hertzian pressure, over the load.
 
     Parameters
     ----------
@@ -98,18 +99,22 @@ def fluid_friction(
         Natural logarithm of the viscosity in Pa s at pressures in Pa.
     eyring_stress : float
         Stress tau_E in Pa of ``tau = tau_E asinh(eta v/(h tau_E))``; a great one makes the liquid Newtonian.
+    film_share : float
+        Share of the load, and so of the pressure, that the film carries.
 
     Returns
     -------
     float
-        Mean shear stress over mean pressure, by 64 Gauss points in the angle ``x = a sin(angle)``; rolling friction
-        is left out.
+        Mean shear stress over the mean pressure of the whole load, by 64 Gauss points in the angle of
+        ``x = a sin(angle)``; rolling friction is left out.
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosine = np.cos(np.pi / 2 * nodes)
     if sliding_velocity == 0:
         return 0.0
-    logarithm = log_viscosity(contact.pressure * cosine) + np.log(abs(sliding_velocity) / (film * eyring_stress))
+    logarithm = log_viscosity(film_share * contact.pressure * cosine) + np.log(
+        abs(sliding_velocity) / (film * eyring_stress)
+    )
     # asinh(e^l) is l + ln 2 long before e^l overflows
     stress = eyring_stress * np.where(
         logarithm > 30, logarithm + np.log(2), np.arcsinh(np.exp(np.minimum(logarithm, 30)))
@@ -212,7 +217,7 @@ class FilmFormula:
         return f"film formula {self.name}: {', '.join(parts)}" if parts else ""
 
 
-# Ranges as remembered from the papers; no open copy was at hand to compare them with (docs/mixed-lubrication.md).
+# Ranges as remembered from the papers; no open copy was at hand (docs/evidence/mixed-lubrication.md).
 _PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
 _DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 
@@ -228,6 +233,11 @@ FORMULAS: dict[str, FilmFormula] = {
     "pan_hamrock_minimum": PAN_HAMROCK_MINIMUM,
     "dowson_higginson": DOWSON_HIGGINSON_MINIMUM,
 }
+
+
+def square_of_half_width(W: float) -> float:
+    """Return ``(a/R)^2 = 8 W/pi`` of the dry contact, by which films in ``a^2/R`` become films over R."""
+    return 8 * W / np.pi
 
 
 class Moes(NamedTuple):

@@ -24,7 +24,7 @@ from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, Shape, smooth
 from mdr_dask.physics.surfaces.waves import Waves
 
-COARSEST, FINEST = 4, 64  # points for every Nyquist point that `auto` begins and ends with for a general solid
+COARSEST, FINEST = 4, 256  # points for every Nyquist point that `auto` begins and ends with for a general solid
 CELLS = 4  # the general solver compares grids of every, every second and every fourth node
 CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
 

@@ -10,6 +10,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.viscoelastic_newton import solve_sliding, static_depth
+from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
@@ -23,9 +24,13 @@ class Settings(NamedTuple):
     resolved: float = 0.5  # largest relative change of a number between two grids that is extrapolated
     hardly: float = 1.5  # cells in contact below which the change between two grids is a part of the error only
     cells_of_a_peak: int = 16  # cells in contact for every peak of the line whose errors are independent
-    by_chance: float = 0.03  # of the last change of a number, which its error is never below: grids agree by chance
-    of_contact: float = 0.03  # and of the last change of the length in contact
     safety: float = 2.4
+    # of the last change of drag, depth, contact fraction and slope, which their errors are never below
+    by_chance: tuple[float, ...] = (0.03, 0.03, 0.15, 0.15)
+    of_before: float = 0.15  # of the change before, which the last one is never taken for less than
+    of_others: tuple[float, ...] = (0.02, 0.0, 0.04, 0.04)  # of the largest relative change of the four
+    of_a_cell: tuple[float, ...] = (0.0, 0.0, 0.2, 0.1)  # over cells in contact: edges move within their cells
+    near_a_node: int = 16  # cells in contact below which the height of the highest peak between nodes counts in full
 
 
 SETTINGS = Settings()
@@ -100,8 +105,7 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
             found = _solve(below[::step], step, travelling, line.periodic, None)
         solutions.append(found)
     mean = float(heights.mean()) if line.periodic else 0.0
-    peaks = int(np.count_nonzero((below[1:-1] > below[:-2]) & (below[1:-1] >= below[2:]))) + 1
-    return _extrapolated(solutions, mean - float(heights[top]), cells, peaks)
+    return _extrapolated(solutions, _Top.of(below, mean - float(heights[top]), line.periodic))
 
 
 @dataclass(frozen=True)
@@ -110,25 +114,22 @@ class _Load:
 
     cell: float
     strain_area: float
-    moduli: FloatArray
-    reach: FloatArray
-    times: FloatArray
-    stretch_of: FloatArray
-    amplitude_of: FloatArray
+    solid: Travelling
 
     @classmethod
     def of(cls, solid: LinearSolid, load: float, cell: float) -> _Load:
         """Measure a solid in cells and static moduli; arms much shorter than a cell and the dashpot are one arm."""
         static = solid.static_modulus
         fast = solid.times < SETTINGS.shortest * cell
-        moduli, reach = solid.moduli[~fast] / static, solid.times[~fast] / cell
+        moduli, deborah = solid.moduli[~fast] / static, solid.times[~fast] / cell
         viscosity = (solid.viscosity + solid.moduli[fast] @ solid.times[fast]) / static
         if viscosity > 0:
             shortest = SETTINGS.shortest / 10
             moduli = np.append(viscosity / cell / shortest, moduli)
-            reach = np.append(shortest, reach)
-        modes = recovery(moduli, reach)
-        return cls(cell, load / cell, moduli, reach, modes.times, modes.stretch.T.copy(), modes.amplitude.T.copy())
+            deborah = np.append(shortest, deborah)
+        modes = recovery(moduli, deborah)
+        columns = modes.stretch.T.copy(), modes.amplitude.T.copy()
+        return cls(cell, load / cell, Travelling(moduli, deborah, modes.times, *columns))
 
 
 @dataclass(frozen=True)
@@ -147,11 +148,11 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     if start is None or not np.all(np.isfinite(start)):
         inner = profile[:-1] if periodic else profile
         depth = static_depth(inner, strain_area)
-        start = np.append(np.full(load.moduli.size, depth - strain_area / inner.size), depth)
+        start = np.append(np.full(load.solid.moduli.size, depth - strain_area / inner.size), depth)
     unknown, totals = start.copy(), np.empty(6)
-    arms = load.moduli, load.reach / step, load.times / step, load.stretch_of, load.amplitude_of
+    solid = load.solid._replace(deborah=load.solid.deborah / step, times=load.solid.times / step)
     converged, sweeps, inside = solve_sliding(
-        profile, strain_area, periodic, *arms, SETTINGS.tolerance, unknown, totals
+        profile, strain_area, periodic, solid, SETTINGS.tolerance, unknown, totals
     )
     imbalance = abs(float(totals[1]) / strain_area - 1)
     good = converged and imbalance < SETTINGS.balance
@@ -162,36 +163,57 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     return _Solution(values, unknown, imbalance, status, sweeps)
 
 
-def _extrapolated(solutions: list[_Solution], mean: float, cells: int, peaks: int) -> ViscoelasticSteady:
+class _Top(NamedTuple):
+    """Cells and peaks of a line, its mean from the highest node, and by how much the peak there rises over it."""
+
+    cells: int
+    peaks: int
+    mean: float
+    rise: float
+
+    @classmethod
+    def of(cls, below: FloatArray, mean: float, periodic: bool) -> _Top:
+        """Return them from heights below the highest node, at which a periodic line begins and ends."""
+        peaks = int(np.count_nonzero((below[1:-1] > below[:-2]) & (below[1:-1] >= below[2:]))) + 1
+        top = int(np.argmax(below))
+        before, after = below[top - 1 if top or not periodic else -2], below[min(top + 1, below.size - 1)]
+        bend = -(before + after)
+        rise = float((after - before) ** 2 / (8 * bend)) if bend > 0 else 0.0  # of the parabola through three nodes
+        return cls(below.size - 1, peaks, mean, rise)
+
+
+def _extrapolated(solutions: list[_Solution], top: _Top) -> ViscoelasticSteady:
     """Extrapolate the two finest grids by their second order; the coarsest tells how well that works.
 
-    The error is estimated by a geometric mean of the last change of the extrapolation, counted twice, and of the last
-    change of the grids, since the former may be small by accident. It falls with the number of cells in contact, whose
-    errors are independent. Numbers may agree on three grids by chance, hardly the length in contact as well. Where
-    hardly a cell is in contact the friction halves with the cells, and the exact one may lie far below.
+    An error is estimated by a geometric mean of the last change of the extrapolation, counted twice, and of the last
+    change of the grids, since the former may be small by accident. That of the drag falls with the number of cells in
+    contact, whose errors are independent. One number may agree on three grids by chance, hardly all four. Where hardly
+    a cell is in contact numbers halve with the cells, and the exact ones may lie far below. All grids share the highest
+    node: by how much a peak rises over it they do not see.
     """
     settings = SETTINGS
     coarsest, coarse, fine = solutions
     if any(solution.status != Outcome.CONVERGED for solution in solutions):
         status = fine.status if fine.status != Outcome.CONVERGED else Outcome.DEPTH_NOT_FOUND
         return ViscoelasticSteady(np.full(4, np.nan), np.full(4, np.nan), status, fine.sweeps)
-    change, touching = np.abs(fine.values - coarse.values), float(fine.values[FRACTION]) * cells
-    resolved = change <= settings.resolved * np.abs(fine.values)
+    size, touching = np.abs(fine.values), float(fine.values[FRACTION]) * top.cells
+    change, before = np.abs(fine.values - coarse.values), np.abs(coarse.values - coarsest.values)
+    resolved = change <= settings.resolved * size
     values = np.where(resolved, fine.values + (fine.values - coarse.values) / 3, fine.values)
-    errors = change.copy()
     if touching < 1 or (touching < settings.hardly and not resolved[DRAG]):
-        errors *= settings.hardly / touching if touching > 0 else np.inf
+        errors = change * (settings.hardly / touching if touching > 0 else np.inf)
     else:
         again = np.abs(values - (coarse.values + (coarse.values - coarsest.values) / 3))
-        independent = min(touching, settings.cells_of_a_peak * peaks)
-        estimate = settings.safety * np.cbrt(again**2 * change) / independent**0.25
-        estimate = np.maximum(estimate, settings.by_chance * change)
-        estimate[DRAG] = max(
-            estimate[DRAG], settings.of_contact * change[FRACTION] / fine.values[FRACTION] * values[DRAG]
-        )
-        errors = np.where(resolved, estimate, errors)
+        change = np.maximum(change, settings.of_before * before)
+        estimate = settings.safety * np.cbrt(again**2 * change)
+        estimate[DRAG] /= min(touching, settings.cells_of_a_peak * top.peaks) ** 0.25
+        others = np.max(change[size > 0] / size[size > 0], initial=0.0) * np.array(settings.of_others)
+        least = np.maximum(others, np.array(settings.of_a_cell) / touching) * size
+        estimate = np.maximum(np.maximum(estimate, np.array(settings.by_chance) * change), least)
+        errors = np.where(resolved, estimate, change)
+    errors[DEPTH] += top.rise * min(1.0, settings.near_a_node / touching if touching > 0 else 1.0)
     errors += fine.imbalance * np.abs(values)
-    values[DEPTH] += mean
+    values[DEPTH] += top.mean
     values[FRACTION] = min(max(values[FRACTION], 0.0), 1.0)
     return ViscoelasticSteady(values, errors, fine.status, fine.sweeps)
 

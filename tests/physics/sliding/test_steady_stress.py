@@ -34,6 +34,10 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
     h, slope = (10**height * roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
     carried = 10 ** (load + height)
     steady = solve(h, slope, 10**reach, carried, scheme)
+    if steady.status[0] == Outcome.DEPTH_NOT_FOUND:
+        # the dashpot alone holds the load on a length, or at a depth, that is lost in the rounding of the line
+        assert load - reach < -12
+        return
     assert steady.status[0] == Outcome.CONVERGED
     # the highest point, which lies above the nodes by part of the range, is pressed in; at most all of the line is
     slack = 1e-9 * (np.ptp(h) + carried)
@@ -80,8 +84,10 @@ def test_spikes_and_steps_are_solved(scheme):
     height[40] = 1e6
     reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
     steady = on_line(height, np.zeros(200), reach, load, scheme)
-    assert np.all(steady.status == Outcome.CONVERGED)
-    assert np.all(steady.drag >= 0)
+    rounding = load / 1e6 / np.maximum(reach, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
+    found = steady.status == Outcome.CONVERGED
+    assert np.all(found | rounding)
+    assert np.all(steady.drag[found] >= 0)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

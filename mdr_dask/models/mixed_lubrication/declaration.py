@@ -1,22 +1,25 @@
-"""The parameters of mixed lubrication, with units, bounds and meanings."""
+"""Parameters and outputs of mixed lubrication, with units, bounds and meanings."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
 from mdr_dask.models.parts.measured_line import ProfileFile
-
-if TYPE_CHECKING:
-    from mdr_dask.physics.lubrication.film_formulas import HertzLine
-    from mdr_dask.physics.lubrication.oil import Oil
+from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
+from mdr_dask.physics.lubrication.oil import OILS, Oil, walther_constants
 
 Positive = Annotated[float, Field(gt=0)]
+#: Contact modulus of steel on steel, 210 GPa and 0.3 each.
+STEEL = 210e9 / (2 * (1 - 0.3**2))
+#: Places of the profiles in half widths of the contact.
+POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
 
 class OilData(Parameters):
@@ -36,8 +39,6 @@ class OilData(Parameters):
 
     @model_validator(mode="after")
     def _falls(self) -> Self:
-        from mdr_dask.physics.lubrication.oil import walther_constants
-
         walther_constants(self.temperature_1, self.viscosity_1, self.temperature_2, self.viscosity_2)
         return self
 
@@ -45,6 +46,12 @@ class OilData(Parameters):
 class MixedLubrication(Parameters):
     """Two equal rough rollers pressed together on an oil film; the defaults are the twin-disc rig of the thesis."""
 
+    gone: ClassVar[Mapping[str, str]] = {
+        "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
+        "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
+        "load_share": "write asperity_load_share",
+        "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
+    }
     normal_force: float = quantity("N", "normal force F_N on the rollers", gt=0)
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", gt=0)
@@ -57,7 +64,10 @@ class MixedLubrication(Parameters):
     hurst: float = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
     longest_wavelength: Positive | Literal["auto"] = quantity(
-        "m", "wavelength above which there is no roughness; auto is 2a at cutoff_force", default="auto"
+        "m",
+        "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
+        "load on their asperities asks for it",
+        default="auto",
     )
     cutoff_force: float = quantity(
         "N", "normal force whose contact width is the longest wavelength", default=1600, gt=0
@@ -84,8 +94,7 @@ class MixedLubrication(Parameters):
     )
     roller_radius: float = quantity("m", "radius of each roller", default=0.05, gt=0)
     roller_width: float = quantity("m", "length L' of the contact line", default=0.01, gt=0)
-    young_modulus: float = quantity("Pa", "Young's modulus of the rollers", default=210e9, gt=0)
-    poisson_ratio: float = quantity("1", "Poisson's ratio of the rollers", default=0.3, ge=0, le=0.5)
+    contact_modulus: float = quantity("Pa", "contact modulus E*", default=STEEL, gt=0)
     resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
     boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
     eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", default=5e6, gt=0)
@@ -113,14 +122,17 @@ class MixedLubrication(Parameters):
         """Return where the lines come from; equal for cases that can share them."""
         if self.profile_1 is not None and self.profile_2 is not None:
             return Measured(self.profile_1, self.profile_2, self.rms_roughness is not None)
-        longest = self.longest_wavelength
-        if longest == "auto":
-            longest = 2 * float(self.dry_contact(self.cutoff_force).half_width)
         shortest = self.shortest_wavelength
         if shortest == "auto":
             shortest = 10 * self.perimeter / self.points
         modes = int(self.perimeter / shortest * (1 + 1e-12))
-        return Generated(self.points, self.hurst, self.perimeter / longest, modes)
+        return Generated(self.points, self.hurst, self.perimeter / self.longest(), modes)
+
+    def longest(self) -> float:
+        """Return the longest wavelength of the roughness in m."""
+        if self.longest_wavelength == "auto":
+            return 2 * float(self.dry_contact(self.cutoff_force).half_width)
+        return self.longest_wavelength
 
     def problem(self) -> str:
         """Say why the case cannot be computed, in one sentence; an empty string if it can."""
@@ -146,13 +158,11 @@ class MixedLubrication(Parameters):
 
     def oil_data(self) -> Oil:
         """Return the oil, whether named or given."""
-        from mdr_dask.physics.lubrication import oil
-
         data = self.oil
         if isinstance(data, str):
-            return oil.OILS[data]
+            return OILS[data]
         low, high = sorted((data.temperature_1, data.temperature_2))
-        return oil.Oil(
+        return Oil(
             data.temperature_1,
             data.viscosity_1,
             data.temperature_2,
@@ -167,12 +177,80 @@ class MixedLubrication(Parameters):
 
     def dry_contact(self, force: float) -> HertzLine:
         """Return the Hertzian contact of the smooth rollers under a normal force in N."""
-        from mdr_dask.physics.lubrication import film_formulas as film
+        return hertz_line(force / self.roller_width, self.contact_modulus, self.roller_radius / 2)
 
-        return film.hertz_line(force / self.roller_width, self.contact_modulus(), self.roller_radius / 2)
 
-    def contact_modulus(self) -> float:
-        """Return E* of the rollers in Pa."""
-        from mdr_dask.physics.lubrication import film_formulas as film
+OUTPUTS = (
+    Output("breakthrough_probability", "1", "share of time with the boundary layer broken anywhere", has_error=True),
+    Output("contact_length", "m", "mean length in intimate contact", has_error=True),
+    Output("film", "m", "film thickness h0", has_error=True),
+    Output("film_ratio", "1", "film thickness over combined rms height", has_error=True),
+    Output("asperity_load_share", "1", "share of the load on asperities, the rest is on the film", has_error=True),
+    Output("turn_error", "1", "standard error of the probability of one turn, from its batches", default=False),
+    Output(
+        "contact_conductance",
+        "S",
+        "mean electrical conductance of the spots in contact",
+        default=False,
+        has_error=True,
+    ),
+    Output(
+        "contact_resistance",
+        "ohm",
+        "reciprocal of the mean conductance, infinite without contact",
+        default=False,
+        has_error=True,
+    ),
+    Output(
+        "friction_coefficient",
+        "1",
+        "coefficient of friction of asperities and film",
+        default=False,
+        has_error=True,
+    ),
+    Output("contact_half_width", "m", "half width a of the Hertzian contact", default=False),
+    Output("contact_length_trace", "m", "length in intimate contact over the turn", ("angle",), default=False),
+    Output("upper_profile", "m", "surface of roller 1 where contact is greatest", ("position",), default=False),
+    Output("lower_profile", "m", "surface of roller 2 where contact is greatest", ("position",), default=False),
+)
 
-        return float(film.reduced_modulus(*(self.young_modulus, self.poisson_ratio) * 2))
+
+def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
+    """Return the angles of a trace and the places, in half widths, of the profiles."""
+    angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
+    return {
+        "angle": Coordinate(angles, "rad", "rolling angle"),
+        "position": Coordinate(POSITIONS, "1", "distance from the middle of the contact over its half width"),
+    }
+
+
+def seconds(block: Block[MixedLubrication]) -> float:
+    """Estimate the time of a block from points, cases and creep."""
+    millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
+    creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
+    lines = 0.06 * float(millions.max())
+    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
+
+
+MODEL = Model(
+    name="mixed_lubrication",
+    version=3,
+    summary="breakthrough of the boundary layer between two rough rollers on an oil film",
+    parameters=MixedLubrication,
+    outputs=OUTPUTS,
+    compute=deferred("mdr_dask.models.mixed_lubrication.solve", "compute"),
+    seconds=seconds,
+    whole=(
+        "normal_force",
+        "rotation_speed",
+        "temperature",
+        "slide_roll_ratio",
+        "rms_roughness",
+        "pressure_viscosity",
+        "layer_thickness",
+        "layer_shear_strength",
+        "film_formula",
+        "film_thickness",
+    ),
+    coordinates=coordinates,
+)

@@ -1,0 +1,148 @@
+"""From a block of rough rollers on a film of oil to arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
+from mdr_dask.models.mixed_lubrication.lines import Source
+from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
+from mdr_dask.models.mixed_lubrication.turn import Turn, creeping, profiles, rolling, trace, turn_values
+from mdr_dask.physics.lubrication import breakthrough
+from mdr_dask.physics.lubrication.breakthrough import Excursions
+
+#: Film ratio below which overlapping asperities merge into clusters that no longer break.
+FILM_RATIO_WARNING = 0.5
+#: Outputs of the turn of two lines, beside traces and profiles.
+_OF_TURN = {
+    "breakthrough_probability",
+    "contact_length",
+    "turn_error",
+    "contact_conductance",
+    "contact_resistance",
+    "contact_length_trace",
+    "upper_profile",
+    "lower_profile",
+}
+_PROFILES = {"upper_profile", "lower_profile"}
+
+
+def compute(block: Block[MixedLubrication]) -> Result:
+    """Return the values of a block; one realisation is one turn of the rollers with lines of its own.
+
+    Cases that differ in load, speed, temperature, rms height or layer share the lines of a realisation and, in pure
+    rolling, the search for points above the film: it goes from the thinnest film to the thickest.
+    """
+    result = _empty(block)
+    groups: dict[Source, list[tuple[int, Operation]]] = {}
+    for index in range(block.cases):
+        case = block.case(index)
+        problem = case.problem()
+        if problem:
+            _refuse(result, index, Status.FAILED, problem)
+            continue
+        try:
+            operation = operation_of(case, block.accuracy)
+        except NoFilmError as error:
+            _refuse(result, index, Status.NOT_CONVERGED, str(error))
+            continue
+        groups.setdefault(operation.source, []).append((index, operation))
+        fixed = fixed_values(operation)
+        _store(result, block, index, slice(None), fixed)
+        _warn(result, block, index, operation)
+        for position in range(len(block.realisations)):
+            _note(result, index, position, _missed(block, fixed, ""))
+        result.status[index] = Status.DONE
+    if _OF_TURN & set(block.outputs):
+        for source, members in groups.items():
+            members.sort(key=lambda member: member[1].level)
+            for position in range(len(block.realisations)):
+                _realise(result, block, source, members, position)
+    return replace(result, solves=sum(map(len, groups.values())) * len(block.realisations))
+
+
+def _empty(block: Block[MixedLubrication]) -> Result:
+    sizes = {name: coordinate.values.size for name, coordinate in coordinates(block.parameters).items()}
+    shape = (block.cases, len(block.realisations))
+    values = {
+        name: np.full((*shape, *(sizes[dim] for dim in MODEL.output(name).dims)), np.nan) for name in block.outputs
+    }
+    return Result(values, np.full(shape, Status.MISSING, dtype=np.int8))
+
+
+def _refuse(result: Result, index: int, status: Status, why: str) -> None:
+    """Give up a case in all its realisations."""
+    result.status[index] = status
+    result.messages.update({(index, position): why for position in range(result.status.shape[1])})
+
+
+def _store(
+    result: Result, block: Block[MixedLubrication], index: int, position: int | slice, found: Mapping[str, Any]
+) -> None:
+    for name in found.keys() & set(block.outputs):
+        result.values[name][index, position] = found[name]
+
+
+def _note(result: Result, index: int, position: int, note: str) -> None:
+    """Add a sentence to the message of one case in one realisation."""
+    if note:
+        before = result.messages.get((index, position))
+        result.messages[index, position] = f"{before}; {note}" if before else note
+
+
+def _missed(block: Block[MixedLubrication], found: Mapping[str, float], advice: str) -> str:
+    """Say which outputs asked for miss the accuracy of the campaign and by how much; an empty string if none does."""
+    if block.accuracy is None:
+        return ""
+    missed = []
+    for name in block.outputs:
+        value, error = found.get(name, 0.0), found.get(f"{name}_error", 0.0)
+        if np.isfinite(value) and error > block.accuracy * abs(value):
+            missed.append(f"{name} {error / abs(value) if value else np.inf:.1e}")
+    if not missed:
+        return ""
+    return f"estimated relative errors: {', '.join(missed)}; {block.accuracy:.1e} was asked for{advice}"
+
+
+def _realise(
+    result: Result,
+    block: Block[MixedLubrication],
+    source: Source,
+    members: list[tuple[int, Operation]],
+    position: int,
+) -> None:
+    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest."""
+    lines = source.lines(block.seed, block.realisations[position])
+    above: Excursions | None = None
+    for index, operation in members:
+        solve: Callable[..., Turn] = partial(creeping, operation, lines)
+        if operation.case.slide_roll_ratio == 0:
+            level = operation.level
+            above = breakthrough.excursions(lines[0] + lines[1], level) if above is None else above.above(level)
+            solve = partial(rolling, operation, above)
+        turn = solve()
+        found = turn_values(operation, turn, partial(solve, coarser=2), block.outputs)
+        _store(result, block, index, position, found)
+        _note(result, index, position, _missed(block, found, "; raise points"))
+        if "contact_length_trace" in block.outputs:
+            _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
+        if _PROFILES & set(block.outputs):
+            _store(result, block, index, position, profiles(operation, turn, lines))
+
+
+def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
+    """Say once a case, at realisation 0, where an assumption behind it fails, whatever outputs are asked for."""
+    if 0 not in block.realisations:
+        return
+    position = block.realisations.index(0)
+    ratio = operation.film / operation.rms
+    _note(result, index, position, operation.warning)
+    if ratio < FILM_RATIO_WARNING:
+        what = f"film ratio {ratio:.2g} is below {FILM_RATIO_WARNING}: overlaps merge into clusters that do not break"
+        _note(result, index, position, f"{what}, the probability is too low")

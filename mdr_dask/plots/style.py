@@ -1,0 +1,220 @@
+"""How figures look: sizes, colours, quantities with their units, titles, ticks, and what a figure leaves out."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.colors import Colormap, Normalize
+    from matplotlib.figure import Figure
+
+#: Okabe and Ito's colours, told apart by colour-blind readers; more curves than these have a colour bar.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+LINES = ("-", "--", ":", "-.")
+MARKERS = ("o", "s", "^", "D")
+#: Panels of one figure that can still be read.
+MOST_PANELS = 6
+#: Width and height of a panel in inches; characters of small print to an inch.
+PANEL = (6.4, 4.4)
+SMALL_PRINT = 15
+DPI = 150
+#: What data carry as their gid, so that they can be told from laws and guides.
+DATA, BAND = "data", "band"
+
+
+class Quantity(NamedTuple):
+    """How a parameter is written: its symbol, the unit shown, and the way there from SI."""
+
+    symbol: str
+    unit: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+#: Parameters by name; a store whose unit is 1 (a dimensionless campaign) keeps the symbol alone.
+QUANTITIES: Mapping[str, Quantity] = {
+    "normal_force": Quantity("normal force $F_N$", "N"),
+    "line_load": Quantity("line load $w$", "N/m"),
+    "velocity": Quantity("velocity $v$", "m/s"),
+    "velocity_change": Quantity(r"velocity change $\Delta v/v_1$", ""),
+    "mean_velocity": Quantity("mean velocity $u$", "m/s"),
+    "rotation_speed": Quantity("rotation speed", "rpm", 30 / np.pi),
+    "temperature": Quantity("temperature", "°C", 1.0, -273.15),
+    "shear_modulus": Quantity("shear modulus $G$", "MPa", 1e-6),
+    "modulus": Quantity("contact modulus $E^*$", "GPa", 1e-9),
+    "contact_modulus": Quantity("contact modulus $E^*$", "GPa", 1e-9),
+    "relaxation_time": Quantity(r"relaxation time $\tau$", "ms", 1e3),
+    "hurst": Quantity("Hurst exponent $H$", ""),
+    "rms_roughness": Quantity("rms height $h$", "µm", 1e6),
+    "length": Quantity("length $L$", "mm", 1e3),
+    "longest_wavelength": Quantity("longest wavelength", "mm", 1e3),
+    "shortest_wavelength": Quantity("shortest wavelength", "µm", 1e6),
+    "points": Quantity("points", ""),
+    "slide_roll_ratio": Quantity("slide-roll ratio", ""),
+    "pressure_viscosity": Quantity(r"pressure-viscosity coefficient $\alpha$", "1/GPa", 1e9),
+    "layer_thickness": Quantity("layer thickness $h_c$", "nm", 1e9),
+    "layer_shear_strength": Quantity(r"layer strength $\tau_0$", "MPa", 1e-6),
+    "load_parameter": Quantity("load parameter $W$", ""),
+    "speed_parameter": Quantity("speed parameter $U$", ""),
+    "material_parameter": Quantity("material parameter $G$", ""),
+    "inlet": Quantity("inlet $x_{in}/a$", ""),
+    "viscosity": Quantity(r"viscosity $\eta_0$", "Pa s"),
+    "radius": Quantity("radius $R$", "mm", 1e3),
+    "roller_radius": Quantity("roller radius", "mm", 1e3),
+    "stick_radius": Quantity("stick radius $c/a_0$", ""),
+    "cycles": Quantity("cycles", ""),
+    "amplitude": Quantity("amplitude $U_0$", "µm", 1e6),
+    "load": Quantity("normal force $F_N$", "N"),
+    "depth": Quantity("depth $d_0$", "µm", 1e6),
+    "path": Quantity("sliding path", "m"),
+    "friction": Quantity("coefficient of friction", ""),
+    "xi": Quantity(r"$\xi$", ""),
+    "indenter_angle": Quantity("angle", "°", 180 / np.pi),
+    "indenter_radius": Quantity("radius $R$", "mm", 1e3),
+}
+
+
+def quantity(name: str, values: xr.DataArray | None = None) -> Quantity:
+    """Return how a parameter is written; one without a unit in its store is a pure number."""
+    unit = None if values is None else values.attrs.get("units")
+    known = QUANTITIES.get(name)
+    if known is None:
+        return Quantity(name.replace("_", " "), "" if unit in (None, "1") else str(unit))
+    return Quantity(known.symbol, "") if unit == "1" else known
+
+
+def shown(name: str, values: xr.DataArray) -> Any:
+    """Return the values of a parameter in the unit that figures show."""
+    if values.dtype.kind not in "fiu":
+        return values.values
+    how = quantity(name, values)
+    return np.asarray(values.values, dtype=np.float64) * how.factor + how.offset
+
+
+def label(name: str, values: xr.DataArray | None = None) -> str:
+    """Return the label of an axis: ``normal force $F_N$ [N]``."""
+    how = quantity(name, values)
+    return with_unit(how.symbol, how.unit)
+
+
+def with_unit(symbol: str, unit: str) -> str:
+    """Return a label with its unit as all figures write it."""
+    return f"{symbol} [{unit}]" if unit and unit != "1" else symbol
+
+
+def named(name: str, value: xr.DataArray) -> str:
+    """Return one value as legends and titles write it: ``$F_N$ = 1.5 N``."""
+    how, number = quantity(name, value), shown(name, value)
+    text = f"{float(number):.4g}" if value.dtype.kind in "fiu" else str(number[()])
+    symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
+    return f"{symbol} = {text} {how.unit}".strip()
+
+
+def panels(count: int, columns: int = 3, size: tuple[float, float] = PANEL, **shared: Any) -> tuple[Figure, list[Axes]]:
+    """Return a figure and as many panels as asked for, in rows."""
+    from matplotlib.figure import Figure
+
+    columns = max(1, min(columns, count))
+    rows = -(-count // columns)
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    grid = list(figure.subplots(rows, columns, squeeze=False, **shared).ravel())
+    for unused in grid[count:]:
+        unused.remove()
+    return figure, grid[:count]
+
+
+def title(figure: Figure, subject: str, *fixed: str) -> None:
+    """Write the subject of a figure over it, and in small print what is held fixed and what bars mean."""
+    lines = [subject, *(line for text in fixed if text for line in _wrapped(figure, text))]
+    figure.suptitle("\n".join(lines), fontsize="medium")
+
+
+def leave_out(figure: Figure, sentences: Iterable[str]) -> None:
+    """Write under a figure what it leaves out."""
+    told = [sentence for sentence in dict.fromkeys(sentences) if sentence]
+    before = left_out(figure)
+    text = "; ".join([*([before] if before else []), *told])
+    if text:
+        figure.supxlabel("\n".join(_wrapped(figure, f"not drawn: {text}")), fontsize="small", color="0.3")
+
+
+def left_out(figure: Figure) -> str:
+    """Return what a figure says that it leaves out."""
+    return figure.get_supxlabel().replace("\n", " ").removeprefix("not drawn: ")
+
+
+def _wrapped(figure: Figure, text: str) -> list[str]:
+    return textwrap.wrap(text, max(30, int(SMALL_PRINT * figure.get_figwidth())), break_long_words=False)
+
+
+def scale(count: int) -> list[str]:
+    """Return so many colours for curves that a legend names."""
+    return [COLOURS[k % len(COLOURS)] for k in range(count)]
+
+
+def shades(values: Any) -> tuple[Colormap, Normalize]:
+    """Return colour map and norm of curves that a colour bar names: logarithmic where the values are geometric."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LogNorm, Normalize
+
+    values = np.asarray(values, dtype=np.float64)
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    norm = (LogNorm if is_geometric(values) else Normalize)(low, high if high > low else low + 1)
+    return colormaps["viridis"].resampled(256), norm
+
+
+def is_geometric(values: Any) -> bool:
+    """Return whether numbers belong on a logarithmic axis: positive, and spread over more than a factor of ten."""
+    values = np.asarray(values, dtype=np.float64)
+    values = values[np.isfinite(values)]
+    return bool(values.size and values.min() > 0 and values.max() > 10 * values.min())
+
+
+def logarithmic(axes: Axes, which: str) -> None:
+    """Give the axes of a panel that are named, ``x``, ``y`` or ``xy``, a logarithmic scale whose labels do not collide.
+
+    Called when the data are drawn: the ticks go by the limits then.
+    """
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    for name in which:
+        getattr(axes, f"set_{name}scale")("log")
+        axis: Axis = getattr(axes, f"{name}axis")
+        low, high = sorted(np.abs(axis.get_view_interval()))
+        if low > 0 and high < 100 * low:
+            _plain_ticks(axis, low, high)
+        else:
+            axis.set_major_locator(LogLocator(numticks=10))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def _plain_ticks(axis: Axis, low: float, high: float) -> None:
+    """Put ticks at 1, 2 and 5 times the powers of ten, with plain numbers, on an axis of less than two decades."""
+    from matplotlib.ticker import FixedLocator, MaxNLocator, NullFormatter
+
+    decades = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    ticks = np.sort(np.ravel(decades[:, None] * np.array([1, 2, 5])))
+    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    if ticks.size < 2:
+        ticks = np.array(MaxNLocator(4).tick_values(low, high))
+        ticks = ticks[(ticks >= low) & (ticks <= high)]
+    axis.set_major_locator(FixedLocator(ticks.tolist()))
+    axis.set_major_formatter(lambda value, _: f"{value:.4g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
+def legend(axes: Axes, heading: str = "") -> None:
+    """Draw the legend of a panel where it has anything to name, outside where it is long."""
+    handles, _ = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    long = len(handles) > 9
+    place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if long else {"loc": "best"}
+    axes.legend(title=heading or None, fontsize="x-small", title_fontsize="x-small", framealpha=0.7, **place)

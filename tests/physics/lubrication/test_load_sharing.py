@@ -1,0 +1,95 @@
+"""Load shared by film and asperities: sums of Gaussian heights, the balance, its limits, and the room between lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import norm
+
+from mdr_dask.physics.lubrication.film_formulas import FORMULAS
+from mdr_dask.physics.lubrication.load_sharing import (
+    Asperities,
+    SharedLoad,
+    distance_of_means,
+    mean_overlap,
+    share_load,
+)
+from mdr_dask.physics.surfaces import roughness
+
+E_STAR, RMS, WAVELENGTH = 115.385e9, 0.28e-6, 0.42e-3
+
+
+@pytest.mark.parametrize("distance", [-20.0, -3.0, -0.5, 0.0, 0.7, 2.0, 6.0])
+def test_mean_overlap_is_the_integral_over_gaussian_heights(distance: float) -> None:
+    by_quadrature = quad(lambda z: (z - distance) * norm.pdf(z), distance, 12.0, epsabs=0, epsrel=1e-11)[0]
+    assert mean_overlap(distance) == pytest.approx(by_quadrature, rel=1e-8)
+
+
+@pytest.mark.parametrize("room", [1e-100, 1e-12, 1e-3, 0.3989, 1.0, 3.0, 8.999, 9.001, 40.0, 1e6])
+def test_room_between_the_lines_is_the_film(room: float) -> None:
+    distance = distance_of_means(room)
+    assert mean_overlap(-distance) == pytest.approx(room, rel=1e-9)
+    assert distance <= room
+    if room >= 3:
+        assert distance == pytest.approx(room, rel=2e-4)  # far apart, the film is the distance
+
+
+def test_every_film_has_a_distance() -> None:
+    rooms = np.geomspace(1e-300, 1e3, 4000)
+    distances = np.array([distance_of_means(float(room)) for room in rooms])
+    assert np.all(np.diff(distances) >= 0)
+
+
+def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
+    """MDR springs of two generated lines, pressed until the room between them is the film: E* times overlap."""
+    points = 400_000
+    amplitude = RMS / np.sqrt(2) * roughness.amplitudes(40_000, 0.7, longest=300.0)
+    phase = roughness.phases(7, 0, 80_000).reshape(-1, 2)
+    heights = sum(roughness.line(amplitude, phase[:, roller], points) for roller in (0, 1))
+    asperities = Asperities(RMS, WAVELENGTH, E_STAR)
+    for distance in (-1.0, 0.0, 1.0):
+        film = np.mean(np.maximum(distance * RMS - heights, 0))
+        spacing = WAVELENGTH * 300 / points
+        force = E_STAR * spacing * np.sum(np.maximum(heights - distance * RMS, 0))  # of 300 squares in a row
+        # 300 longest waves: means scatter by some per cent
+        assert asperities.pressure(film) == pytest.approx(force / (300 * WAVELENGTH**2), rel=0.1)
+
+
+@pytest.mark.parametrize("name", list(FORMULAS))
+@pytest.mark.parametrize("ratio", [1e-4, 0.01, 0.3, 1.0, 2.0, 4.0])
+@pytest.mark.parametrize("pressure", [1e7, 2e8, 1e9])
+def test_shares_add_to_one_and_the_film_is_never_thinner(name: str, ratio: float, pressure: float) -> None:
+    formula, asperities = FORMULAS[name], Asperities(RMS, WAVELENGTH, E_STAR)
+    W, U, G = 2e-5, 1e-11, 4000.0
+    scale = ratio * RMS / float(formula(W, U, G))
+    shared = share_load(
+        lambda share: scale * float(formula(W, U / share, G * share)),
+        lambda film: asperities.pressure(film) / pressure,
+    )
+    assert shared.film_share + shared.asperity_share == pytest.approx(1.0, abs=1e-7)
+    assert shared.film >= ratio * RMS
+    assert shared.film == pytest.approx(ratio * RMS * shared.film_share ** (formula.material - formula.speed), rel=1e-9)
+    assert shared.asperity_share == pytest.approx(asperities.pressure(shared.film) / pressure, rel=1e-9)
+
+
+def test_as_the_film_vanishes_the_asperities_carry_everything() -> None:
+    """The film that they leave is that of the dry contact, whatever the formula gives."""
+    asperities, pressure = Asperities(RMS, WAVELENGTH, E_STAR), 1.3e8
+
+    def shared(alone: float) -> SharedLoad:
+        return share_load(lambda share: alone * share**-0.222, lambda film: asperities.pressure(film) / pressure)
+
+    shares = [shared(film) for film in np.geomspace(1e-6, 1e-16, 12)]
+    carried = [each.asperity_share for each in shares]
+    assert np.all(np.diff(carried) > -1e-9)
+    assert carried[0] < 1e-3
+    assert carried[-1] == pytest.approx(1.0, abs=1e-6)
+    assert asperities.pressure(shares[-1].film) == pytest.approx(pressure, rel=1e-6)
+
+
+def test_a_film_that_is_not_found_anywhere_is_none() -> None:
+    shared = share_load(lambda share: 0.0, lambda film: 2.0)
+    assert shared.film == 0.0
+    cut = share_load(lambda share: 1.0 if share < 0.5 else 0.0, lambda film: 0.1 if film else 2.0)
+    assert cut.film == 0.0
