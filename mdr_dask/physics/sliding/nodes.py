@@ -12,7 +12,7 @@ from mdr_dask.arrays import FloatArray
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
-BEFORE, AFTER = WING + 1, WING + 1  # nodes of the turns before and after, as many as `refine` reads
+BEFORE, AFTER = WING + 1, WING + 2  # nodes of the turns before and after, as many as `refine` reads
 ABOVE = 4 / 27  # of its slopes at both ends, that a cubic cell reaches above its ends at most
 SUMMIT = 64  # nodes in a cell that its highest point is taken from
 
