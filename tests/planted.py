@@ -37,7 +37,7 @@ model: ehl_line
 outputs: [central_film, minimum_film, film, pressure, traction_coefficient]
 parameters:
 """
-RULE = "wear_rule" if "wear_rule" in FrettingWear.model_fields else "method"
+RULE = "wear_rule"
 FRETTING = """
 model: fretting_wear
 outputs: [wear_volume, contact_radius, worn_profile, worn_image]
