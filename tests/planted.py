@@ -12,7 +12,6 @@ import zarr
 
 from mdr_dask import campaign, plan, store
 from mdr_dask.models.base import Status
-from mdr_dask.models.fretting_wear import FrettingWear
 from mdr_dask.physics.sliding import laws
 
 LINE = """
