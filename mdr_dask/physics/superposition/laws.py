@@ -158,8 +158,8 @@ def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance
         return squares / freedom - 1
 
     scatter, largest = 0.0, float(np.std(factors))
-    if excess(0.0) > 0:
-        ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
+    ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
+    if excess(0.0) > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
         scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-3)))
     best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
     residual = float(np.sqrt(np.mean((law(best)[0] - factors) ** 2)))
