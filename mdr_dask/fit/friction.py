@@ -309,17 +309,26 @@ def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -
 
 
 def _least_squares(
-    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 30
+    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 40
 ) -> FloatArray:
-    """Fit the data of every row, shape (rows, points), by damped Gauss-Newton; return (rows, constants)."""
+    """Fit the data of every row, shape (rows, points), by Levenberg and Marquardt's steps; return (rows, constants)."""
+    size = np.eye(len(start))
     constants = np.tile(np.array(start), (data.shape[0], 1))
+    damping = np.full(data.shape[0], 1e-6)
+    value = model(constants)
+    cost = np.sum((data - value) ** 2, axis=1)
     for _ in range(steps):
-        value = model(constants)
-        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * np.eye(len(start))], axis=-1)
-        normal = np.swapaxes(jacobian, 1, 2) @ jacobian + 1e-12 * np.eye(len(start))
+        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
         gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
         step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
-        constants = constants + step
+        trial = model(constants + step)
+        cost_there = np.sum((data - trial) ** 2, axis=1)
+        better = cost_there <= cost
+        constants = np.where(better[:, None], constants + step, constants)
+        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
+        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
         if np.abs(step).max() < 1e-9:
             break
     return constants
