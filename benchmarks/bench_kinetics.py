@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.velocity_jump import CONVERGED, velocity_jump
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS = 1000
 
@@ -13,7 +15,7 @@ POINTS = 1000
 @pytest.mark.parametrize("reach", [0.002, 0.02])
 def test_bench_jump(benchmark, hurst, reach):
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(1, 0, POINTS // 2)
-    height, slope = (roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1))
-    times = np.geomspace(1e-4, 20, 40)
-    found = benchmark(velocity_jump, height, slope, 0.3, (reach, 1.2 * reach), times, np.pi * POINTS, 12)
-    assert found.status == CONVERGED
+    line = periodic_line(*(roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1)))
+    course = Course(np.geomspace(1e-4, 20, 40), np.pi * POINTS, 12)
+    found = benchmark(velocity_jump, line, 0.3, (reach, 1.2 * reach), course)
+    assert found.outcome == Outcome.CONVERGED

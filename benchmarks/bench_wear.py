@@ -5,15 +5,13 @@ import pytest
 
 from mdr_dask.models.base import Block
 from mdr_dask.models.fretting_wear import MODEL
-from mdr_dask.models.fretting_wear.parameters import FrettingWear
+from mdr_dask.models.fretting_wear.declaration import FrettingWear
 from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.transforms import inverse_transform
-from mdr_dask.physics.wear import worn as wear
-from mdr_dask.physics.wear.exact import exact_without_error
-from mdr_dask.physics.wear.forced import exact_forced, limit_forced
-from mdr_dask.physics.wear.forced_fast import fast_forced
-from mdr_dask.physics.wear.literal import literal
+from mdr_dask.physics.wear import rules as wear
+from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.forced_rule import fast_forced
 
 PARABOLA = PowerProfile(2.0)
 
@@ -26,27 +24,21 @@ def test_fast(benchmark):
     assert benchmark(wear.fast, PARABOLA, 0.455, 4.0).wear_volume > 0
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
-def test_exact(benchmark, tolerance):
-    assert benchmark(exact_without_error, PARABOLA, 0.455, 4.0, tolerance).wear_volume > 0
+@pytest.mark.parametrize("errors", [False, True])
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, 1e-4])
+def test_exact(benchmark, accuracy, errors):
+    assert benchmark(exact, PARABOLA, 0.455, [4.0], accuracy, errors=errors)[0].wear_volume > 0
 
 
-def test_literal(benchmark):
-    assert benchmark.pedantic(literal, (PARABOLA, 0.455, 0.5), {"cells": 60, "substeps": 16}).wear_volume > 0
-
-
-@pytest.mark.parametrize("method", [limit_forced, fast_forced, exact_forced, literal])
-def test_constant_force(benchmark, method):
-    """The four methods at N = 2, c = 0.455: tolerance 1e-3, 100 cells."""
-    arguments = {
-        limit_forced: ((1e-3,), {}),
-        fast_forced: ((2.0,), {}),
-        exact_forced: (([2.0], 1e-3), {}),
-        literal: ((2.0,), {"cells": 100, "substeps": 16, "constant_force": True}),
-    }
-    values, names = arguments[method]
-    worn = benchmark.pedantic(method, (PARABOLA, 0.455, *values), names)
-    assert np.ravel([worn])[0].depth > 1.0
+@pytest.mark.parametrize("rule", ["limit", "fast", "exact"])
+def test_constant_force(benchmark, rule):
+    """The three rules at N = 2, c = 0.455, accuracy 1e-3."""
+    run = {
+        "limit": lambda: limit_under_force(PARABOLA, 0.455, 1e-3),
+        "fast": lambda: fast_forced(PARABOLA, 0.455, 2.0),
+        "exact": lambda: exact(PARABOLA, 0.455, [2.0], 1e-3, constant_force=True)[0],
+    }[rule]
+    assert benchmark.pedantic(run).depth > 1.0
 
 
 def test_inverse_transform(benchmark):
@@ -59,5 +51,7 @@ def test_panels(benchmark):
 
 def test_block_of_fast_cases(benchmark):
     columns = {"stick_radius": np.linspace(0.05, 0.95, 2000), "cycles": np.linspace(0.1, 20, 2000)}
-    block = Block(FrettingWear(stick_radius=0.5), columns, 2000, (0,), 0, ("wear_volume", "contact_radius"))
+    block = Block(
+        FrettingWear(wear_rule="fast", stick_radius=0.5), columns, 2000, (0,), 0, ("wear_volume", "contact_radius")
+    )
     assert benchmark(MODEL.compute, block).solves == 2000

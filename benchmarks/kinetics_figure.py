@@ -18,7 +18,8 @@ from mdr_dask import bootstrap
 from mdr_dask.fit.relaxation import exponential, point_weights, widths
 from mdr_dask.physics.sliding.backward_euler import solve
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.velocity_jump import velocity_jump
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS, HURST, LOAD, REACH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
 LAW = (REACH * np.pi * POINTS) ** (1 - HURST)
@@ -132,7 +133,8 @@ def graded(amplitude: np.ndarray, phase: np.ndarray, times: np.ndarray) -> np.nd
     """Return mu - mu_2 of the march."""
     nodes = 4 * POINTS
     line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
-    jump = velocity_jump(*line, LOAD, (REACH, REACH * (1 + CHANGE)), times, np.pi * POINTS, 12)
+    course = Course(times, np.pi * POINTS, 12)
+    jump = velocity_jump(periodic_line(*line), LOAD, (REACH, REACH * (1 + CHANGE)), course)
     trace: np.ndarray = (jump.trace - jump.after) / LOAD
     return trace
 

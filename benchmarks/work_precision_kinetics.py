@@ -16,8 +16,9 @@ from numba import njit
 
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.protocol import follow
-from mdr_dask.physics.transients.velocity_jump import velocity_jump
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients.elements.follow import follow
+from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS, REACH, CHANGE, LOAD, RUN_IN = 500, 0.05, 0.2, 0.3, 10.0
 TIMES = np.geomspace(0.01, 3, 20)
@@ -32,7 +33,8 @@ def line(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def march(oversampling: int, per_decade: float) -> np.ndarray:
-    found = velocity_jump(*line(oversampling), LOAD, (REACH, REACH * (1 + CHANGE)), TIMES, np.pi * POINTS, per_decade)
+    course = Course(TIMES, np.pi * POINTS, per_decade)
+    found = velocity_jump(periodic_line(*line(oversampling)), LOAD, (REACH, REACH * (1 + CHANGE)), course)
     return (found.trace - found.after) / found.after
 
 

@@ -16,8 +16,9 @@ from numba import njit
 
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.forces import depth_for
-from mdr_dask.physics.transients.protocol import KELVIN, closed_line, follow_line, foundation, steady_start
+from mdr_dask.physics.transients.elements.edges import depth_for
+from mdr_dask.physics.transients.elements.follow import closed_line, follow_line, steady_start
+from mdr_dask.physics.transients.elements.foundation import KELVIN, foundation
 
 POINTS, REACH, CHANGE, LOAD = 100, 0.1, 0.2, 0.3
 TIMES = np.concatenate([np.geomspace(0.05, 0.95, 10), 1 + np.geomspace(0.05, 0.95, 10)])

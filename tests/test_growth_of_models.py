@@ -20,9 +20,9 @@ MODELS = {
     "velocity_jump": (LINE, "velocity", ("1 mm/s", "1 cm/s", "10 cm/s"), "hurst", (0.7, 0.5)),
     "fretting_wear": (
         """
-parameters: {{shape: parabola, method: fast, curvature_radius: 10 mm, modulus: 115 GPa, shear_modulus: 90 GPa,
-             friction: 0.6, amplitude: 1 um, load: 50 N, hardness: 2 GPa, wear_coefficient: 1e-4, cycles: {values},
-             wear_coefficient_scatter: {other}}}
+parameters: {{indenter: {{shape: parabola, radius: 10 mm}}, wear_rule: fast, contact_modulus: 115 GPa,
+             shear_modulus: 90 GPa, friction: 0.6, amplitude: 1 um, normal_force: 50 N, hardness: 2 GPa,
+             wear_coefficient: 1e-4, cycles: {values}, wear_coefficient_scatter: {other}}}
 outputs: [wear_volume, contact_radius]
 """,
         "cycles",

@@ -31,6 +31,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
 ABSOLUTE_ZERO = -273.15
+LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
 SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
 
 
@@ -103,15 +104,17 @@ def master_curve(
     frame = _frame(table)
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
+    frame, left_out = _finite(frame, [over, values, by] + ([second] if second else []))
     if second is not None:
-        return _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
+        found = _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
+        return found.assign_attrs(left_out=left_out)
     groups, curves = _curves(frame, over, values, by)
     zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
     free = superposition.superpose(groups, curves, vertical, None, draws)
     result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
-    return dataset.assign(_laws(result, over, by, units.get(by, "")))
+    return dataset.assign(_laws(result, over, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
 
 
 def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
@@ -122,6 +125,30 @@ def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
     frame = mean[[name for name in numeric if name in mean.data_vars]].to_dataframe().reset_index()
     frame.attrs["units"] = {str(name): str(mean[name].attrs.get("units", "1")) for name in numeric}
     return frame
+
+
+def _finite(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
+    """Return the rows that have a finite number in each of the columns, and a sentence about the others, if any."""
+    missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
+    anywhere = np.logical_or.reduce(list(missing.values()))
+    if not anywhere.any():
+        return frame, ""
+    where = ", ".join(f"{name!r} in {lines.sum()}" for name, lines in missing.items() if lines.any())
+    kept = frame[~anywhere]
+    kept.attrs.update(frame.attrs)
+    return kept, f"{anywhere.sum()} of {anywhere.size} rows are left out, which have no finite number: {where}"
+
+
+def _untold(found: superposition.Superposition) -> dict[str, str]:
+    """Return a sentence about the steps that the curves do not tell, if there are any."""
+    if not found.undetermined:
+        return {"undetermined": ""}
+    runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
+    mean, scatter = found.usual
+    return {
+        "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are "
+        f"taken to be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
+    }
 
 
 def _find(frame: pd.DataFrame, wanted: str) -> str | None:
@@ -187,7 +214,7 @@ def _of_two_groups(
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
-    rows = frame[[over, values, *by]].dropna()
+    rows = frame[[over, values, *by]]
     first, second = (_clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
     centres = [
         {label: float(rows[name].to_numpy()[labels == label].mean()) for label in np.unique(labels)}
@@ -196,6 +223,9 @@ def _of_two_groups(
     for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
         part = rows[(first == one) & (second == other)]
         (_,), (curve,) = _curves(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
+        if np.ptp(curve[0]) == 0:
+            where = f"{by[0]} = {centres[0][one]:g}, {by[1]} = {centres[1][other]:g}"
+            raise DataError(f"the curve at {where} needs two or more distinct points")
         keys.append((centres[0][one], centres[1][other]))
         curves.append(curve)
     a, b = np.array(keys).T
@@ -226,7 +256,6 @@ def _curves(
     frame: pd.DataFrame, over: str, values: str, by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     rows = frame[[over, values, by]].to_numpy(dtype=np.float64)
-    rows = rows[np.all(np.isfinite(rows), axis=1)]
     if rows.size == 0 or np.any(rows[:, :2] <= 0):
         raise DataError(f"{over!r} and {values!r} must be positive: curves are shifted along logarithmic axes")
     labels = _clusters(rows[:, 2])
@@ -238,13 +267,16 @@ def _curves(
 def _clusters(values: FloatArray) -> NDArray[np.intp]:
     """Return the number of the group of each value.
 
-    Measured values that scatter about a few set ones are split at the largest jump among their gaps.
+    Measured values that scatter about a few set ones are split at the largest jump among their gaps. Values that occur
+    again, or whose gaps are much alike, are set ones themselves.
     """
-    distinct, place = np.unique(values, return_inverse=True)
-    if distinct.size <= values.size / 3 or distinct.size < 3:
+    distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
+    if distinct.size <= values.size / 3 or distinct.size < 3 or times.min() > 1:
         return place
     gaps = np.sort(np.diff(distinct))
     jump = int(np.argmax(gaps[1:] / gaps[:-1]))
+    if gaps[jump + 1] < LEAST_JUMP * gaps[jump]:
+        return place
     threshold = np.sqrt(gaps[jump] * gaps[jump + 1])
     return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
 
@@ -283,7 +315,6 @@ def _dataset(
             "reference": result.reference,
             "noise": result.noise,
             "freedom": result.freedom,
-            "sampled": result.sampled,
         },
     )
     narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
@@ -375,7 +406,6 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
         draws=_drawn(curve),
-        sampled=float(curve.attrs["sampled"]),
     )
     units = {
         by: curve[by].attrs.get("units", ""),

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
+from pydantic import ValidationError
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
 from mdr_dask.models.base import Block
-from mdr_dask.models.fretting_wear.parameters import FrettingWear, TableShape
-from mdr_dask.models.fretting_wear.reduction import Numbers, reduce_block, table_profile
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Table
+from mdr_dask.models.fretting_wear.reduction import reduce_block, table_profile
+from mdr_dask.tables import Column, read_sheet, read_table
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.wear.factor import Measured
 
 MODELS = ("fretting_wear",)
 
@@ -27,7 +31,7 @@ def wear_coefficient(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
             return "wear_coefficient", parameters.wear_coefficient, "wear coefficient k"
         return "cycle_factor", 1.0, "units N of wear in one cycle of the table"
 
-    return _fit(groups, describe, lambda parameters: parameters.method)
+    return _fit(groups, describe, lambda parameters: parameters.wear_rule)
 
 
 def best_xi(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -43,10 +47,13 @@ def _fit(
     """Fit one factor in every series that names a table."""
     from mdr_dask.physics.wear.factor import fit_factor
 
-    found: dict[str, dict[str, float]] = {}
+    found: dict[str, dict[str, float | str]] = {}
     meanings: dict[str, tuple[str, str]] = {}
     for series, dataset in groups.items():
-        parameters = FrettingWear.model_validate(json.loads(dataset.attrs["parameters"]))
+        try:
+            parameters = FrettingWear.model_validate(json.loads(dataset.attrs["parameters"]))
+        except ValidationError:
+            raise FitError("the store was made with parameters of an older version; run its campaign again") from None
         if parameters.measured is None:
             continue
         name, start, meaning = describe(parameters)
@@ -55,18 +62,22 @@ def _fit(
         except ValueError as problem:
             raise FitError(str(problem)) from None
         ends = {"": factor.value, "_low": factor.low, "_high": factor.high}
-        row = {name + end: start * value for end, value in ends.items()}
-        row |= {"residual": factor.residual, "explained": factor.explained}
+        row: dict[str, float | str] = {name + end: start * value for end, value in ends.items()}
+        row |= {"residual": factor.residual, "explained": factor.explained, "law_holds": factor.law_holds}
         found[series] = row
         meanings |= {name + end: ("1", meaning) for end in ends}
     if not found:
         raise FitError("no series names a table of measurements; give the parameter measured: table.csv")
-    meanings["residual"] = ("1", "root mean square deviation, in a0^2 d0 for volumes and d0 for profiles")
+    meanings["residual"] = (
+        "1",
+        "root mean square deviation: over given errors, else relative for volumes, in d0 for f",
+    )
     meanings["explained"] = ("1", "share of the variance explained")
+    meanings["law_holds"] = ("1", "whether the law holds")
     return _dataset(found, meanings)
 
 
-def _dataset(found: dict[str, dict[str, float]], meanings: dict[str, tuple[str, str]]) -> xr.Dataset:
+def _dataset(found: dict[str, dict[str, float | str]], meanings: dict[str, tuple[str, str]]) -> xr.Dataset:
     series = list(found)
     return xr.Dataset(
         {
@@ -81,47 +92,50 @@ def _dataset(found: dict[str, dict[str, float]], meanings: dict[str, tuple[str, 
     )
 
 
-def _prediction(parameters: FrettingWear, method: str) -> tuple[Callable[[float], np.ndarray], np.ndarray]:
-    """Return what the law predicts for a factor of N, and the measurements, both dimensionless."""
+def _prediction(parameters: FrettingWear, rule: str) -> tuple[Callable[[float], np.ndarray], Measured, np.ndarray]:
+    """Return what the law predicts for a factor of N, the measurements, dimensionless, and what they are ordered by."""
     from mdr_dask.physics.mdr.revolution import PowerProfile
-    from mdr_dask.physics.wear.factor import at_cycles, profile_curve, volume_curve
+    from mdr_dask.physics.wear.factor import Law, Measured
 
-    if method not in {"fast", "exact"}:
-        raise FitError(f"a wear law is fitted by method fast or exact, got {method!r}")
+    if rule not in {"fast", "exact"}:
+        raise FitError(f"a wear law is fitted by wear_rule fast or exact, got {rule!r}")
     numbers, problems = reduce_block(Block(parameters, {}, 1, (0,), 0, ()))
     if problems:
         raise FitError(problems[0, 0])
     if not numbers.level[0, 0] > 0.0:
         raise FitError("the amplitude is in gross slip: the law of partial slip cannot be fitted")
-    table = isinstance(parameters.shape, TableShape)
-    depth = float(numbers.height[0, 0])
-    profile = table_profile(parameters.shape, depth) if table else PowerProfile(float(numbers.exponent[0, 0]))
+    table, depth = isinstance(parameters.indenter, Table), float(numbers.height[0, 0])
+    profile = table_profile(parameters.indenter, depth) if table else PowerProfile(float(numbers.exponent[0, 0]))
     stick = profile.inside(float(numbers.level[0, 0]))
-    columns, held = read_table(parameters), parameters.hold == "force"
+    law = Law(profile, stick, rule, parameters.xi, parameters.hold == "force")
+    columns, length = read_measured(parameters), float(numbers.length[0, 0])
+    errors = columns.get("error")
     if "volume" in columns:
-        measured, cycles = _volumes(columns, numbers)
-        curve = volume_curve(profile, stick, method, parameters.xi, constant_force=held)
-        return lambda factor: at_cycles(curve, factor * cycles), measured
-    radius = columns["radius"] / float(numbers.length[0, 0])
-    curve = profile_curve(profile, stick, radius, method, parameters.xi, constant_force=held)
+        unit, cycles = length**2 * depth, columns["cycles"] * float(numbers.advance[0, 0])
+        worn = cycles > 0.0
+        if not np.any(worn):
+            raise FitError("the measurements do not depend on the factor: no row has cycles")
+        curve = law.volumes()
+        data = Measured(columns["volume"][worn] / unit, None if errors is None else errors[worn] / unit)
+        return lambda factor: curve(factor * cycles[worn]), data, cycles[worn]
+    heights = law.profiles(columns["radius"] / length)
     total = float(numbers.cycles[0, 0])
-    return lambda factor: at_cycles(curve, factor * total), columns["height"] / depth
+    data = Measured(columns["height"] / depth, None if errors is None else errors / depth, relative=False)
+    return lambda factor: heights(factor * total), data, columns["radius"]
 
 
-def _volumes(columns: dict[str, np.ndarray], numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Return measured volumes and N, dimensionless."""
-    unit = float(numbers.length[0, 0] ** 2 * numbers.height[0, 0])
-    return columns["volume"] / unit, columns["cycles"] * float(numbers.advance[0, 0])
+_VOLUMES = (Column("cycles", "1", least=0.0), Column("volume", "m^3", given_unit="m^3"))
+_PROFILE = (Column("radius", "m", least=0.0, given_unit="m"), Column("height", "m", given_unit="m"))
 
 
-def read_table(parameters: FrettingWear) -> dict[str, np.ndarray]:
+def read_measured(parameters: FrettingWear) -> dict[str, np.ndarray]:
     """Read the campaign's table of measurements.
 
     Parameters
     ----------
     parameters : FrettingWear
-        Names a CSV table with the columns ``cycles, volume`` (m3) or ``radius, height`` (m), or without units in a
-        dimensionless campaign; lines that begin with ``#`` are comments.
+        Names a table with the columns ``cycles, volume`` (m3) or ``radius, height`` (m), or without units in a
+        dimensionless campaign, and perhaps ``error``, the standard error of volume or height.
 
     Returns
     -------
@@ -136,17 +150,14 @@ def read_table(parameters: FrettingWear) -> dict[str, np.ndarray]:
     if parameters.measured is None:
         raise DataError("there is no table of measurements; give the parameter measured: table.csv")
     file = parameters.measured
-    rows = [row for row in csv.reader(io.StringIO(file.read_text())) if row and not row[0].lstrip().startswith("#")]
-    header = [cell.strip().lower() for cell in rows[0]] if rows else []
-    if not ({"cycles", "volume"} <= set(header) or {"radius", "height"} <= set(header)):
-        raise DataError(f"{file.name}: expected the columns cycles, volume or radius, height, got {header!r}")
-    try:
-        data = np.array([[float(cell) for cell in row] for row in rows[1:]]).reshape(-1, len(header))
-    except ValueError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
-    if not np.all(np.isfinite(data)):
-        raise DataError(f"{file.name}: the measurements must be finite")
-    return dict(zip(header, data.T, strict=True))
+    text = file.read_text()
+    sheet = read_sheet(text, file.name)
+    held = [cell.text.strip().lower() for cell in sheet.names]
+    columns = _VOLUMES if "volume" in held else _PROFILE
+    if not {column.name for column in columns} <= set(held):
+        raise DataError(f"{file.name}: expected the columns cycles, volume or radius, height, got {held!r}")
+    error = Column("error", columns[1].unit, needed=False, above=0.0, given_unit=columns[1].unit)
+    return read_table(text, file.name, (*columns, error))
 
 
 FITS: tuple[Fit, ...] = (

@@ -1,14 +1,40 @@
-"""Small dense systems solved by one thread, so that a result does not depend on how many threads a library may use."""
+"""Dense linear systems: LAPACK's factors, kept for many right-hand sides, and an elimination for compiled kernels.
+
+A worker runs LAPACK with one thread, so that a result does not depend on how many threads a library may use.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dgetrf, dgetrs
+
+from mdr_dask.arrays import FloatArray
+
+
+class Factors(NamedTuple):
+    """The triangular factors of the transpose of a matrix, and its row exchanges."""
+
+    triangles: FloatArray
+    pivots: NDArray[np.int32]
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return x of matrix @ x = right, a vector or one column for each system."""
+        return np.asarray(dgetrs(self.triangles, self.pivots, right, trans=1)[0])
+
+
+def factorise(matrix: FloatArray) -> Factors | None:
+    """Return the factors of a square matrix in C order, which is spent; None if it is singular or not finite."""
+    triangles, pivots, status = dgetrf(matrix.T, overwrite_a=True)
+    diagonal = np.diagonal(triangles)
+    return Factors(triangles, pivots) if status == 0 and np.all(np.isfinite(diagonal)) else None
 
 
 @njit(nogil=True, cache=True)
-def solve_in_place(matrix: NDArray[np.float64], right: NDArray[np.float64]) -> bool:
+def solve_in_place(matrix: FloatArray, right: FloatArray) -> bool:
     """Solve matrix @ x = right by elimination with row pivots; `right` becomes x, `matrix` is spent.
 
     Parameters

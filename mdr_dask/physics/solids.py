@@ -338,12 +338,10 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
 
     Notes
     -----
-    -1 / lambda are the zeros of the modulus: 1 + sum G_m tau_m / (tau_m - lambda) = 0. Each zero is found as its
-    distance from
-    the nearer pole, so that differences keep their relative precision over any number of decades; the modes are
-    orthogonal under the weights G_m / tau_m, which makes the inverse of `stretch` explicit.
+    -1 / lambda are the zeros of the modulus, see :func:`recovery_times`; the modes are orthogonal under the weights
+    G_m / tau_m, which makes the inverse of `stretch` explicit.
     """
-    zeros, distance = _zeros_between(moduli, times)
+    zeros, distance = recovery_times(moduli * times, times)
     stretch = times[:, None] / distance
     norm = np.sum((moduli * times)[:, None] / distance**2, axis=0)
     amplitude = (moduli[:, None] / distance / norm).T.copy()
@@ -362,13 +360,29 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _zeros_between(moduli: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return lambda_k, and tau_m - lambda_k with full relative precision, shape (arms, arms)."""
+def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the times lambda_k of free recovery, the zeros of 1 + sum weight_m / (tau_m - lambda).
+
+    Parameters
+    ----------
+    weight : array, shape (modes,)
+        G_m tau_m / G_inf of an arm, eta / G_inf of a dashpot; positive.
+    times : array, shape (modes,)
+        tau_m, ascending and distinct; 0 for a dashpot.
+
+    Returns
+    -------
+    times : array, shape (modes,)
+        lambda_k, ascending: each lies between tau_k and the next.
+    distance : array, shape (modes, modes)
+        tau_m - lambda_k. Each zero is found as its distance from the nearer pole, so that these keep their relative
+        precision over any number of decades.
+    """
     arms = times.size
-    zeros, distance, weight = np.empty(arms), np.empty((arms, arms)), moduli * times
+    zeros, distance = np.empty(arms), np.empty((arms, arms))
     for k in range(arms):
         last = k == arms - 1
-        gap = 2 * times[k] * moduli.sum() if last else times[k + 1] - times[k]
+        gap = 2 * weight.sum() if last else times[k + 1] - times[k]
         left = last or _imbalance(k, gap / 2, weight, times)[0] >= 0
         pole, sign = (k, 1.0) if left else (k + 1, -1.0)
         offset = sign * _distance_to_zero(pole, sign, gap, weight, times)

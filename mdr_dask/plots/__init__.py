@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from mdr_dask.plots.base import Plot
 
 #: Modules of this room that hold ``PLOTS``.
-SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "wear")
+SUBJECTS: tuple[str, ...] = ("contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "wear")
 
 #: Entry point group in which other packages offer tuples of `Plot`.
 GROUP = "mdr_dask.plots"

@@ -6,7 +6,7 @@ Axes that a figure cannot show are held at one value. Which one stands in its ti
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -351,6 +351,20 @@ def parameters_of(data: xr.Dataset) -> dict[str, Any]:
     return found
 
 
+def parameters_at(case: xr.Dataset) -> dict[str, Any]:
+    """Return the parameters of one case: those of its series, with the values that its axes have there."""
+    parameters = parameters_of(case)
+    for axis in case.attrs.get("axes", []):
+        *above, last = axis["path"].split(".")
+        place = parameters
+        for key in above:
+            place = place[key]
+        value = case[axis["name"]].item()
+        labels = axis.get("labels")
+        place[last] = axis["values"][labels.index(value)] if labels else value
+    return parameters
+
+
 def draw(axes: Axes, curve: Curve, x: Any, y: Mean, bars: bool = False) -> None:
     """Draw a curve with its band, or with bars; points that belong on no line have bars."""
     across, value, low, high = (_flat(each) for each in (x, y.value, y.low, y.high))
@@ -430,6 +444,16 @@ def results(
     if not found:
         raise FitError("; ".join(dict.fromkeys(reasons)))
     return found
+
+
+def verdict(found: Iterable[xr.Dataset]) -> str:
+    """Return in how many fits the law holds, for the title; the sentence of a fit that stands alone."""
+    said = [str(text) for each in found if "law_holds" in each for text in np.ravel(each["law_holds"].values)]
+    if len(said) == 1:
+        return f"law holds: {said[0]}"
+    held = sum(text.startswith("yes") for text in said)
+    tested = sum(not text.startswith("not tested") for text in said)
+    return f"the law holds in {held} of {tested} fits" if tested else ""
 
 
 def with_coordinates(found: xr.Dataset, data: xr.Dataset) -> xr.Dataset:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.loading_history import pieces
-from mdr_dask.models.velocity_jump import VelocityJump, time_unit
+from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.kinetics import AFTER, CASE, OUTPUTS, TIME, over_slope, trace
@@ -25,23 +24,15 @@ BEFORE = 0.08  # of the time shown
 
 def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
     """Return the data at the first value of every axis, the parameters there, and what is left out."""
-    parameters = json.loads(data.attrs["parameters"])
-    dims = set()
-    for axis in data.attrs.get("axes", []):
-        *above, last = axis["path"].split(".")
-        place = parameters
-        for key in above:
-            place = place[key]
-        place[last] = axis["values"][0]
-        dims.add(axis["dim"])
-    held = [dim for dim in curves.axes_of(data, AFTER) if dim in dims]
+    held = curves.axes_of(data, AFTER)
     told = [f"{data.sizes[dim] - 1} of {data.sizes[dim]} values of {dim} (drawn: the first)" for dim in held]
-    return data.isel(dict.fromkeys(held, 0)), VelocityJump.model_validate(parameters), told
+    case = data.isel(dict.fromkeys(held, 0))
+    return case, VelocityJump.model_validate(curves.parameters_at(case)), told
 
 
 def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return times in units of tau from before the course to `last`, with the velocity and the load then, in SI."""
-    unit = time_unit(case)
+    unit = case.time_unit()
     before, parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     columns = [np.array([[-BEFORE * last, 0.0], [before, before], [case.normal_force, case.normal_force]])]
     for part in parts:

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MODELS = ("fretting_wear",)
-RULE = "method"
-LINES = {"exact": "--", "fast": "-", "literal": "-.", "limit": ":"}
+RULE = "wear_rule"
+LINES = {"exact": "--", "fast": "-", "limit": ":"}
 #: What a title says of a case; rules and shapes come from the parameters of the series.
 CASE = (
     *("shape", RULE, "hold", "stick_radius", "cycles", "xi", "curvature_radius", "angle", "modulus", "friction"),

@@ -9,18 +9,18 @@ import xarray as xr
 from mdr_dask.cli import main
 
 STEEL = """\
-  curvature_radius: 10 mm
-  modulus: 115 GPa
+  indenter: {shape: parabola, radius: 10 mm}
+  contact_modulus: 115 GPa
   shear_modulus: 90 GPa
   friction: 0.6
   amplitude: 1 um
-  load: 50 N
+  normal_force: 50 N
   hardness: 2 GPa
   wear_coefficient: 1e-4
 """
 TABLE = """\
-  shape: {table: profile.csv}
-  modulus: 115 GPa
+  indenter: {shape: table, file: profile.csv}
+  contact_modulus: 115 GPa
   shear_modulus: 90 GPa
   friction: 0.6
   amplitude: 1 um
@@ -54,12 +54,12 @@ def filled(path: Path) -> xr.Dataset:
     ("parameters", "units"),
     [
         ("  stick_radius: 0.5\n", ("1", "1", "1", "1", "1")),
-        ("  path: 2\n  method: exact\n", ("1", "1", "1", "1", "1")),
-        (STEEL + "  method: exact\n", ("m", "m^3", "N", "m", "Pa")),
+        ("  path: 2\n  wear_rule: exact\n", ("1", "1", "1", "1", "1")),
+        (STEEL + "  wear_rule: exact\n", ("m", "m^3", "N", "m", "Pa")),
     ],
 )
 def test_units_in_the_store(write, parameters, units):
-    names = ("contact_radius", "wear_volume", "normal_force", "worn_profile", "pressure")
+    names = ("contact_radius", "wear_volume", "contact_force", "worn_profile", "pressure")
     data = filled(write(parameters, f"outputs: [{', '.join(names)}]\n"))
     assert tuple(data[name].attrs["units"] for name in names) == units
     assert data.radius.attrs["units"] == "1"
@@ -70,7 +70,7 @@ def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
     """Two frictions make two c; wear coefficient, hardness and cycles are only other moments of the same evolution."""
     varied = STEEL.replace("friction: 0.6", "friction: [0.6, 0.7]").replace("1e-4", "[1e-5, 1e-4, 1e-3]")
     varied = varied.replace("hardness: 2 GPa", "hardness: [1 GPa, 2 GPa]")
-    path = write(varied + "  cycles: [1e3, 1e4, 1e5, 1e6]\n  method: exact\n")
+    path = write(varied + "  cycles: [1e3, 1e4, 1e5, 1e6]\n  wear_rule: exact\n")
     assert main(["run", str(path), "--dry-run"]) == 0
     assert "2 solves remain after sharing" in capsys.readouterr().out
     assert main(["run", str(path)]) == 0
@@ -81,10 +81,10 @@ def test_a_grid_is_solved_once_for_each_stick_radius(write, capsys):
 
 def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_stick_radius(write, capsys):
     """G* U0 / (mu E*) takes 6 values in 18 combinations; the blocks hold all the cases of each of them."""
-    varied = STEEL.replace("load: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa, 400 GPa]")
+    varied = STEEL.replace("normal_force: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa, 400 GPa]")
     varied = varied.replace("90 GPa", "[80 GPa, 160 GPa, 320 GPa]").replace("friction: 0.6", "friction: [0.4, 0.8]")
     varied = varied.replace("wear_coefficient: 1e-4", "wear_coefficient: [1e-5, 1e-4]").replace("1 um", "0.5 um")
-    path = write(varied + "  cycles: [1e3, 1e4]\n  method: exact\n")
+    path = write(varied + "  cycles: [1e3, 1e4]\n  wear_rule: exact\n")
     assert main(["run", str(path), "--dry-run"]) == 0
     assert "6 solves remain after sharing, in 1 blocks" in capsys.readouterr().out
     assert main(["run", str(path)]) == 0
@@ -95,18 +95,19 @@ def test_a_grid_over_friction_and_stiffness_is_solved_once_for_each_distinct_sti
 
 def test_cases_that_only_differ_in_stiffness_share_the_closed_forms(write, capsys):
     """With the depth given, c depends on G*/(mu E*) alone."""
-    varied = STEEL.replace("load: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa]")
+    varied = STEEL.replace("normal_force: 50 N", "depth: 5 um").replace("115 GPa", "[100 GPa, 200 GPa]")
     varied = varied.replace("90 GPa", "[80 GPa, 160 GPa]").replace("hardness: 2 GPa", "hardness: [2 GPa, 4 GPa]")
-    path = write(varied + "  method: limit\n")
+    path = write(varied + "  wear_rule: limit\n")
     assert main(["run", str(path)]) == 0
     assert " 3 solves (62.5% of the results" in capsys.readouterr().err  # G*/E* = 0.4, 0.8, 1.6
 
 
 def test_sliding_from_a_campaign(write):
     path = write(
-        "  shape: [parabola, cone]\n  method: exact\n  hold: [depth, force]\n  path: [0, 1, 40]\n  tolerance: 1e-4\n",
-        "outputs: [contact_radius, wear_volume, normal_force, worn_profile, worn_image, pressure, worn_depth, "
-        "block_depth, discretisation_error, stick_border]\n",
+        "  indenter: [{shape: parabola}, {shape: cone}]\n  hold: [depth, force]\n  path: [0, 1, 40]\n"
+        "  accuracy: 1e-4\n",
+        "outputs: [contact_radius, wear_volume, contact_force, worn_profile, worn_image, pressure, worn_depth, "
+        "block_depth, stick_border]\n",
     )
     data = filled(path).isel(realisation=0)
     assert np.all(data.status == 1)
@@ -114,20 +115,20 @@ def test_sliding_from_a_campaign(write):
     np.testing.assert_allclose(depth.contact_radius, [np.sqrt(2), np.pi / 2], atol=1e-5)
     np.testing.assert_allclose(depth.wear_volume, [np.pi, np.pi**3 / 12], atol=1e-4)
     force = data.sel(hold="force")
-    virgin = force.normal_force.isel(path=0, drop=True)
-    np.testing.assert_allclose(force.normal_force / virgin, 1.0, rtol=1e-4)
+    virgin = force.contact_force.isel(path=0, drop=True)
+    np.testing.assert_allclose(force.contact_force / virgin, 1.0, rtol=1e-4)
     np.testing.assert_allclose(
         force.wear_volume / virgin, (0 * virgin + force.path).transpose(*force.wear_volume.dims), rtol=3e-4, atol=1e-12
     )
-    assert np.all(np.diff(force.block_depth.isel(block=0).transpose("shape", "path")) > 0)
+    assert np.all(np.diff(force.block_depth.isel(block=0).transpose("indenter", "path")) > 0)
     assert np.all(data.stick_border == 0)
-    assert np.all(data.discretisation_error < 6e-3)  # the apex of the cone and the edge
+    assert np.all(data.wear_volume_error <= 3e-3 * data.wear_volume + 1e-6)
 
 
 def test_sliding_in_physical_units_obeys_the_wear_law(write):
     kept = [line for line in STEEL.splitlines() if line.split(":")[0].strip() not in {"shear_modulus", "friction"}]
     kept = [line for line in kept if "amplitude" not in line]
-    data = filled(write("\n".join(kept) + "\n  method: exact\n  hold: force\n  path: [1 m, 10 m]\n"))
+    data = filled(write("\n".join(kept) + "\n  wear_rule: exact\n  hold: force\n  path: [1 m, 10 m]\n"))
     np.testing.assert_allclose(data.wear_volume.values.ravel(), 1e-4 * 50 * np.array([1, 10]) / 2e9, rtol=1e-3)
 
 
@@ -137,7 +138,7 @@ def test_every_block_of_a_history_is_kept(write):
         "    - {cycles: 0.5, amplitude_factor: 0.2, load_factor: 1.2}\n"
     )
     names = "wear_volume, block_wear_volume, block_stick_border, block_depth, block_worn_profile"
-    path = write(f"  method: exact\n  stick_radius: 0.5\n  cells: 60\n{history}", f"outputs: [{names}]\n")
+    path = write(f"  wear_rule: exact\n  stick_radius: 0.5\n  cells: 60\n{history}", f"outputs: [{names}]\n")
     data = filled(path).isel(realisation=0)
     assert data.block.values.tolist() == [1, 2, 3]
     assert np.all(np.diff(data.block_wear_volume) > 0)
@@ -154,9 +155,11 @@ def test_every_block_of_a_history_is_kept(write):
         ("  stick_radius: 1.2\n", "4:17", "expected a number below 1, got 1.2"),
         ("  stick_radius: .nan\n", "4:17", "expected a finite number, got nan"),
         ("  stick_radius: 0.5\n  friction: 0.3\n", "3:1", "leave one kind out"),
-        ("  stick_radius: 0.5\n  path: 2\n  method: exact\n", "3:1", "stick_radius of an oscillation as well"),
-        ("  path: 2\n", "3:1", "method exact only, got 'fast'"),
-        ("  shape: {exponent: -1}\n  stick_radius: 0.5\n", "4:21", "above 0.1, got -1"),
+        ("  stick_radius: 0.5\n  path: 2\n  wear_rule: exact\n", "3:1", "stick_radius of an oscillation as well"),
+        ("  path: 2\n  wear_rule: fast\n", "3:1", "wear_rule exact only, got 'fast'"),
+        ("  indenter: {shape: power, exponent: -1}\n  stick_radius: 0.5\n", "4:38", "above 0.1, got -1"),
+        ("  method: fast\n  stick_radius: 0.5\n", "4:3", "write wear_rule"),
+        ("  wear_rule: literal\n  stick_radius: 0.5\n", "4:14", "expected 'exact', 'fast' or 'limit'"),
     ],
 )
 def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, place, message):
@@ -183,7 +186,7 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     Path("profile.csv").write_text("radius,height\n" + rows)
     assert main(["check", str(path)]) == 2
     error = capsys.readouterr().err
-    assert "wear.yaml:4:10: parameters.shape: profile.csv: " in error
+    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv: " in error
     assert message in error
     assert len(error.splitlines()) == 1
 

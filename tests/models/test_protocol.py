@@ -5,10 +5,11 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump, compute
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.velocity_jump.solve import compute
 from mdr_dask.physics.surfaces import roughness
 
-EVERY = tuple(output.name for output in MODEL.outputs)
+EVERY = MODEL.with_companions(tuple(output.name for output in MODEL.outputs))
 BASE = {
     "length": 0.002,
     "points": 100,
@@ -32,9 +33,9 @@ def block(columns: dict[str, np.ndarray] | None = None, **changes: object) -> Bl
 def test_one_step_is_the_jump() -> None:
     """The general way and the quick one agree within their errors."""
     step, quick = (compute(block(oversampling=16, **change)).values for change in ({"protocol": STEP}, {}))
-    for name in EVERY[:1] + EVERY[2:4]:
+    for name in ("friction_coefficient_before", "friction_coefficient_after", "friction_coefficient"):
         assert np.allclose(step[name], quick[name], rtol=4e-3), name
-    assert np.allclose(step["indentation_depth"], quick["indentation_depth"], rtol=1e-12)
+    assert np.allclose(step["indentation_depth"], quick["indentation_depth"], rtol=1e-3)
 
 
 def test_value_depends_on_the_case_alone() -> None:
@@ -72,7 +73,7 @@ def test_oscillation_returns_every_period() -> None:
 
 def test_table_is_the_ramp(tmp_path: Path) -> None:
     file = tmp_path / "protocol.csv"
-    file.write_text("time,velocity,force\n0,0.05,0.1\n0.002,0.1,0.2\n")
+    file.write_text("force [N],time [ms],velocity [m/s]\n0.1,0,0.05\n0.2,2,0.1\n")
     table = compute(block(protocol={"shape": "table", "file": str(file)}))
     ramp = compute(block(protocol={"shape": "ramp", "duration": 2e-3, "velocity": 0.1, "force": 0.2}))
     for name in EVERY:

@@ -32,7 +32,8 @@ DIMENSIONAL_FILM = (
     "  viscosity: 0.1 Pa s\n"
 )
 FRETTING = (
-    "  curvature_radius: 10 mm\n  modulus: 115 GPa\n  shear_modulus: 90 GPa\n  friction: 0.6\n  load: 50 N\n"
+    "  indenter: {shape: parabola, radius: 10 mm}\n  contact_modulus: 115 GPa\n  shear_modulus: 90 GPa\n"
+    "  friction: 0.6\n  normal_force: 50 N\n"
     "  hardness: 2 GPa\n  wear_coefficient: 1e-4\n  cycles: {geometric: [1e3, 1e5, 4]}\n"
 )
 RULES = f"  {planted.RULE}: [exact, fast, limit]\n"
@@ -130,7 +131,7 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {"temperature", "stribeck", "sensitivity"},
     ),
     "rollers: surfaces": (
-        planted.ROLLERS.replace("load_share", "upper_profile, lower_profile, contact_length_trace")
+        planted.ROLLERS.replace("asperity_load_share", "upper_profile, lower_profile, contact_length_trace")
         + OPERATION
         + "  trace_points: 40\n",
         {},
@@ -318,7 +319,10 @@ def volume(data):
     return curves.Mean(ends[1], ends[0], ends[2])
 
 
-ROLLING = [output("friction_coefficient"), share, output("breakthrough_probability", 100.0), output("film_ratio")]
+ROLLING = [
+    *(output("friction_coefficient"), share, output("film_ratio")),
+    *(output(name, 100.0) for name in ("breakthrough_probability", "asperity_load_share")),
+]
 #: What a figure draws of every case: means and ends of intervals, by the name of the figure and its model.
 EXPECTED = {
     ("regions", "sliding_friction"): [friction(1.0)],

@@ -5,13 +5,13 @@ import xarray as xr
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block
 from mdr_dask.models.fretting_wear import MODEL
-from mdr_dask.models.fretting_wear.parameters import FrettingWear
+from mdr_dask.models.fretting_wear.declaration import FrettingWear
 from mdr_dask.plots import wear
 
 RADIUS = np.linspace(0, 1.6, 41)
 
 
-def study(method, cycles, xi=None, sticks=(0.5, 0.7), realisations=(0,)):
+def study(rule, cycles, xi=None, sticks=(0.5, 0.7), realisations=(0,)):
     """A series over stick radius, cycles and perhaps xi, as a store would hand it out."""
     axes = {"stick_radius": np.array(sticks), "cycles": np.array(cycles)}
     if xi is not None:
@@ -20,7 +20,7 @@ def study(method, cycles, xi=None, sticks=(0.5, 0.7), realisations=(0,)):
     columns = {name: part.ravel() for name, part in zip(axes, mesh, strict=True)}
     outputs = ("wear_volume", "worn_profile", "worn_image")
     parameters = FrettingWear(
-        stick_radius=0.5, method=method, points=41, amplitude_scatter=0.1 * (len(realisations) > 1)
+        stick_radius=0.5, wear_rule=rule, points=41, amplitude_scatter=0.1 * (len(realisations) > 1)
     )
     values = MODEL.compute(Block(parameters, columns, mesh[0].size, realisations, 0, outputs)).values
     shape = (*mesh[0].shape, len(realisations))
@@ -36,12 +36,12 @@ def study(method, cycles, xi=None, sticks=(0.5, 0.7), realisations=(0,)):
 def methods():
     cycles = [0.5, 2.0]
     return xr.concat(
-        [study(m, cycles) for m in ("exact", "fast", "limit")], xr.Variable("method", ["exact", "fast", "limit"])
+        [study(m, cycles) for m in ("exact", "fast", "limit")], xr.Variable("wear_rule", ["exact", "fast", "limit"])
     )
 
 
 def test_development_draws_every_cycle_and_the_limit(methods):
-    figure = wear.draw_development({"development": methods.isel(method=0), "all": methods})
+    figure = wear.draw_development({"development": methods.isel(wear_rule=0), "all": methods})
     left, right = figure.axes
     assert len(left.lines) == len(right.lines) == 3
     assert left.lines[-1].get_linestyle() == ":"

@@ -10,7 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, canonical
-from mdr_dask.models.fretting_wear.parameters import EXPONENTS, FrettingWear, PowerShape, TableShape
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
@@ -33,16 +33,27 @@ class Numbers:
     force: FloatArray
 
 
-def shapes(block: Block[FrettingWear]) -> list[object]:
-    """Return the shape of every case, or the one that all share."""
-    return list(block.columns["shape"]) if "shape" in block.columns else [block.parameters.shape]
+def indenters(block: Block[FrettingWear]) -> list[Indenter]:
+    """Return the indenter of every case, or the one that all share but for numbers that vary."""
+    return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
 
-def _exponents(block: Block[FrettingWear]) -> FloatArray:
-    if "shape.exponent" in block.columns:
-        return np.asarray(block.columns["shape.exponent"], dtype=float)
-    powers = [s.exponent if isinstance(s, PowerShape) else EXPONENTS.get(str(s), np.nan) for s in shapes(block)]
-    return np.broadcast_to(np.array(powers, dtype=float), (block.cases,))
+def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
+    """Return coefficient and exponent of every case, NaN where they are not given."""
+    coefficient, exponent = np.array([one.power_law for one in indenters(block)]).T
+    varied = {path.removeprefix("indenter."): np.asarray(column) for path, column in block.columns.items()}
+    exponent = varied.get("exponent", exponent)
+    coefficient = varied.get("coefficient", coefficient)
+    if "radius" in varied:
+        coefficient = 0.5 / varied["radius"]
+    if "angle" in varied:
+        coefficient = np.tan(varied["angle"])
+    return np.broadcast_to(coefficient, block.cases), np.broadcast_to(exponent, block.cases)
+
+
+def has_tables(block: Block[FrettingWear]) -> bool:
+    """Tell whether an indenter is a table."""
+    return any(isinstance(one, Table) for one in indenters(block))
 
 
 def _column(block: Block[FrettingWear], name: str) -> FloatArray:
@@ -71,7 +82,8 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
     """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0; sliding has g_c = 0, and s for N."""
-    n, normal = _exponents(block), _scatter(block)
+    coefficient, n = _power_laws(block)
+    normal = _scatter(block)
     sliding = block.parameters.path is not None
     amplitude = _factor(block, "amplitude_scatter", normal[:, 1])
     widening = amplitude / _factor(block, "friction_scatter", normal[:, 0])
@@ -83,8 +95,8 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
         if not sliding:
             level = (1.0 - widening) + widening * (_column(block, "stick_radius") ** n)[:, None]
     else:
-        modulus = _column(block, "modulus")
-        length, height = _first_contact(block, n, modulus, messages)
+        modulus = _column(block, "contact_modulus")
+        length, height = _first_contact(block, coefficient, n, modulus, messages)
         force = modulus * height * length
         if not sliding:
             share = _column(block, "shear_modulus") * _column(block, "amplitude")
@@ -99,36 +111,35 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
 
 
 def _first_contact(
-    block: Block[FrettingWear], n: FloatArray, modulus: FloatArray, messages: dict[tuple[int, int], str]
+    block: Block[FrettingWear],
+    coefficient: FloatArray,
+    n: FloatArray,
+    modulus: FloatArray,
+    messages: dict[tuple[int, int], str],
 ) -> tuple[FloatArray, FloatArray]:
     """Return a0 and d0 of dimensional cases; a table that cannot be pressed so deep is a message."""
     from mdr_dask.physics.mdr import power_law_contact as contact
 
-    depth, load, angle = _column(block, "depth"), _column(block, "load"), _column(block, "angle")
-    if any(isinstance(shape, TableShape) for shape in shapes(block)):
+    depth, force = _column(block, "depth"), _column(block, "normal_force")
+    if has_tables(block):
         length = np.full(block.cases, np.nan)
-        for case, (shape, deep) in enumerate(zip(_every_shape(block), depth, strict=True)):
+        bodies = indenters(block)
+        for case, deep in enumerate(depth):
             try:
-                length[case] = table_profile(shape, float(deep)).length
+                length[case] = table_profile(bodies[case % len(bodies)], float(deep)).length
             except ValueError as problem:
                 messages.update({(case, position): str(problem) for position in range(len(block.realisations))})
         return length, depth
-    scale = np.where(np.isnan(angle), _column(block, "curvature_radius") ** (1.0 - n) / n, np.tan(angle))
-    from_load = contact.radius_from_force(load, scale, n, modulus)
-    length = np.where(np.isnan(depth), from_load, contact.contact_radius(depth, scale, n))
-    return length, np.where(np.isnan(depth), contact.depth(length, scale, n), depth)
+    from_force = contact.radius_from_force(force, coefficient, n, modulus)
+    length = np.where(np.isnan(depth), from_force, contact.contact_radius(depth, coefficient, n))
+    return length, np.where(np.isnan(depth), contact.depth(length, coefficient, n), depth)
 
 
-def _every_shape(block: Block[FrettingWear]) -> list[object]:
-    listed = shapes(block)
-    return listed if len(listed) == block.cases else listed * block.cases
-
-
-def table_profile(shape: object, depth: float) -> TableProfile:
+def table_profile(indenter: Indenter, depth: float) -> TableProfile:
     """Read a table and press it; cached by content."""
-    if not isinstance(shape, TableShape):
+    if not isinstance(indenter, Table):
         raise ValueError("tables and formulas of profiles cannot be mixed along one axis")
-    return _pressed_table(shape.table.read_text(), depth)
+    return _pressed_table(indenter.file.read_text(), depth)
 
 
 @lru_cache(maxsize=64)

@@ -19,7 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.linear import solve_in_place
+from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
 
@@ -351,11 +351,13 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
         order = active.size + 1
         A, b = room[: order * order].reshape(order, order), np.empty(order)
         _fill_equations(grid, P, R, active, by_pressure, by_film, A, b)
-        if not solve_in_place(A, b):
+        factors = factorise(A)
+        if factors is None:
             return Iterate(Outcome.SINGULAR, steps, P, central, H)
+        solution = factors.solve(b)
         step = -P
-        step[active] = b[:-1]
-        outcome, central = _take_step(grid, pace, P, central, H, step, b[-1])
+        step[active] = solution[:-1]
+        outcome, central = _take_step(grid, pace, P, central, H, step, solution[-1])
         if outcome != Outcome.UNDER_WAY:
             return Iterate(Outcome(outcome), steps, P, central, H)
     return Iterate(Outcome.TOO_MANY_STEPS, pace.most, P, central, H)

@@ -147,7 +147,7 @@ def interpolate_weighted(panels: Panels, rows: FloatArray, shares: FloatArray, s
     return result
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _weighted(edges, nodes, barycentric, order, rows, shares, stretch, places, row, result):  # type: ignore[no-untyped-def]
     for k in range(shares.size):
         for node in range(nodes.size):
@@ -158,7 +158,7 @@ def _weighted(edges, nodes, barycentric, order, rows, shares, stretch, places, r
             result[node] += shares[k] * row[node]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def _interpolate(
     edges: FloatArray,
     nodes: FloatArray,

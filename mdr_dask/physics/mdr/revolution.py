@@ -2,18 +2,39 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, inlined
 from mdr_dask.physics.mdr.profile_table import check_table
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
+
+
+class Image(NamedTuple):
+    """The image of a body for compiled code: a power law, or a piecewise cubic where there are knots.
+
+    Parameters
+    ----------
+    exponent : float
+        n of g0 = x^n.
+    knots : array, shape (k + 1,)
+        Ends of the pieces, or none.
+    coefficients : array, shape (4, k)
+        Of the powers 3 to 0 of the distance from the left end.
+    """
+
+    exponent: float
+    knots: FloatArray
+    coefficients: FloatArray
 
 
 class Profile(Protocol):
@@ -22,10 +43,6 @@ class Profile(Protocol):
     @property
     def largest_radius(self) -> float:
         """Radius up to which the profile is known."""
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """Places where a derivative of the image jumps."""
 
     def height(self, radius: FloatArray) -> FloatArray:
         """Return f0(r)."""
@@ -36,11 +53,14 @@ class Profile(Protocol):
     def image_slope(self, position: FloatArray) -> FloatArray:
         """Return g0'(x), x >= 0."""
 
-    def rise(self, position: FloatArray, start: float) -> FloatArray:
-        """Return g0(x) - g0(start) without cancellation."""
+    def rise(self, gap: FloatArray, start: float) -> FloatArray:
+        """Return g0(start + gap) - g0(start) without cancellation."""
 
     def inside(self, level: float) -> float:
         """Return the position where g0 reaches a level between 0 and 1."""
+
+    def pieces(self) -> Image:
+        """Return the image for compiled code."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +75,6 @@ class PowerProfile:
 
     exponent: float
     largest_radius: float = np.inf
-    breaks: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.exponent) and self.exponent > 0.0):
@@ -73,15 +92,19 @@ class PowerProfile:
         """Return g0'(x) = n x^(n-1)."""
         return np.asarray(self.exponent * position ** (self.exponent - 1.0))
 
-    def rise(self, position: FloatArray, start: float) -> FloatArray:
-        """Return x^n - c^n, exact to the last digits when x is close to c."""
+    def rise(self, gap: FloatArray, start: float) -> FloatArray:
+        """Return (c + gap)^n - c^n, exact to the last digits however small the gap is."""
         if start == 0.0:
-            return self.image(position)
-        return np.asarray(start**self.exponent * np.expm1(self.exponent * np.log1p((position - start) / start)))
+            return self.image(gap)
+        return np.asarray(start**self.exponent * np.expm1(self.exponent * np.log1p(gap / start)))
 
     def inside(self, level: float) -> float:
         """Return the position where g0 reaches `level`."""
         return float(level ** (1.0 / self.exponent))
+
+    def pieces(self) -> Image:
+        """Return the image for compiled code."""
+        return Image(self.exponent, np.empty(0), np.empty((4, 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,28 +113,26 @@ class TableProfile:
 
     Parameters
     ----------
-    curve : callable
-        f0(r) in units of d0, r in units of a0.
-    slope : callable
-        f0'(r).
-    image_curve : callable
-        g0(x) between 0 and `largest_radius`.
-    image_slope_curve : callable
-        g0'(x).
-    largest_radius : float
-        End of the table.
+    curve, image_curve : PPoly
+        f0(r) and g0(x), in units of d0 and a0.
     length, height_unit : float
         a0 and d0 in the table's own units.
     """
 
-    curve: Callable[[FloatArray], FloatArray]
-    slope: Callable[[FloatArray], FloatArray]
-    image_curve: Callable[[FloatArray], FloatArray]
-    image_slope_curve: Callable[[FloatArray], FloatArray]
-    largest_radius: float
+    curve: PPoly
+    image_curve: PPoly
     length: float
     height_unit: float
-    breaks: tuple[float, ...] = ()
+
+    @property
+    def largest_radius(self) -> float:
+        """End of the table."""
+        return float(self.curve.x[-1])
+
+    @cached_property
+    def image_slope_curve(self) -> PPoly:
+        """g0'(x)."""
+        return self.image_curve.derivative()
 
     def height(self, radius: FloatArray) -> FloatArray:
         """Return f0(r); NaN beyond the table."""
@@ -125,17 +146,53 @@ class TableProfile:
         """Return g0'(x)."""
         return self.image_slope_curve(np.asarray(position))
 
-    def rise(self, position: FloatArray, start: float) -> FloatArray:
-        """Return g0(x) - g0(start), by its slope over short distances."""
-        x = np.asarray(position, dtype=float)
-        gap = x - start
+    def rise(self, gap: FloatArray, start: float) -> FloatArray:
+        """Return g0(start + gap) - g0(start), by its slope over short distances."""
+        gap = np.asarray(gap, dtype=float)
         abscissa, weight = gauss(8)
         short = gap * (self.image_slope_curve(start + gap[..., None] * abscissa) @ weight)
-        return np.where(np.abs(gap) < 0.02, short, self.image(x) - self.image(np.asarray(start)))
+        return np.where(np.abs(gap) < 0.02, short, self.image(start + gap) - self.image(np.asarray(start)))
 
     def inside(self, level: float) -> float:
         """Return the position where g0 reaches `level`, by bisection."""
         return bisect(lambda x: float(self.image_curve(np.asarray(x))) - level, 0.0, 1.0)
+
+    def pieces(self) -> Image:
+        """Return the image for compiled code."""
+        return Image(np.nan, np.ascontiguousarray(self.image_curve.x), np.ascontiguousarray(self.image_curve.c))
+
+
+_ABSCISSA, _WEIGHT = gauss(8)
+
+
+@inlined
+def image_rise(image: Image, start: float, level: float, gap: float) -> float:
+    """Return g0(start + gap) - level, with level = g0(start), without cancellation."""
+    if image.knots.size == 0:
+        n = image.exponent
+        if n == 2.0:
+            return gap * (2.0 * start + gap)
+        if n == 1.0:
+            return gap
+        if gap <= -start:
+            return -level
+        return level * math.expm1(n * math.log1p(gap / start))
+    if abs(gap) >= 0.02:
+        return _piece(image, start + gap, 0) - level
+    rise = 0.0
+    for k in range(_ABSCISSA.size):
+        rise += _WEIGHT[k] * _piece(image, start + gap * _ABSCISSA[k], 1)
+    return rise * gap
+
+
+@compiled
+def _piece(image: Image, place: float, derivative: int) -> float:
+    """Return the piecewise cubic at a place, or its slope."""
+    cell = min(max(np.searchsorted(image.knots, place, side="right") - 1, 0), image.coefficients.shape[1] - 1)
+    local, k = place - image.knots[cell], image.coefficients
+    if derivative == 0:
+        return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
+    return float((3.0 * k[0, cell] * local + 2.0 * k[1, cell]) * local + k[2, cell])
 
 
 def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfile:
@@ -172,17 +229,12 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
             "extend the table or press less deep"
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))
-    image_slope = image_curve.derivative()
-    return TableProfile(
-        curve=lambda q: interpolant(q * a0) / depth,
-        slope=lambda q: slope(q * a0) * a0 / depth,
-        image_curve=lambda q: image_curve(q * a0) / depth,
-        image_slope_curve=lambda q: image_slope(q * a0) * a0 / depth,
-        largest_radius=float(r[-1] / a0),
-        length=a0,
-        height_unit=depth,
-        breaks=(),
-    )
+    return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0, depth)
+
+
+def _scaled(curve: PPoly, length: float, height: float) -> PPoly:
+    """Return a piecewise cubic in other units."""
+    return PPoly(curve.c * length ** np.arange(3.0, -1.0, -1.0)[:, None] / height, curve.x / length)
 
 
 def bisect(function: Callable[[float], float], low: float, high: float) -> float:

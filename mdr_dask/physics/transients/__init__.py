@@ -1,6 +1,6 @@
 """Friction that changes in time, after a jump of the velocity or under any loading history.
 
-Read `velocity_jump` first: from steady state (`steady_patches`) to steady state by the `march` of the depth, which
-asks `contact_search` who touches and `free_flight` what the others do; `patches` are the pieces in contact.
-`protocol` follows every element (`elements`, `element`, `forces`): slower, but for any history, solid and body.
+Read `velocity_jump` first: from steady state to steady state (`ends`) by the `march` of the depth, which asks
+`contact_search` who touches and `free_flight` what the others do; `patches` are the pieces in contact. `accuracy`
+chooses the grids and knows the errors. `elements` follows every element: slower, but for any history, solid and body.
 """

@@ -1,12 +1,18 @@
-"""Compiled parts of the velocity jump: who touches what at one moment."""
+"""Who touches what at one moment after a jump: one pass along the stretches of the line where contact is possible."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.sliding.kelvin import BLOCK
+from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
+    Moment,
+    Wakes,
     left_before,
     losing,
     meeting,
@@ -20,48 +26,55 @@ from mdr_dask.physics.transients.patches import (
     DRAG_STIFFNESS,
     LENGTH,
     STIFFNESS,
+    SUMS,
     TILT,
-    Course,
-    Patches,
-    Profile,
+    Barriers,
     add_patch,
+    force_at,
     height_at,
+    keeps_pressed,
+    loading,
     unloading,
 )
 
-CANDIDATES = 8
-BLOCK = 16
+CANDIDATES = 8  # places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
-GUARD_CELLS = 200.0
+GUARD_CELLS = 200.0  # travelled, until which elements that the jump found free are told apart
+VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
 
 
-@compiled
-def block_least(profile: Profile, reach: float, least: FloatArray) -> None:
-    """Write the least p + reach p' over the nodes that end the cells of each block of `BLOCK` cells."""
-    for m in range(least.size):
-        value = np.inf
-        for i in range(m * BLOCK + 1, (m + 1) * BLOCK + 1):
-            value = min(value, profile.height[i] + reach * profile.slope[i])
-        least[m] = value
+class Reachable(NamedTuple):
+    """Where elements can be in contact between two depths.
+
+    Parameters
+    ----------
+    runs : int array, shape (m, 2)
+        First and last node of the stretches in which contact is possible.
+    floor : array, shape (n + 2,)
+        Displacement that an element has at least, at the nodes.
+    """
+
+    runs: IntArray
+    floor: FloatArray
 
 
-@inlined
-def _write_patch(
-    profile: Profile,
-    begin: float,
-    until: float,
-    lift: float,
-    reach: float,
-    found: int,
-    start: FloatArray,
-    end: FloatArray,
-    sums: FloatArray,
-) -> int:
-    """Write a patch, add up its forces and return how many there are now."""
-    add_patch(profile, begin, until, lift, reach, sums)
-    start[found], end[found] = begin, until
-    return found + 1
+class Workspace(NamedTuple):
+    """What a search writes: patches and their sums, the places of leaving, ranges of the depth, and barriers."""
+
+    start: FloatArray
+    end: FloatArray
+    sums: FloatArray
+    places: FloatArray
+    spreads: FloatArray
+    barriers: Barriers
+
+
+def workspace_for(patches: int, barriers: Barriers) -> Workspace:
+    """Return room for a number of patches and some more, with the barriers of a Deborah number."""
+    most = 4 * patches + 4096
+    start, end = np.empty((2, most))
+    return Workspace(start, end, np.zeros(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS), barriers)
 
 
 @inlined
@@ -73,113 +86,53 @@ def _remember(place: float, places: FloatArray, known: int) -> int:
 
 
 @inlined
-def _leaving(
-    profile: Profile,
-    first: Patches,
-    t: float,
-    reach: float,
-    depth: float,
-    lift: float,
-    part: tuple[float, float],
-    pulls: bool,
-    next_free: float,
-) -> tuple[float, bool, float]:
-    """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones."""
-    low, high = part
-    until = unloading(profile, lift, reach, low, high) if pulls else high
+def _leaving(now: Moment, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
+    """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones.
+
+    At `until` the force vanishes, or the part ends.
+    """
     if until < next_free:
         return until, False, next_free
-    w = depth + height_at(profile, until)[0]
-    next_free = next_free_place(profile, first, t, reach, until)
-    if next_free == until and w < left_before(profile, first, t, reach, until)[0] * (1 - 1e-14):
-        return losing(profile, first, t, reach, depth, low, until), True, next_free
+    w = depth + height_at(now.track, until)[0]
+    next_free = next_free_place(now, until)
+    if next_free == until and w < left_before(now, until)[0] * (1 - 1e-14):
+        return losing(now, depth, low, until), True, next_free
     return until, False, next_free
 
 
-@inlined
-def _arriving(
-    profile: Profile,
-    first: Patches,
-    course: Course,
-    t: float,
-    reach: float,
-    lift: float,
-    part: tuple[float, float],
-    gap: float,
-    rise: float,
-    places: FloatArray,
-    known: int,
-    oldest: float,
-) -> tuple[float, float, float]:
-    """Return where contact begins in a part of a cell, and how load and drag change by the depth as that place moves.
-
-    At the end of the part the profile is above the wake by `gap`, and rises from it by `rise`.
-    """
-    low, high = part
-    guess = high - gap / rise if rise > 0 else low
-    begin, rise, gain = meeting(profile, first, course, t, reach, low, high, guess, places, known, oldest)
-    h, slope, _ = height_at(profile, begin)
-    edge = max(lift + h + reach * slope, 0.0) * gain / rise if rise > 0 else 0.0
-    return begin, edge, edge * slope
-
-
 @compiled
-def touch(
-    profile: Profile,
-    runs: IntArray,
-    floor: FloatArray,
-    least: FloatArray,
-    first: Patches,
-    course: Course,
-    t: float,
-    reach: float,
-    start: FloatArray,
-    end: FloatArray,
-    sums: FloatArray,
-    places: FloatArray,
-    spreads: FloatArray,
-) -> int:
-    """Find the patches in contact at time t, at the last depth and rate of the course, and add up their forces.
+def touch(now: Moment, reachable: Reachable, work: Workspace) -> int:
+    """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
 
     Parameters
     ----------
-    profile : Profile
-    runs : int array, shape (m, 2)
-        First and last node of the stretches in which contact is possible.
-    floor : array, shape of the profile
-        Displacement that a free element has at least.
-    least : array
-        See :func:`block_least`.
-    first : Patches
-        State before the jump; ``count = 0`` for the steady state.
-    course : Course
-        Depth and rate, this moment included.
-    t, reach : float
-        Time since the jump, and v tau / L since then.
-    start, end : array
-        Written: the patches.
-    sums : array, shape (SUMS,)
-        Written: load and drag over 4 G L, length in contact, rise over it, derivatives of load and drag by the depth.
-    places, spreads : array, shape (CANDIDATES,), (WINDOWS,)
-        Room.
+    now : Moment
+    reachable : Reachable
+        Its stretches must hold the patches at the depth.
+    work : Workspace
+        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, rise over it, and the
+        derivatives of load and drag by the depth.
 
     Returns
     -------
     int
         Number of patches, or -1 if a patch does not end within its stretch or there are more than fit.
     """
-    depth = course.depth[course.count - 1]
-    lift = depth + course.rate[course.count - 1]
-    height, slope, cell = profile.height, profile.slope, profile.cell
+    track, history, deborah = now.track, now.history, now.deborah
+    height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
+    runs, floor = reachable.runs, reachable.floor
+    start, end, sums, places, spreads, barriers = work
+    depth = history.depth[history.count - 1]
+    lift = depth + history.rate[history.count - 1]
     known, found, edges, edges_drag = 0, 0, 0.0, 0.0
     oldest, last_start = -np.inf, -np.inf
-    contact, begin, free_from = profile.periodic, profile.origin, 0.0
-    finish = 1.0 + profile.origin if profile.periodic else np.inf
-    guard = first.count > 0 and reach * t < GUARD_CELLS * cell
-    next_free = next_free_place(profile, first, t, reach, begin) if guard and contact else np.inf
-    window = WINDOW_CELLS * cell
-    write_spreads(course, t, reach, window, spreads)
-    fade_of_cell = np.exp(-cell / (min(reach, first.reach) if first.count > 0 else reach))
+    n, finish = int(track.cells), track.cells + track.origin
+    contact, begin, free_from = True, track.origin, 0.0
+    guard = deborah * now.time < GUARD_CELLS
+    next_free = next_free_place(now, begin) if guard else np.inf
+    window = WINDOW_CELLS
+    write_spreads(now, window, spreads)
+    fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
     for run in range(runs.shape[0]):
@@ -187,72 +140,82 @@ def touch(
         if not contact:
             known_at = -np.inf
         while i < stop:
-            whole = contact and i % BLOCK == 0 and i + BLOCK < stop and (i + BLOCK) * cell < next_free
-            if whole and lift + least[i // BLOCK] > 0:
-                i += BLOCK
+            if not contact:
+                least_free *= fade_of_cell
+                highest = depth + peak[i]
+                if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
+                    i += 1
+                    continue
+            positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
+            if contact and positive and begin <= i and i + 1 < next_free:
+                whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
+                i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1
                 continue
-            x0, x1, h1, slope1 = i * cell, (i + 1) * cell, height[i + 1], slope[i + 1]
+            cell, x1 = i, min(i + 1.0, finish)
             i += 1
-            if x1 > finish:
-                x1 = finish
-                h1, slope1, _ = height_at(profile, x1)
-            pulls = lift + h1 + reach * slope1 <= 0
-            if contact:
-                until, lost, next_free = _leaving(
-                    profile, first, t, reach, depth, lift, (max(x0, begin), x1), pulls, next_free
-                )
-                if not (pulls or lost):
-                    continue
-                if found + 1 >= start.size:
-                    return -1
-                found = _write_patch(profile, begin, until, lift, reach, found, start, end, sums)
-                w = depth + height_at(profile, until)[0]
-                known = worth_keeping(profile, course, t, reach, until, w, spreads, window, places, known)
-                least_free, known_at = (w - spreads[0]) * fade_of_cell, until
-                oldest, last_start = last_start, begin
-                if not lost:
-                    known = _remember(until, places, known)
-                contact, free_from = False, until
-                continue
-            least_free *= fade_of_cell
-            highest = depth + max(h1, height[i - 1])
-            if slope[i - 1] > 0 > slope1:
-                highest += 0.5 * cell * min(slope[i - 1], -slope1)
-            if highest <= min(floor[i - 1], floor[i]) or (highest < least_free and x1 - known_at < window):
-                continue
-            low, probe = max(x0, free_from), x1
-            if pulls:
-                if lift + height[i - 1] + reach * slope[i - 1] <= 0 or free_from > x0:
-                    continue
-                probe = unloading(profile, lift, reach, low, x1)
-                h1, slope1, _ = height_at(profile, probe)
-            u, u_slope, _ = wake_at(profile, first, course, t, reach, probe, places, known, oldest)
-            gap, rise = depth + h1 - u, slope1 - u_slope
-            spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
-            least_free, known_at = (u - spread) * fade_of_cell, probe
-            if gap > 0:
-                begin, edge, edge_drag = _arriving(
-                    profile, first, course, t, reach, lift, (low, probe), gap, rise, places, known, oldest
-                )
-                edges, edges_drag = edges + edge, edges_drag + edge_drag
-                contact = True
-                next_free = next_free_place(profile, first, t, reach, begin) if guard else np.inf
-            if pulls and gap > -2 * spread:
+            c0, c1, c2, c3 = cubic(height, enter, leave, cell)
+            x = max(float(cell), begin if contact else free_from)
+            for _ in range(VISITS):
                 if contact:
+                    y = x - cell
+                    place = NONE
+                    if not positive:
+                        pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
+                        place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
+                    pulls = cell + place < x1
+                    until, lost, next_free = _leaving(now, depth, x, cell + place if pulls else x1, next_free)
+                    if not (pulls or lost):
+                        break
                     if found + 1 >= start.size:
                         return -1
-                    found = _write_patch(profile, begin, probe, lift, reach, found, start, end, sums)
+                    add_patch(track, begin, until, lift, deborah, sums)
+                    start[found], end[found] = begin, until
+                    found += 1
+                    w = depth + height_at(track, until)[0]
+                    known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
+                    least_free, known_at = (w - spreads[0]) * fade_of_cell, until
                     oldest, last_start = last_start, begin
-                known = worth_keeping(profile, course, t, reach, probe, depth + h1, spreads, window, places, known)
-                known = _remember(probe, places, known)
-                contact, free_from = False, probe
+                    if not lost:
+                        known = _remember(until, places, known)
+                    contact, free_from, x = False, until, until
+                    if lost:
+                        break
+                # the line comes nearer to free elements while the force on them would be positive
+                low, high = x - cell, NONE
+                if not positive:
+                    if x == free_from or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
+                        low = loading(c0, c1, c2, c3, lift, deborah, low)
+                    if cell + low >= x1:
+                        break
+                    high = unloading(c0, c1, c2, c3, lift, deborah, low)
+                pulls = cell + high < x1
+                probe = cell + high if pulls else x1
+                wakes = Wakes(places, known, oldest)
+                u, u_slope, _ = wake_at(now, wakes, probe)
+                h, slope, _ = height_at(track, probe)
+                gap, rise = depth + h - u, slope - u_slope
+                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+                least_free, known_at = (u - spread) * fade_of_cell, probe
+                if gap > 0:
+                    guess = probe - gap / rise if rise > 0 else cell + low
+                    begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
+                    h, slope, _ = height_at(track, begin)
+                    edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
+                    edges, edges_drag = edges + edge, edges_drag + edge * slope
+                    contact, x = True, begin
+                    next_free = next_free_place(now, begin) if guard else np.inf
+                    continue
+                if not pulls:
+                    break
+                if gap > -2 * spread:
+                    known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
+                    known = _remember(probe, places, known)
+                free_from = x = probe
         if contact and run + 1 < runs.shape[0]:
             return -1
-    if contact and not profile.periodic:
-        return -1
-    if profile.periodic:
-        begin = begin if contact else finish
-        found = _write_patch(profile, begin, finish, lift, reach, found, start, end, sums)
-    sums[STIFFNESS] = sums[LENGTH] * (1 + course.stiff) + edges
-    sums[DRAG_STIFFNESS] = sums[TILT] * (1 + course.stiff) + edges_drag
-    return found
+    begin = begin if contact else finish
+    add_patch(track, begin, finish, lift, deborah, sums)
+    start[found], end[found] = begin, finish
+    sums[STIFFNESS] = sums[LENGTH] * (1 + history.stiff) + edges
+    sums[DRAG_STIFFNESS] = sums[TILT] * (1 + history.stiff) + edges_drag
+    return found + 1

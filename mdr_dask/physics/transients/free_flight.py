@@ -1,9 +1,9 @@
-"""Compiled parts of the velocity jump: the displacement of elements in free flight.
+"""The displacement of elements in free flight after a jump.
 
-An element at x came along the path x' = x - reach (t - t') with reach = v tau / L, and its displacement is the largest
-one it was pressed to, faded since:
+An element at x came along the path x' = x - deborah (t - t'), and its displacement is the largest one it was pressed
+to, faded since:
 
-    u(x, t) = max over t' <= t of (d(t') + p(x')) exp(-(t - t'))
+    u(x, t) = max over t' <= t of (d(t') + h(x')) exp(-(t - t'))
 
 so that only the depth d(t) has a history. Free flights are never followed: the place where an element left is the one
 where this expression is stationary.
@@ -11,177 +11,165 @@ where this expression is stationary.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import inlined
-from mdr_dask.physics.transients.patches import (
-    ROOT_STEPS,
-    Course,
-    Patches,
-    Profile,
-    height_at,
-    last_until,
-    patch_before,
-)
+from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, last_until, patch_before
 
+ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 MET = 3e-4  # of a cell: a last Newton step that is not checked
+FADED = 45.0  # relaxation times after which nothing is left of a displacement
+
+
+class Moment(NamedTuple):
+    """A moment after the jump: the line, the state before the jump, the depths so far, time, and Deborah number."""
+
+    track: Track
+    first: Patches
+    history: History
+    time: float
+    deborah: float
+
+
+class Wakes(NamedTuple):
+    """Places where contact is left now, ``count`` of them, and the start of the last patch that hides older wakes."""
+
+    places: FloatArray
+    count: int  # type: ignore[assignment]
+    oldest: float
 
 
 @inlined
-def _moment(course: Course, t: float) -> tuple[float, float, float]:
+def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
-    last = course.count - 1
-    if last <= 0 or t >= course.time[last]:
-        return course.depth[last], course.rate[last], 0.0
+    last = history.count - 1
+    if last <= 0 or t >= history.time[last]:
+        return history.depth[last], history.rate[last], 0.0
     low, high, back = last - 1, last, 1
-    while course.time[low] > t and low > 0:
+    while history.time[low] > t and low > 0:
         high, low, back = low, max(low - back, 0), 2 * back
-    low = last_until(course.time, t, low, high)
+    low = last_until(history.time, t, low, high)
     high = low + 1
-    step = course.time[high] - course.time[low]
-    y = (t - course.time[low]) / step
-    rise = course.depth[high] - course.depth[low]
-    enter, leave = course.rate[low] * step, course.rate[high] * step
+    step = history.time[high] - history.time[low]
+    y = (t - history.time[low]) / step
+    rise = history.depth[high] - history.depth[low]
+    enter, leave = history.rate[low] * step, history.rate[high] * step
     c2, c3 = 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
     return (
-        course.depth[low] + y * (enter + y * (c2 + y * c3)),
+        history.depth[low] + y * (enter + y * (c2 + y * c3)),
         (enter + y * (2 * c2 + 3 * y * c3)) / step,
         (2 * c2 + 6 * y * c3) / step**2,
     )
 
 
 @inlined
-def _follows(course: Course, t: float) -> float:
+def _follows(history: History, t: float) -> float:
     """Return the derivative of the depth at time t by the last depth."""
-    last = course.count - 1
-    if last <= 0 or t >= course.time[last]:
+    last = history.count - 1
+    if last <= 0 or t >= history.time[last]:
         return 1.0
-    if t <= course.time[last - 1]:
+    if t <= history.time[last - 1]:
         return 0.0
-    step = course.time[last] - course.time[last - 1]
-    y = (t - course.time[last - 1]) / step
-    return float(y * y * (3 - 2 * y + course.stiff * step * (y - 1)))
+    step = history.time[last] - history.time[last - 1]
+    y = (t - history.time[last - 1]) / step
+    return float(y * y * (3 - 2 * y + history.stiff * step * (y - 1)))
 
 
 @inlined
-def _left_from(
-    profile: Profile, course: Course, t: float, reach: float, x: float, place: float
-) -> tuple[float, float, float]:
+def _left_from(now: Moment, x: float, place: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place`, its slope along x, and the derivative by depth.
 
     The leaving point of that element is where its load vanished then, not where it vanishes now; a few Newton steps
     from there suffice, because the displacement is stationary in it.
     """
     best, best_slope, best_gain = -1.0, 0.0, 0.0
-    s = place
+    s, deborah = place, now.deborah
     for _ in range(4):
-        then = t - (x - s) / reach
+        then = now.time - (x - s) / deborah
         if then <= 0:
             break
-        d, rate, change = _moment(course, then)
-        h, slope, curvature = height_at(profile, s)
-        fade = np.exp(-(x - s) / reach)
-        force = d + h + rate + reach * slope
-        falls = (rate + change) / reach + slope + reach * curvature
+        d, rate, change = _depth_at(now.history, then)
+        h, slope, curvature = height_at(now.track, s)
+        fade = np.exp(-(x - s) / deborah)
+        force = d + h + rate + deborah * slope
+        falls = (rate + change) / deborah + slope + deborah * curvature
         step = -force / falls if falls < 0 else 0.0
-        near = abs(step) < NEAR * profile.cell
-        u = (d + h + (0.5 * force * step / reach if near else 0.0)) * fade
+        near = abs(step) < NEAR
+        u = (d + h + (0.5 * force * step / deborah if near else 0.0)) * fade
         if u > best:
-            best, best_slope = u, -(d + h + rate) * fade / reach
-            best_gain = _follows(course, then) * fade
+            best, best_slope = u, -(d + h + rate) * fade / deborah
+            best_gain = _follows(now.history, then) * fade
         if near:
             break
-        s = min(max(s + min(max(step, -2 * profile.cell), 2 * profile.cell), 0.0), x)
+        s = min(max(s + min(max(step, -2.0), 2.0), 0.0), x)
     return best, best_slope, best_gain
 
 
 @inlined
-def left_before(profile: Profile, first: Patches, t: float, reach: float, x: float) -> tuple[float, float]:
+def left_before(now: Moment, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
-    s = x - reach * t
-    if profile.periodic:
-        s -= np.floor(s - profile.origin)
-    elif s < first.start[0]:
-        return 0.0, 0.0
+    track, first = now.track, now.first
+    s = x - now.deborah * now.time
+    s -= np.floor((s - track.origin) / track.cells) * track.cells
     low = patch_before(first, s)
-    fade = np.exp(-t)
+    fade = np.exp(-now.time)
     if s <= first.end[low]:
-        h, slope, _ = height_at(profile, s)
+        h, slope, _ = height_at(track, s)
         return (first.depth + h) * fade, slope * fade
-    u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.reach) * fade
-    return u, -u / first.reach
+    u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * fade
+    return u, -u / first.deborah
 
 
 @inlined
-def wake_at(
-    profile: Profile,
-    first: Patches,
-    course: Course,
-    t: float,
-    reach: float,
-    x: float,
-    places: FloatArray,
-    count: int,
-    oldest: float,
-) -> tuple[float, float, float]:
+def wake_at(now: Moment, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
-    for k in range(count):
-        value, value_slope, value_gain = _left_from(profile, course, t, reach, x, places[k])
+    for k in range(wakes.count):
+        value, value_slope, value_gain = _left_from(now, x, wakes.places[k])
         if value > u:
             u, slope, gain = value, value_slope, value_gain
-    if first.count > 0 and t < 45 and x - reach * t > oldest:
-        value, value_slope = left_before(profile, first, t, reach, x)
+    if now.time < FADED and x - now.deborah * now.time > wakes.oldest:
+        value, value_slope = left_before(now, x)
         if value > u:
             u, slope, gain = value, value_slope, 0.0
     return u, slope, gain
 
 
 @inlined
-def meeting(
-    profile: Profile,
-    first: Patches,
-    course: Course,
-    t: float,
-    reach: float,
-    low: float,
-    high: float,
-    x: float,
-    places: FloatArray,
-    count: int,
-    oldest: float,
-) -> tuple[float, float, float]:
-    """Return where the profile rises through the wake, the slopes of their gap by place and depth."""
-    depth = course.depth[course.count - 1]
+def meeting(now: Moment, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
+    """Return where the line rises through the wake, the slopes of their gap by place and depth."""
+    depth = now.history.depth[now.history.count - 1]
     slope, gain = 1.0, 0.0
     for _ in range(ROOT_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
-        u, u_slope, gain = wake_at(profile, first, course, t, reach, x, places, count, oldest)
-        h, h_slope, _ = height_at(profile, x)
+        u, u_slope, gain = wake_at(now, wakes, x)
+        h, h_slope, _ = height_at(now.track, x)
         gap = depth + h - u
         slope = h_slope - u_slope
         if gap > 0:
             high = x
         else:
             low = x
-        step = -gap / slope if slope > 0 else 2 * profile.cell
-        if abs(step) < MET * profile.cell or high - low < 1e-9 * profile.cell:
+        step = -gap / slope if slope > 0 else 2.0
+        if abs(step) < MET or high - low < 1e-9:
             return min(max(x + step, low), high), slope, 1 - gain
         x += step
     return x, slope, 1 - gain
 
 
 @inlined
-def losing(profile: Profile, first: Patches, t: float, reach: float, depth: float, low: float, high: float) -> float:
+def losing(now: Moment, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
-    while high - low > 1e-12 * profile.cell:
+    while high - low > 1e-12:
         x = 0.5 * (low + high)
         if not low < x < high:
             break
-        if depth + height_at(profile, x)[0] > left_before(profile, first, t, reach, x)[0]:
+        if depth + height_at(now.track, x)[0] > left_before(now, x)[0]:
             low = x
         else:
             high = x
@@ -189,22 +177,23 @@ def losing(profile: Profile, first: Patches, t: float, reach: float, depth: floa
 
 
 @inlined
-def write_spreads(course: Course, t: float, reach: float, window: float, spreads: FloatArray) -> None:
-    """Write the range of the depth while the profile went the last window, twice that, four times that, and so on."""
-    now = course.count - 1
-    lowest = highest = course.depth[now]
-    back = now
+def write_spreads(now: Moment, window: float, spreads: FloatArray) -> None:
+    """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
+    history = now.history
+    last = history.count - 1
+    lowest = highest = history.depth[last]
+    back = last
     for k in range(spreads.size):
-        since = t - window / reach * 2.0**k
-        while back > 0 and course.time[back] > since:
+        since = now.time - window / now.deborah * 2.0**k
+        while back > 0 and history.time[back] > since:
             back -= 1
-            lowest, highest = min(lowest, course.depth[back]), max(highest, course.depth[back])
+            lowest, highest = min(lowest, history.depth[back]), max(highest, history.depth[back])
         spreads[k] = highest - lowest
 
 
 @inlined
 def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
-    """Return the range of the depth while the profile went a distance."""
+    """Return the range of the depth while the line went a distance."""
     k = 0
     while k < spreads.size - 1 and distance > window:
         distance *= 0.5
@@ -213,40 +202,32 @@ def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
 
 
 @inlined
-def worth_keeping(
-    profile: Profile,
-    course: Course,
-    t: float,
-    reach: float,
-    x: float,
-    pressed: float,
-    spreads: FloatArray,
-    window: float,
-    places: FloatArray,
-    count: int,
-) -> int:
+def worth_keeping(now: Moment, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0
-    for k in range(count):
-        if t * reach <= x - places[k]:
+    for k in range(wakes.count):
+        place = wakes.places[k]
+        if now.time * now.deborah <= x - place:
             continue
-        u = _left_from(profile, course, t, reach, x, places[k])[0]
-        if u + 2 * spread_over(spreads, window, 2 * (x - places[k]) + window) >= pressed:
-            places[kept] = places[k]
+        u = _left_from(now, x, place)[0]
+        if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
+            wakes.places[kept] = place
             kept += 1
     return kept
 
 
 @inlined
-def next_free_place(profile: Profile, first: Patches, t: float, reach: float, x: float) -> float:
+def next_free_place(now: Moment, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
-    s = x - reach * t
-    turns = np.floor(s - profile.origin) if profile.periodic else 0.0
+    track, first = now.track, now.first
+    travel = now.deborah * now.time
+    s = x - travel
+    turns = np.floor((s - track.origin) / track.cells) * track.cells
     s -= turns
     low = patch_before(first, s)
     if not first.start[low] <= s <= first.end[low]:
         return x
     until = first.end[low]
-    if profile.periodic and low == first.count - 1:
-        until = first.end[0] + 1.0
-    return float(until + turns + reach * t)
+    if low == first.count - 1:
+        until = first.end[0] + track.cells
+    return float(until + turns + travel)

@@ -1,6 +1,7 @@
-"""Compiled parts of the velocity jump: a profile of cubic cells, patches in contact and the forces on them.
+"""The pieces of a line in contact and the forces on them.
 
-Lengths are in units of the line, heights in any one unit, times in relaxation times tau.
+Lengths are in cells of the line and slopes are rises over a cell, as in the sweep; heights are in any one unit and
+times in relaxation times. The Deborah number is v tau in cells.
 """
 
 from __future__ import annotations
@@ -8,102 +9,57 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined
-from mdr_dask.physics.surfaces.cubic_line import highest_point
+from mdr_dask.physics.sliding.kelvin import BLOCK, leaving, write_barriers
+from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-5  # of a cell: a step of Newton after which the next one is below rounding
+CLOSE = 1e-6  # of a cell: a step of Newton after which the next one is below rounding
 NEARBY = 8  # patches to look at one by one before halving
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS = range(6)
 SUMS = 6
 
 
-class Profile(NamedTuple):
-    """A profile of cubic cells, from the cell of its highest point on where it is periodic.
+class Track(NamedTuple):
+    """The cells of a periodic line from its highest point on, with their integrals up to every node.
 
     Parameters
     ----------
-    height, slope : array, shape (n + 2,) if periodic, else (n + 1,)
-        Height into the elastomer and its derivative at the nodes.
-    area, square : array, same shape
+    height : array, shape (n + 2,)
+        Heights at the nodes, from the highest point: a light contact loses no digits.
+    enter, leave, peak : array, shape (n + 1,)
+        Slopes at the start and the end of each cell, and its highest point; the last cell is the first one again.
+    area, square : array, shape (n + 2,)
         Integrals of the height and of the slope squared up to each node.
-    cells, cell : float
-        Number of cells of a line, and the length of one.
+    cells : float
+        n, the length of the line.
     origin : float
-        Highest point, in the first cell, where a turn begins.
-    periodic : bool
-        Whether the last cell is the first one again; else elements enter undeformed.
+        The highest point, in the first cell, where a turn begins.
     """
 
     height: FloatArray
-    slope: FloatArray
+    enter: FloatArray
+    leave: FloatArray
+    peak: FloatArray
     area: FloatArray
     square: FloatArray
     cells: float
-    cell: float
     origin: float
-    periodic: bool
 
 
-def cubic_profile(height: FloatArray, slope: FloatArray) -> tuple[Profile, float]:
-    """Return a periodic profile of cubic cells that begins at its highest point.
-
-    Parameters
-    ----------
-    height : array, shape (n,)
-        Heights at equidistant nodes of a line of unit length, positive into the elastomer, which moves along it in the
-        order of the nodes.
-    slope : array, shape (n,)
-        Derivative at the nodes.
-
-    Returns
-    -------
-    profile : Profile
-        With heights from the highest point, so that a light contact loses no digits.
-    top : float
-        Height of that point.
-    """
-    best, place, top = highest_point(height, slope)
-    n = height.size
-    heights, slopes, area, square = np.empty((4, n + 2))
-    _turned(height, slope, best, top, heights, slopes, area, square)
-    return Profile(heights, slopes, area, square, float(n), 1 / n, place / n, True), top
-
-
-@njit(nogil=True, cache=True)
-def _turned(
-    height: FloatArray,
-    slope: FloatArray,
-    best: int,
-    top: float,
-    heights: FloatArray,
-    slopes: FloatArray,
-    area: FloatArray,
-    square: FloatArray,
-) -> None:
-    """Write the columns of a profile that begins at cell `best`."""
-    n = height.size
-    for i in range(n + 2):
-        node = best + i if best + i < n else best + i - n
-        node = node if node < n else node - n
-        heights[i], slopes[i] = height[node] - top, slope[node]
-    area[0] = square[0] = 0.0
-    for i in range(n + 1):
-        enter, leave = slopes[i] / n, slopes[i + 1] / n
-        before, after = slopes[i - 1 if i > 0 else n - 1] / n, slopes[i + 2 if i < n else 2] / n
-        area[i + 1] = area[i] + (0.5 * (heights[i + 1] + heights[i]) + (enter - leave) / 12) / n
-        # by Euler and Maclaurin: exact over the whole line, whose roughness is band-limited
-        bend = (leave**2 - before**2 - after**2 + enter**2) / 24
-        square[i + 1] = square[i] + (0.5 * (enter**2 + leave**2) + bend) * n
+def track_of(cells: Cells) -> Track:
+    """Return the cells of a periodic line with their integrals up to every node."""
+    area, square = running(cells.mean), running(cells.stretch)
+    n = float(cells.mean.size - 1)
+    return Track(cells.height, cells.enter, cells.leave, cells.peak, area, square, n, cells.start)
 
 
 class Patches(NamedTuple):
-    """Where the elements touch: patch k from ``start[k]`` to ``end[k]``, `count` of them, at one depth and reach.
+    """Where the elements touch: patch k from ``start[k]`` to ``end[k]``, at one depth and Deborah number.
 
-    ``cursor`` is where one of them was found last.
+    ``pressed`` is the displacement with which elements leave a patch, ``cursor`` where one of them was found last.
     """
 
     start: FloatArray
@@ -111,15 +67,25 @@ class Patches(NamedTuple):
     pressed: FloatArray
     count: int  # type: ignore[assignment]
     depth: float
-    reach: float
+    deborah: float
     cursor: IntArray
 
 
-class Course(NamedTuple):
-    """The depth and its rate at the moments so far, ``count`` of them; constant depth where there is none.
+class Barriers(NamedTuple):
+    """The force without the lift d + d_dot that keeps cells and blocks pressed; NaN in blocks not needed yet."""
 
-    ``stiff`` is the derivative of the last rate by the last depth.
-    """
+    cell: FloatArray
+    block: FloatArray
+
+
+def barriers_for(track: Track) -> Barriers:
+    """Return barriers of which none is known."""
+    n = int(track.cells)
+    return Barriers(np.empty(n), np.full(n // BLOCK + 1, np.nan))
+
+
+class History(NamedTuple):
+    """The depth and its rate at the moments so far, ``count`` of them; ``stiff`` is d(last rate) / d(last depth)."""
 
     time: FloatArray
     depth: FloatArray
@@ -129,25 +95,15 @@ class Course(NamedTuple):
 
 
 @inlined
-def _cubic(profile: Profile, i: int) -> tuple[float, float, float, float]:
-    """Return the coefficients of the height in cell i over 0..1."""
-    h = profile.height[i]
-    rise = profile.height[i + 1] - h
-    enter, leave = profile.slope[i] * profile.cell, profile.slope[i + 1] * profile.cell
-    return h, enter, 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
-
-
-@inlined
-def height_at(profile: Profile, x: float) -> tuple[float, float, float]:
+def height_at(track: Track, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
-    y = x * profile.cells
-    i = min(max(int(y), 0), profile.height.size - 2)
-    y -= i
-    c0, c1, c2, c3 = _cubic(profile, i)
+    i = min(max(int(x), 0), track.enter.size - 1)
+    y = x - i
+    c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     return (
         c0 + y * (c1 + y * (c2 + y * c3)),
-        (c1 + y * (2 * c2 + y * 3 * c3)) * profile.cells,
-        (2 * c2 + 6 * y * c3) * (profile.cells * profile.cells),
+        c1 + y * (2 * c2 + y * 3 * c3),
+        2 * c2 + 6 * y * c3,
     )
 
 
@@ -183,110 +139,136 @@ def patch_before(patches: Patches, s: float) -> int:
 
 
 @inlined
-def integrals_at(profile: Profile, x: float) -> tuple[float, float, float]:
-    """Return the height at x, its integral up to x and that of its slope squared."""
-    y = x * profile.cells
-    i = min(max(int(y), 0), profile.height.size - 2)
-    y -= i
-    a, b, c, e = _cubic(profile, i)
-    area = y * (a + y * (b / 2 + y * (c / 3 + y * e / 4)))
-    square = y * (b * b + y * (2 * b * c + y * ((4 * c * c + 6 * b * e) / 3 + y * (3 * c * e + y * 1.8 * e * e))))
-    return (
-        a + y * (b + y * (c + y * e)),
-        profile.area[i] + area * profile.cell,
-        profile.square[i] + square * profile.cells,
+def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
+    """Return the height at y of a cubic over 0..1, and the integrals of it and of its slope squared from 0 to y."""
+    height = c0 + y * (c1 + y * (c2 + y * c3))
+    area = y * (c0 + y * (c1 / 2 + y * (c2 / 3 + y * c3 / 4)))
+    square = y * c1 * c1 + y * y * (
+        2 * c1 * c2 + y * ((4 * c2 * c2 + 6 * c1 * c3) / 3 + y * c3 * (3 * c2 + y * 1.8 * c3))
     )
+    return height, area, square
 
 
 @inlined
-def add_patch(profile: Profile, start: float, end: float, lift: float, reach: float, sums: FloatArray) -> None:
-    """Add the forces of a patch in contact, f = lift + p + reach p' with lift = d + d_dot, exactly."""
-    h0, area0, square0 = integrals_at(profile, start)
-    h1, area1, square1 = integrals_at(profile, end)
-    sums[LOAD] += lift * (end - start) + area1 - area0 + reach * (h1 - h0)
-    sums[DRAG] += lift * (h1 - h0) + 0.5 * (h1 * h1 - h0 * h0) + reach * (square1 - square0)
+def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
+    """Add the forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot, exactly.
+
+    Whole cells are taken from the running integrals, parts of cells from their cubics, as in the sweep.
+    """
+    last = track.enter.size - 1
+    i, j = min(int(start), last), min(int(end), last)
+    c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
+    h0, area0, square0 = _part(c0, c1, c2, c3, start - i)
+    if i == j:
+        h1, area1, square1 = _part(c0, c1, c2, c3, end - i)
+        area, square = area1 - area0, square1 - square0
+    else:
+        _, area_all, square_all = _part(c0, c1, c2, c3, 1.0)
+        c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, j)
+        h1, area1, square1 = _part(c0, c1, c2, c3, end - j)
+        area = area_all - area0 + (track.area[j] - track.area[i + 1]) + area1
+        square = square_all - square0 + (track.square[j] - track.square[i + 1]) + square1
+    rise = h1 - h0
+    sums[LOAD] += lift * (end - start) + area + deborah * rise
+    sums[DRAG] += rise * (lift + 0.5 * (h0 + h1)) + deborah * square
     sums[LENGTH] += end - start
-    sums[TILT] += h1 - h0
-
-
-@inlined
-def unloading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
-    """Return where lift + p + reach p' falls through zero between low and high, in one cell."""
-    i = min(max(int(0.5 * (low + high) * profile.cells), 0), profile.height.size - 2)
-    c0, c1, c2, c3 = _cubic(profile, i)
-    far = reach * profile.cells
-    # the force is a cubic itself
-    p, q, r = lift + c0 + far * c1, c1 + 2 * far * c2, c2 + 3 * far * c3
-    left, right = max(low * profile.cells - i, 0.0), min(high * profile.cells - i, 1.0)
-    first, last = left, right
-    end = p + right * (q + right * (r + right * c3))
-    begin = p + left * (q + left * (r + left * c3))
-    y = left + (right - left) * (begin / (begin - end) if begin > 0 > end else 0.5)
-    for _ in range(ROOT_STEPS):
-        force = p + y * (q + y * (r + y * c3))
-        if force > 0:
-            left = y
-        else:
-            right = y
-        falls = q + y * (2 * r + 3 * y * c3)
-        step = y - force / falls if falls < 0 else 0.5 * (left + right)
-        if abs(step - y) < CLOSE and falls < 0:
-            y = min(max(step, first), last)
-            break
-        if not left < step < right:
-            step = 0.5 * (left + right)
-        if right - left < 1e-12:
-            break
-        y = step
-    return (i + y) * profile.cell
-
-
-@inlined
-def loading(profile: Profile, lift: float, reach: float, low: float, high: float) -> float:
-    """Return where lift + p + reach p' rises through zero between low and high, by bisection."""
-    for _ in range(ROOT_STEPS):
-        x = 0.5 * (low + high)
-        h, slope, _ = height_at(profile, x)
-        if lift + h + reach * slope > 0:
-            high = x
-        else:
-            low = x
-    return high
+    sums[TILT] += rise
 
 
 @compiled
-def released(profile: Profile, first: Patches, reach: float, rate: float, sums: FloatArray) -> None:
+def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
+    """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
+
+    Where its control points over that part fall, so does the cubic, and Newton's steps find its only zero.
+    """
+    width = 1 - y
+    begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
+    near = begin + width / 3 * (q + y * (2 * r + y * 3 * c))
+    far = end - width / 3 * (q + 2 * r + 3 * c)
+    if near > 0 and far > 0 and end > 0:
+        return NONE
+    if not (begin >= near >= far >= end and begin > 0 >= end):
+        return float(leaving(p, q, r, c, 0.0, y))
+    low, high, x = y, 1.0, y + width * begin / (begin - end)
+    for _ in range(ROOT_STEPS):
+        value = p + x * (q + x * (r + x * c))
+        if value > 0:
+            low = x
+        else:
+            high = x
+        falls = q + x * (2 * r + x * 3 * c)
+        step = x - value / falls if falls < 0 else 2.0
+        if abs(step - x) < CLOSE:
+            return min(max(step, y), 1.0)
+        x = step if low < step < high else 0.5 * (low + high)
+    return x
+
+
+@inlined
+def unloading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+    """Return where in a cell, from y on, the force lift + h + deborah h' falls through zero first, or `NONE`."""
+    return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
+
+
+@inlined
+def loading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+    """Return where in a cell, from y on, the force rises through zero first, or `NONE`."""
+    return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
+
+
+@inlined
+def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
+    """Return the force lift + h + deborah h' at y in a cell."""
+    return lift + c0 + y * (c1 + y * (c2 + y * c3)) + deborah * (c1 + y * (2 * c2 + y * 3 * c3))
+
+
+@inlined
+def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
+    """Return whether the force is positive in all of cell i."""
+    if np.isnan(barriers.block[i // BLOCK]):
+        write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers.cell, barriers.block)
+    return bool(barriers.cell[i] < lift)
+
+
+@compiled
+def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 
     Parameters
     ----------
-    profile, first : Profile, Patches
+    track, first : Track, Patches
         The state before the jump; displacements and depth do not change at once.
-    reach, rate : float
-        New v tau / L, and new rate of the depth.
+    barriers : Barriers
+        At the new Deborah number.
+    deborah, rate : float
+        New Deborah number, and new rate of the depth.
     sums : array, shape (SUMS,)
-        Written: load and drag over 4 G L, length in contact, which is the derivative of the load by the rate.
+        Written: load and drag over 4 G dx, length in contact, which is the derivative of the load by the rate.
     """
     sums[:] = 0.0
-    lift = first.depth + rate
-    cell = profile.cell
+    lift, n = first.depth + rate, int(track.cells)
     for k in range(first.count):
-        i = int(first.start[k] / cell)
-        begin, x0 = first.start[k], first.start[k]
-        h, slope, _ = height_at(profile, x0)
-        pressed = lift + h + reach * slope > 0
-        while x0 < first.end[k]:
-            x1 = min((i + 1) * cell, first.end[k])
-            h, slope = profile.height[i + 1], profile.slope[i + 1]
-            if x1 == first.end[k]:
-                h, slope, _ = height_at(profile, x1)
-            now = lift + h + reach * slope > 0
-            if pressed and not now:
-                add_patch(profile, begin, unloading(profile, lift, reach, x0, x1), lift, reach, sums)
-            elif now and not pressed:
-                begin = loading(profile, lift, reach, x0, x1)
-            pressed = now
-            x0 = x1
-            i += 1
+        begin, end = first.start[k], first.end[k]
+        x, pressed, entered = begin, False, True
+        while x < end:
+            i = min(int(x), n)
+            stop = min(i + 1.0, end)
+            if pressed and x == i and i < n and stop == i + 1 and keeps_pressed(track, barriers, deborah, i, lift):
+                x = stop
+                continue
+            c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
+            if entered:
+                pressed, entered = force_at(c0, c1, c2, c3, lift, deborah, x - i) > 0, False
+            change = (
+                unloading(c0, c1, c2, c3, lift, deborah, x - i)
+                if pressed
+                else loading(c0, c1, c2, c3, lift, deborah, x - i)
+            )
+            x = min(i + change, stop) if change < NONE else stop
+            if x < stop and pressed:
+                add_patch(track, begin, x, lift, deborah, sums)
+            elif x < stop:
+                begin = x
+            pressed = pressed != (x < stop)
         if pressed:
-            add_patch(profile, begin, first.end[k], lift, reach, sums)
+            add_patch(track, begin, end, lift, deborah, sums)

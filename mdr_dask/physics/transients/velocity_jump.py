@@ -1,4 +1,4 @@
-"""Friction after a jump of the velocity at constant load, from one steady state to the next."""
+"""Friction after a jump of the velocity at constant load, marched from one steady state to the next on one line."""
 
 from __future__ import annotations
 
@@ -8,61 +8,99 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.steady import steady_sliding
-from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.march import Pace, march
-from mdr_dask.physics.transients.patches import (
-    DRAG,
-    LENGTH,
-    LOAD,
-    SUMS,
-    TILT,
-    Patches,
-    Profile,
-    cubic_profile,
-    released,
-)
-from mdr_dask.physics.transients.steady_patches import Ends, steady_ends
+from mdr_dask.physics.sliding.kelvin import DRAG_RATE
+from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
+from mdr_dask.physics.transients.contact_search import Reachable, workspace_for
+from mdr_dask.physics.transients.ends import Ends, Line, ends_on
+from mdr_dask.physics.transients.march import LEFT_LIMITS, Aim, Marching, Pace, Trajectory, march
+from mdr_dask.physics.transients.patches import Patches, Track
 
-CONVERGED, NOT_CONVERGED, INVALID, STRAYED = 0, 1, 2, 3
-MESSAGES = {
-    NOT_CONVERGED: "the depth for the load was not found at one moment after the jump",
-    INVALID: "load, velocity and profile must be finite, the load and both velocities positive",
-    STRAYED: "friction after the jump did not come to the steady state at the new velocity",
-}
-STEPS_PER_DECADE = 24
-MISS = 0.01  # of the change of depth: what a step may differ from a parabola through the ones before
-NEGLIGIBLE = 1e-5  # of the mean displacement: changes of depth that need no finer steps
-NEWTON = 0.03  # of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer
-EQUILIBRIUM = 5e-5  # of depth and drag, at 24 steps a decade
-MOMENTS = 3000
-SHARE = 0.1  # of the accuracy: how near to its end friction is left
-LONG, STRAY = 15.0, 0.02  # relaxation times after which friction has come so near to its end, of all its changes
-FIRST_STEP = 0.02  # of the time in which 1 / q_max is passed, and of tau
-WIDENINGS = 3
-LONG_LINE = 40_000  # nodes from which on depths are looked for on every other one first
-DOUBT = 2e-3  # of the depth: how far off it may be there
+
+class Settings(NamedTuple):
+    """Numbers of the march, chosen by ``python -m benchmarks.grid_kinetics`` and ``benchmarks.honesty_kinetics``.
+
+    Parameters
+    ----------
+    first_step : float
+        Of the time in which 1 / q_max is passed, and of tau, at 24 steps a decade.
+    miss : float
+        Of the change of depth: what a step may differ from a parabola through the ones before, at 24 steps a decade.
+    negligible : float
+        Of the mean displacement: changes of depth that need no finer steps.
+    newton : float
+        Of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer.
+    equilibrium : float
+        Of depth and drag, where the march ends, at 24 steps a decade.
+    share : float
+        Of the accuracy: how near to its end friction is left.
+    long, stray : float
+        Relaxation times after which friction has come so near to its end, of all its changes.
+    margin : float
+        Of the change of depth, by which a depth may leave its ends.
+    widenings : int
+        Times that those limits are widened.
+    moments : int
+        Most moments of a march.
+    """
+
+    first_step: float = 0.02
+    miss: float = 0.01
+    negligible: float = 1e-5
+    newton: float = 0.03
+    equilibrium: float = 5e-5
+    share: float = 0.1
+    long: float = 15.0
+    stray: float = 0.02
+    margin: float = 0.25
+    widenings: int = 3
+    moments: int = 3000
+
+
+SETTINGS = Settings()
+WHOLE = 1 - 1e-12  # of a line in contact, but for rounding
+SHALLOW = 0.01  # of the least depth of the ends: no march goes below
+FINE_STEPS = 24.0  # steps per decade of which the settings speak
+
+
+class Course(NamedTuple):
+    """What is asked of a march.
+
+    Parameters
+    ----------
+    times : array, shape (m,)
+        (t - t_0) / tau at which friction and depth are wanted, increasing.
+    wavenumber : float
+        q_max L, which fixes the first step.
+    per_decade : float
+        Steps in a factor ten of the time.
+    accuracy : float
+        Error allowed for the trace, over the friction at the end: a transient that is smaller is not marched, another
+        one ends when drag and depth have stayed within a tenth of it.
+    """
+
+    times: FloatArray
+    wavenumber: float
+    per_decade: float = FINE_STEPS
+    accuracy: float = 0.0
 
 
 class Jump(NamedTuple):
-    """Friction before, at and after a jump of the velocity.
+    """Friction before, at and after a jump of the velocity; drags are F_x / (4 G L), in height squared over length.
 
     Parameters
     ----------
     before, at, after : float
-        F_x / (4 G L) in the unit of height squared over that of length, steady at v_1, at t_0+, and steady at v_2.
-    trace : array, shape (times,)
-        The same at the times asked for.
-    depth : array, shape (2,)
-        Depth before and after.
+        Steady at v_1, at t_0+, and steady at v_2.
+    trace, depth : array, shape (times,)
+        Drag and depth at the times asked for.
     moments : int
         Number of moments computed; the rest is in equilibrium.
     left_out : float
         Estimated size of a transient that is not computed, because all of it lies within the accuracy.
-    status : int
-        `CONVERGED` or a key of `MESSAGES`.
+    outcome : Outcome
     """
 
     before: float
@@ -72,202 +110,216 @@ class Jump(NamedTuple):
     depth: FloatArray
     moments: int
     left_out: float
-    status: int
+    outcome: Outcome
 
 
-def pace_after(last: float, reach: float, wavenumber: float, per_decade: float, change: float, load: float) -> Pace:
-    """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio, up to `last`.
+def pace_after(course: Course, deborah: float, change: float, load: float) -> Pace:
+    """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio.
 
     Parameters
     ----------
-    last : float
-        Last time, in relaxation times.
-    reach : float
+    course : Course
+    deborah : float
         v_2 tau / L.
-    wavenumber : float
-        q_max L of the profile.
-    per_decade : float
-        Steps in a factor ten of the time.
-    change : float
-        Difference of the depths before and after.
-    load : float
-        F_N / (4 G L), in the same unit.
+    change, load : float
+        Difference of the depths before and after, and F_N / (4 G L), in the same unit.
     """
-    finer = STEPS_PER_DECADE / per_decade
-    first = FIRST_STEP * finer * min(1.0, 1 / (wavenumber * reach))
-    scale = max(abs(change), NEGLIGIBLE * load)
-    close = NEWTON * min(1.0, (8 / per_decade) ** 2)
-    return Pace(first, 10 ** (1 / per_decade), MISS * finer**3 * scale, close * scale, last)
+    finer = FINE_STEPS / course.per_decade
+    first = SETTINGS.first_step * finer * min(1.0, 1 / (course.wavenumber * deborah))
+    scale = max(abs(change), SETTINGS.negligible * load)
+    close = SETTINGS.newton * min(1.0, (8 / course.per_decade) ** 2)
+    last = float(course.times[-1])
+    return Pace(first, 10 ** (1 / course.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
 
 
-def velocity_jump(
-    height: FloatArray,
-    slope: FloatArray,
-    load: float,
-    reaches: tuple[float, float],
-    times: FloatArray,
-    wavenumber: float,
-    per_decade: float = STEPS_PER_DECADE,
-    accuracy: float = 0.0,
-) -> Jump:
+def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], course: Course) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
 
-    The start is the direct steady state at v_1; the instant t_0+ solves the jump condition (displacements and depth
-    do not change at once, the rate of the depth does); then the depth is marched by backward differentiation of order
-    three over graded steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
+    The start is steady sliding at v_1; then the depth is marched by backward differentiation of order three over graded
+    steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
 
     Parameters
     ----------
-    height, slope : array, shape (n,)
-        See :func:`mdr_dask.physics.transients.patches.cubic_profile`.
+    line : CubicLine
+        Periodic.
     load : float
         F_N / (4 G L), in the unit of height.
-    reaches : tuple of float
+    deborah : tuple of float
         v_1 tau / L and v_2 tau / L.
-    times : array, shape (m,)
-        (t - t_0) / tau at which friction is wanted, increasing.
-    wavenumber : float
-        q_max L, which fixes the first step.
-    per_decade : float
-        Steps in a factor ten of the time.
-    accuracy : float
-        Error allowed for the trace, over the friction at the end: a transient that is smaller is not computed, another
-        one ends when drag and depth have stayed within a tenth of it.
-
-    Returns
-    -------
-    Jump
-        With ``mu = drag / load`` times height over length.
+    course : Course
     """
-    cases = np.array([load]), np.array([reaches])
-    return velocity_jumps(height, slope, *cases, times, wavenumber, per_decade, np.array([accuracy]))[0]
+    prepared, loads, numbers = Line.of(line), np.array([load]), np.array([deborah])
+    return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), course)[0]
 
 
 def velocity_jumps(
-    height: FloatArray,
-    slope: FloatArray,
+    line: Line,
     loads: FloatArray,
-    reaches: FloatArray,
-    times: FloatArray,
-    wavenumber: float,
-    per_decade: float,
-    accuracies: FloatArray,
+    deborah: FloatArray,
+    ends: Ends,
+    course: Course,
+    left_out: BoolArray | None = None,
 ) -> list[Jump]:
-    """Return the jumps of many cases on one line, whose steady states are found together; see :func:`velocity_jump`.
+    """Return the jumps of many cases on one line, of which none depends on the others.
 
     Parameters
     ----------
-    height, slope : array, shape (n,)
-    loads, accuracies : array, shape (cases,)
-    reaches : array, shape (cases, 2)
-    times, wavenumber, per_decade
-        As of one case, which does not depend on the others.
+    line, loads, deborah
+        As in :func:`~mdr_dask.physics.transients.ends.ends_on`.
+    ends : Ends
+        Of the same line.
+    course : Course
+        What is asked of the march.
+    left_out : array, shape (cases,), optional
+        Cases whose transient is left out, however large.
     """
-    if not np.all(np.isfinite(height)):
-        return [_failed(times, INVALID)] * loads.size
-    every = 2 if height.size >= LONG_LINE and height.size % 2 == 0 else 1
-    steady = steady_sliding(periodic_line(height[::every], slope[::every]), reaches.ravel(), np.repeat(loads, 2))
-    depths, states = steady.depth.reshape(-1, 2), steady.status.reshape(-1, 2)
-    profile, top = cubic_profile(height, slope)
-    equilibrium = EQUILIBRIUM * (STEPS_PER_DECADE / per_decade) ** 3
     jumps = []
     for k in range(loads.size):
-        if states[k].any():
-            jumps.append(_failed(times, INVALID if Outcome.INVALID in states[k] else NOT_CONVERGED))
-            continue
-        change = float(depths[k, 1] - depths[k, 0])
-        pace = pace_after(float(times[-1]), reaches[k, 1], wavenumber, per_decade, change, loads[k])
-        tolerances = float(accuracies[k]), equilibrium, DOUBT if every > 1 else 0.0
-        pair = float(reaches[k, 0]), float(reaches[k, 1])
-        jump = _relax(profile, float(loads[k]), pair, depths[k] + top, times, pace, tolerances)
-        jumps.append(jump._replace(depth=jump.depth - top))
+        if ends.outcome[k] != Outcome.CONVERGED:
+            jumps.append(_failed(course.times, Outcome(ends.outcome[k])))
+        else:
+            one = course if left_out is None or not left_out[k] else course._replace(accuracy=np.inf)
+            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, one).solve())
     return jumps
 
 
-def _failed(times: FloatArray, status: int) -> Jump:
-    return Jump(np.nan, np.nan, np.nan, np.full(times.size, np.nan), np.full(2, np.nan), 0, 0.0, status)
+def _failed(times: FloatArray, outcome: Outcome) -> Jump:
+    nothing = np.full(times.size, np.nan)
+    return Jump(np.nan, np.nan, np.nan, nothing, nothing, 0, 0.0, outcome)
 
 
-def _relax(
-    profile: Profile,
-    load: float,
-    reaches: tuple[float, float],
-    depths: FloatArray,
-    times: FloatArray,
-    pace: Pace,
-    tolerances: tuple[float, float, float],
-) -> Jump:
-    """Solve both steady states on one profile and march between them, within limits of the depth that may widen."""
-    low, high = float(depths.min()), float(depths.max())
-    accuracy, equilibrium, doubt = tolerances
-    margin = 0.25 * (high - low) + NEGLIGIBLE * load + doubt * high
-    for _ in range(WIDENINGS):
-        ends = steady_ends(profile, load, reaches, depths, (low - margin, high + margin))
-        jump = _between(profile, load, reaches[1], ends, times, pace, (accuracy, equilibrium)) if ends else None
-        if jump is not None:
+class _Relaxation(NamedTuple):
+    """One case between its ends, in units of cells; depths from the highest point of the line."""
+
+    line: Line
+    load: float
+    deborah: FloatArray
+    before: float
+    at: float
+    after: float
+    rate: float
+    tilt: float
+    depth: FloatArray
+    first: Patches
+    is_full: bool
+    course: Course
+    pace: Pace
+
+    @classmethod
+    def of(cls, line: Line, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course) -> _Relaxation:
+        """Take the k-th case of some ends."""
+        n, depth = line.track.cells, ends.depth[k]
+        return cls(
+            line,
+            float(load * n),
+            deborah * n,
+            float(ends.before[k]),
+            float(ends.at[k]),
+            float(ends.after[k]),
+            float(ends.rate[k]),
+            float(ends.tilt[k]),
+            depth + line.cells.top,
+            ends.first[k],
+            bool(np.all(ends.contact[k] >= WHOLE)),
+            course,
+            pace_after(course, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
+        )
+
+    def solve(self) -> Jump:
+        """March from end to end, within limits of the depth that may widen."""
+        times, constant = self.course.times, np.ones(self.course.times.size)
+        jump = Jump(
+            self.before,
+            self.at,
+            self.after,
+            self.after * constant,
+            (self.depth[1] - self.line.cells.top) * constant,
+            0,
+            0.0,
+            Outcome.CONVERGED,
+        )
+        if self.is_full:  # then u = d + h, d is constant and nothing relaxes
             return jump
-        margin *= 4
-    return _failed(times, NOT_CONVERGED)
+        transient = self.transient() if self.course.accuracy > 0 else np.inf
+        if transient <= self.course.accuracy * self.after:
+            trace = np.where(times > 0, self.after, self.at)
+            sinking = np.where(times > 0, self.depth[1], self.depth[0]) - self.line.cells.top
+            return jump._replace(trace=trace, depth=sinking, left_out=transient)
+        low, high = float(self.depth.min()), float(self.depth.max())
+        margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
+        for _ in range(SETTINGS.widenings):
+            found = self.march(jump, (max(low - margin, SHALLOW * low), high + margin), transient)
+            if found is not None:
+                return found
+            margin *= 4
+        return _failed(times, Outcome.DEPTH_NOT_FOUND)
 
+    def transient(self) -> float:
+        """Estimate the size of the transient: the difference of its ends alone does not bound one that crosses its end.
 
-def _between(
-    profile: Profile,
-    load: float,
-    reach: float,
-    ends: Ends,
-    times: FloatArray,
-    pace: Pace,
-    tolerances: tuple[float, float],
-) -> Jump | None:
-    """Solve the jump condition and follow the depth to its end, where it matters; None if it leaves its limits."""
-    before, after, accuracy = ends.before, ends.after, tolerances[0]
-    depth = np.array([ends.first.depth, ends.last.depth])
-    if _full(ends.first, profile) and _full(ends.last, profile):
-        return Jump(before, after, after, np.full(times.size, after), depth, 0, 0.0, CONVERGED)
-    sums = np.empty(SUMS)
-    rate, good = _release(profile, ends.first, reach, load, sums)
-    if not good:
-        return _failed(times, NOT_CONVERGED)
-    at = sums[DRAG]
-    # the difference of its ends alone does not bound a transient, which may cross its end
-    transient = abs(at - after) + abs(rate * sums[TILT]) + ends.by_depth
-    if transient <= accuracy * after:
-        return Jump(before, at, after, np.where(times > 0, after, at), depth, 0, transient, CONVERGED)
-    settled = max(tolerances[1], SHARE * accuracy * after / max(transient, 1e-300))
-    close = max(10 * tolerances[1], settled) * abs(depth[1] - depth[0])
-    course = np.empty((4, MOMENTS))
-    course[:, 0] = 0.0, depth[0], rate, at
-    aim = depth[1], after, close, settled
-    count, status = march(profile, ends.runs, ends.floor, ends.first, reach, load, pace, ends.limits, aim, *course)
-    if status != 0:
-        return _failed(times, NOT_CONVERGED) if status == 1 else None
-    moments, drag = course[0, :count], course[3, :count]
-    if moments[-1] >= LONG and abs(drag[-1] - after) > STRAY * np.ptp(drag):
-        return _failed(times, STRAYED)
-    return Jump(before, at, after, _at_times(moments, drag, times, after), depth, count, 0.0, CONVERGED)
+        To it come the friction of the depth's rate, and that of its change.
+        """
+        sums = np.empty(SWEEP_SUMS)
+        self.line.patches(self.depth[1], self.deborah[1], sums)
+        by_depth = abs(sums[DRAG_RATE] * (self.depth[1] - self.depth[0]))
+        return float(abs(self.at - self.after) + abs(self.rate * self.tilt) + by_depth)
+
+    def march(self, jump: Jump, limits: tuple[float, float], transient: float) -> Jump | None:
+        """Return the jump with what a march between two depths finds, or None if it leaves them."""
+        accuracy, course = self.course.accuracy, self.course
+        equilibrium = SETTINGS.equilibrium * (FINE_STEPS / course.per_decade) ** 3
+        settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
+        close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
+        found = Trajectory(*np.empty((4, SETTINGS.moments)))
+        for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
+            column[0] = value
+        marching = Marching(self.line.track, self.first, self.reachable(*limits), self.deborah[1], self.load, *limits)
+        work = workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
+        count, outcome = march(marching, self.pace, Aim(self.depth[1], self.after, close, settled), found, work)
+        if outcome == LEFT_LIMITS:
+            return None
+        time, depth, _, drag = (column[:count] for column in found)
+        strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > SETTINGS.stray * np.ptp(drag)
+        if outcome != Outcome.CONVERGED or strayed:
+            return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
+        ends = np.array([self.after, self.depth[1]])
+        trace, sinking = _at_times(time, np.stack([drag, depth]), course.times, ends)
+        return jump._replace(trace=trace, depth=sinking - self.line.cells.top, moments=count)
+
+    def reachable(self, low: float, high: float) -> Reachable:
+        """Return where elements can be in contact between two depths."""
+        slowest = self.line.patches(low, float(self.deborah.min()), np.empty(SWEEP_SUMS))
+        floor = np.empty(self.line.track.height.size)
+        _fill(self.line.track, slowest, floor)
+        active = high + self.line.track.peak > np.minimum(floor[:-1], floor[1:])
+        active[1:] |= active[:-1].copy()
+        active[:-1] |= active[1:].copy()
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
+        runs: IntArray = edges.reshape(-1, 2).astype(np.int64)
+        return Reachable(runs, floor)
 
 
 @njit(nogil=True, cache=True)
-def _release(profile: Profile, first: Patches, reach: float, load: float, sums: FloatArray) -> tuple[float, bool]:
-    """Solve the jump condition: the rate of the depth that carries the load right after the jump."""
-    rate = 0.0
-    for _ in range(60):
-        released(profile, first, reach, rate, sums)
-        if abs(sums[LOAD] - load) <= 1e-13 * load or sums[LENGTH] <= 0:
-            break
-        rate += (load - sums[LOAD]) / sums[LENGTH]
-    return rate, abs(sums[LOAD] - load) <= 1e-9 * load
+def _fill(track: Track, state: Patches, floor: FloatArray) -> None:
+    """Write the displacement of a steady state at the nodes."""
+    k, decay, flying = -1, np.exp(-1 / state.deborah), False
+    for i in range(floor.size):
+        while k + 1 < state.count and state.start[k + 1] <= i:
+            k += 1
+        if k < 0:
+            floor[i] = -np.inf
+        elif i <= state.end[k]:
+            floor[i], flying = state.depth + track.height[i], False
+        elif flying and state.start[k] <= i - 1:
+            floor[i] = floor[i - 1] * decay
+        else:
+            floor[i], flying = state.pressed[k] * np.exp(-(i - state.end[k]) / state.deborah), True
 
 
-def _full(state: Patches, profile: Profile) -> bool:
-    """Return whether all of a periodic line is in contact: then u = d + p, d is constant and nothing relaxes."""
-    return state.count == 1 and profile.periodic and state.end[0] - state.start[0] >= 1
-
-
-def _at_times(moments: FloatArray, drag: FloatArray, times: FloatArray, after: float) -> FloatArray:
-    """Interpolate over log time by a modified Akima curve, which no kink makes overshoot; linear in the first step."""
+def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray) -> FloatArray:
+    """Interpolate over log time by modified Akima curves, which no kink makes overshoot; linear in the first step."""
     scale = moments[1]
-    curve = Akima1DInterpolator(np.log1p(moments / scale), drag, method="makima")
-    trace: FloatArray = curve(np.log1p(times / scale))
-    trace[times > moments[-1]] = after
-    return trace
+    curves = Akima1DInterpolator(np.log1p(moments / scale), rows, axis=1, method="makima")
+    traces: FloatArray = curves(np.log1p(times / scale))
+    traces[:, times > moments[-1]] = after[:, None]
+    return traces

@@ -1,6 +1,7 @@
 """Fretting and sliding wear of a contact of revolution.
 
-Read `worn` first: what a worn contact is, its limit and the fast rule. `rules` are those compiled for many cases,
-`exact` and `forced` the exact evolution at constant depth and force (`evolution`, `gross_slip`, `forced_slip`,
-`forced_fast`), `history` blocks of load, `factor` the fit of one factor to measured wear.
+Read `worn` first: what a worn contact is, and how its error is told. `rules` has the limit and the fast rule,
+`forced_rule` the fast rule under constant force. The exact evolution: `exact` is its front end for every condition,
+`evolution` the stepping, `slip` and `forced_slip` the equations, `forced` the way under constant force. `history` has
+blocks of load, `factor` the fit of one factor to measured wear.
 """

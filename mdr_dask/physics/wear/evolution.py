@@ -1,34 +1,106 @@
-"""The exact evolution of a fretted or sliding contact of revolution at constant depth or constant force.
+"""How a worn contact evolves: steps of backward differentiation along fixed radii, for any kind of slip.
 
-Every radius remembers what it has gathered: in partial slip the logarithm of its slip s over the slip s0 of the virgin
-body, int p dN / eta; in gross slip its worn depth, int p ds. Beyond the contact that is exactly zero. The contact
-c < r < a is mapped onto graded panels in r^2, which follow the moving edge; each step is a stiff backward
-differentiation formula along fixed radii, solved by Newton's method for the image g and the edge together.
+Every radius remembers what it has gathered (see `Problem`). The contact is mapped onto graded panels in r^2, which
+follow the moving edge; each step is a stiff backward differentiation formula of order 1 to 3, solved for the image and
+the edge together by a Newton iteration that keeps its Jacobian as long as it converges.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
-from scipy.interpolate import CubicSpline
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.linear import solve_in_place
-from mdr_dask.physics.mdr.half_integrals import Panels, interpolate_weighted
-from mdr_dask.physics.mdr.revolution import Profile
-from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.linear import Factors, factorise, solve_in_place
+from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels
+from mdr_dask.physics.outcome import Outcome
 
 #: Local error of a BDF step of order 1, 2, 3 over its distance from the extrapolated past.
 _ERROR_SHARE = (1.0 / 3.0, 2.0 / 11.0, 3.0 / 25.0)
-_MOST_STEPS = 20000
-_MOST_ITERATIONS = 10
-#: Newton's method squares its error: what is left after so small a change is round-off.
-_LAST_CHANGE = 1e-7
+
+
+class Settings(NamedTuple):
+    """Tuned numbers of the march; `python -m benchmarks wear` measures them.
+
+    Parameters
+    ----------
+    most_steps, most_iterations : int
+        Where a march, and a step, give up.
+    growth : float
+        Largest ratio of one step to the last.
+    slow : float
+        Rate of convergence beyond which the Jacobian is renewed.
+    theta_ratio : float
+        How much longer or shorter a step may be than that of the Jacobian.
+    difference : float
+        Step of the differences by the edge and what follows it.
+    """
+
+    most_steps: int = 20000
+    most_iterations: int = 12
+    growth: float = 1.8
+    slow: float = 0.4
+    theta_ratio: float = 1.7
+    difference: float = 1e-7
+
+
+SETTINGS = Settings()
+
+
+class Resolution(NamedTuple):
+    """How finely an evolution is solved: panels and steps for an accuracy of f in eta d0.
+
+    Parameters
+    ----------
+    accuracy : float
+        The accuracy that the panels are chosen for.
+    wider : float
+        How much wider the steps' accuracy is.
+    fewer : int
+        Nodes that each panel, and halvings that each end, has less.
+    rough : tuple of float
+        How much wider the accuracy of two rougher solutions is, which tell the error.
+    """
+
+    accuracy: float
+    wider: float = 1.0
+    fewer: int = 0
+    rough: tuple[float, float] = (8.0, 64.0)
+
+    @property
+    def step(self) -> float:
+        """The error allowed in a step."""
+        return 0.2 * self.accuracy * self.wider
+
+    @property
+    def first(self) -> float:
+        """The length of the first step, over the time in which a contact changes."""
+        return 0.1 * self.accuracy * self.wider
+
+    def panels(self, near: int, fewest_digits: float = 2.0) -> Panels:
+        """Return panels, halved `near` times more towards the inner border than towards the edge."""
+        digits = max(-np.log10(self.accuracy), fewest_digits)
+        levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
+        order = 4 if self.accuracy > 3e-5 else 6
+        left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
+        return graded_panels(left, right, order - self.fewer)
+
+    def panels_of_a_punch(self) -> Panels:
+        """Return panels for a pressure that tends to a jump at the edge."""
+        halvings = round(2.0 * max(-np.log10(self.accuracy), 2.0)) - self.fewer
+        return graded_panels(halvings + 1, halvings + 4, 4 - self.fewer)
+
+    def halfway_to(self, finer: Resolution) -> Resolution:
+        """Return a resolution with steps between those of two."""
+        return self._replace(wider=float(np.sqrt(self.wider * finer.wider)))
+
+    def rougher(self) -> tuple[Resolution, Resolution]:
+        """Return the two rougher resolutions."""
+        first, second = self.rough
+        return self._replace(wider=first, fewer=1), self._replace(wider=second, fewer=2)
 
 
 class NotConvergedError(ArithmeticError):
@@ -44,28 +116,30 @@ class Moment:
     time : float
         Cycles N in partial slip, sliding path s in gross slip.
     unknowns : array, shape (n,)
-        The unknowns of the problem: values of the image at all nodes but the last, the edge a, in some problems more.
+        The unknowns of the problem: values of the image at all nodes but the last, the squared width of the panels over
+        that of the virgin contact, in some problems more. All are of the order of one.
     gathered : array, shape (n,)
         What the radii of the nodes have gathered; zero at the edge.
-    edge : float
-        a.
     """
 
     time: float
     unknowns: FloatArray
     gathered: FloatArray
-    edge: float
 
 
 class Problem(Protocol):
     """One kind of slip, as the equations of one step."""
 
     @property
+    def newton(self) -> float:
+        """Return the error of the solution of a step's equations over that of the step."""
+
+    @property
     def panels(self) -> Panels:
         """Return the panels between the inner border and the edge."""
 
-    def inner(self, unknowns: FloatArray) -> float:
-        """Return the radius of the inner border."""
+    def holds(self, unknowns: FloatArray) -> bool:
+        """Tell whether unknowns describe a contact."""
 
     def start(self) -> Moment:
         """Return the virgin contact."""
@@ -83,171 +157,14 @@ class Problem(Protocol):
         """Return its derivatives by the nodal unknowns."""
 
     def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the quantity in d0 whose step error is controlled."""
-
-
-class FixedBorder(ABC):
-    """What problems with a fixed inner border share: the memory of a radius is a value of a function on the panels."""
-
-    panels: Panels
-    inner_radius: float
-
-    def inner(self, unknowns: FloatArray) -> float:
-        """Return the radius of the inner border."""
-        return self.inner_radius
-
-    @abstractmethod
-    def gathered(self, unknowns: FloatArray) -> FloatArray:
-        """Return what the radii have gathered."""
-
-    def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
-        memories = np.array([moment.gathered for moment in past])
-        squares = np.array([moment.edge for moment in past]) ** 2 - self.inner_radius**2
-        last = self.panels.nodes.size - 1
-
-        def known(unknowns: FloatArray) -> FloatArray:
-            lengths = (unknowns[last] ** 2 - self.inner_radius**2) / squares
-            return interpolate_weighted(self.panels, memories, shares, lengths)
-
-        return known
-
-    def moment(
-        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
-    ) -> Moment:
-        """Return the moment that a solved step ends in."""
-        return Moment(time, unknowns, self.gathered(unknowns), float(unknowns[self.panels.nodes.size - 1]))
-
-
-@dataclass(frozen=True, eq=False)
-class PartialSlip(FixedBorder):
-    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and a.
-
-    `virgin` are the coefficients of a cubic spline of ln s0 over ln(r^2 - c^2) from `first` on, `step` apart.
-    """
-
-    profile: Profile
-    inner_radius: float
-    panels: Panels
-    first: float
-    step: float
-    virgin: FloatArray
-    eta: float
-
-    def radii(self, edge: float) -> FloatArray:
-        """Return the radii of the nodes for an edge."""
-        c = self.inner_radius
-        return np.asarray(np.sqrt(c * c + (edge - c) * (edge + c) * self.panels.nodes))
-
-    def start(self) -> Moment:
-        """Return the virgin contact."""
-        y = self.profile.rise(self.radii(1.0), self.inner_radius) / self.eta
-        return Moment(0.0, np.append(y[:-1], 1.0), np.zeros_like(y), 1.0)
-
-    def split(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """Return y at all nodes, the factor sqrt(L) / r that turns it into a half-integrand, and L = a^2 - c^2."""
-        a, c = unknowns[-1], self.inner_radius
-        length = (a - c) * (a + c)
-        y = unknowns.copy()
-        y[-1] = 1.0
-        return y, np.sqrt(length) / self.radii(a), length
-
-    def slip(self, unknowns: FloatArray) -> FloatArray:
-        """Return s at the nodes."""
-        y, factor, _ = self.split(unknowns)
-        return np.asarray(self.panels.inner @ (y * factor))
-
-    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
-        return np.asarray(self._rows(unknowns, theta, known)[0])
-
-    def _rows(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
-        rows, panels, table = np.empty((4, unknowns.size)), self.panels, (self.first, self.step, self.virgin)
-        _slip_rows(unknowns, self.inner_radius, panels.nodes, panels.inner, panels.outer, *table, theta, known, rows)
-        return rows
-
-    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
-        """Return the derivatives by y."""
-        result, size = np.empty((unknowns.size, unknowns.size)), unknowns.size
-        _, _, factor, slip = self._rows(unknowns, theta, np.zeros(size))
-        length = (unknowns[-1] - self.inner_radius) * (unknowns[-1] + self.inner_radius)
-        _slip_jacobian(self.panels.inner, self.panels.outer, factor, slip, theta / np.sqrt(length), result)
-        return result
-
-    def gathered(self, unknowns: FloatArray) -> FloatArray:
-        """Return ln(s / s0)."""
-        gain = np.asarray(self._rows(unknowns, 0.0, np.zeros_like(unknowns))[0])
-        gain[-1] = 0.0
-        return gain
-
-    def worn(self, unknowns: FloatArray) -> FloatArray:
-        """Return the slip times eta: the part of f that changes."""
-        return self.eta * self.slip(unknowns)
-
-    def wear_rate(self, unknowns: FloatArray) -> float:
-        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the dissipation of a cycle over mu."""
-        y, factor, length = self.split(unknowns)
-        return float(self.eta * np.sqrt(length) * self.panels.weights @ (y * (1.0 - y) * factor))
-
-
-@njit(nogil=True, cache=True)
-def _slip_rows(unknowns, c, nodes, inner, outer, first, step, coefficients, theta, known, rows):  # type: ignore[no-untyped-def]
-    """Put the residual of `PartialSlip`, y, the factor of `split` and the slip into the rows."""
-    size = nodes.size
-    residual, y, factor, slips = rows[0], rows[1], rows[2], rows[3]
-    a = unknowns[size - 1]
-    length = (a - c) * (a + c)
-    root = np.sqrt(length)
-    for i in range(size):
-        y[i] = unknowns[i] if i < size - 1 else 1.0
-        factor[i] = root / np.sqrt(c * c + length * nodes[i])
-    for i in range(size):
-        slip, pressure = 0.0, 0.0
-        for j in range(size):
-            slip += inner[i, j] * factor[j] * y[j]
-            pressure += outer[i, j] * y[j]
-        slips[i] = slip
-        place = np.log(length * nodes[i]) - first
-        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
-        virgin = coefficients[0, cell]
-        for power in range(1, 4):
-            virgin = virgin * (place - cell * step) + coefficients[power, cell]
-        gain = np.log(max(slip, 1e-300)) - virgin
-        residual[i] = gain - known[i] - theta * pressure / root if i < size - 1 else gain
-
-
-@njit(nogil=True, cache=True)
-def _slip_jacobian(inner, outer, factor, slip, share, result):  # type: ignore[no-untyped-def]
-    """Put the derivatives of `PartialSlip.residual` by y into `result`."""
-    size = factor.size
-    for i in range(size):
-        rate = share if i < size - 1 else 0.0
-        for j in range(size):
-            result[i, j] = inner[i, j] * factor[j] / slip[i] - rate * outer[i, j]
-
-
-def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
-    """Prepare partial slip: tabulate ln s0 over ln(r^2 - c^2) up to the radius `reach`.
-
-    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx, free of cancellation next to c.
-    """
-    c = stick_radius
-    eta = float(profile.rise(np.array(1.0), c))
-    smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
-    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 600)
-    r = np.sqrt(c * c + np.exp(table))
-    abscissa, weight = gauss(40)
-    span = np.arctan2(np.exp(0.5 * table), c)
-    x = np.maximum(r[:, None] * np.cos(span[:, None] * abscissa), c)
-    slip = 2.0 / np.pi * span * (profile.rise(x, c) @ weight) / eta
-    coefficients = np.ascontiguousarray(CubicSpline(table, np.log(slip)).c)
-    return PartialSlip(profile, c, panels, table[0], table[1] - table[0], coefficients, eta)
+        """Return the quantity, over what can wear, whose step error is controlled."""
 
 
 def march(
     problem: Problem,
     end: float,
     tolerance: float,
+    first: float,
     start: Moment | None = None,
     stops: Callable[[Any], bool] = lambda moment: False,
 ) -> list[Any]:
@@ -262,7 +179,9 @@ def march(
     end : float
         Time to reach.
     tolerance : float
-        Error of f in d0 allowed in one step.
+        Error of `Problem.worn` allowed in one step.
+    first : float
+        Length of the first step.
     start : Moment, optional
         Where to start from, in place of the virgin contact.
     stops : callable, Moment -> bool
@@ -278,41 +197,66 @@ def march(
     NotConvergedError
         If a step fails however short it is.
     """
+    newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
-    step = 0.1 * tolerance
+    step = first
     while history[-1].time < end and not stops(history[-1]):
-        if len(history) > _MOST_STEPS:
-            raise NotConvergedError(f"the wear law needed more than {_MOST_STEPS} steps")
-        moment, error = _try_step(problem, history, step)
+        if len(history) > SETTINGS.most_steps:
+            raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {SETTINGS.most_steps}")
+        time = history[-1].time
+        moment, error = _try_step(problem, newton, history, time + step)
         power = 1.0 / (min(len(history), 3) + 1)
         if moment is None or error > tolerance:
             step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
-            if step < 1e-13 * (1.0 + history[-1].time):
-                raise NotConvergedError(f"the wear law could not be advanced beyond {history[-1].time:.6g}")
+            if time + step == time or step < 1e-9 * first:
+                raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
             continue
         history.append(moment)
-        growth = min(1.8, 0.85 * (tolerance / max(error, 1e-300)) ** power)
+        growth = min(SETTINGS.growth, 0.85 * (tolerance / max(error, 1e-300)) ** power)
         step *= growth if growth > 1.1 or growth < 0.9 else 1.0
     return history
 
 
-def unknowns_at(history: Sequence[Moment], time: float) -> FloatArray:
-    """Return the unknowns at any time marched through, by the polynomial of the step that passed it."""
-    return _extrapolate(time, neighbours(history, time))
+def settled(problem: Problem) -> Any:
+    """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
+    virgin = problem.start()
+    known = problem.memory([virgin], np.zeros(1))
+    unknowns = _Newton(problem, 1e-9).solve(virgin.unknowns, 0.0, known)
+    return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
 
 
-def value_at(history: Sequence[Moment], values: FloatArray, time: float) -> float:
-    """Return a number known at all moments at any time marched through, as `unknowns_at` does."""
-    numbers = {id(m): float(v) for m, v in zip(history, values, strict=True)}
-    near = neighbours(history, time)
-    marked = [Moment(m.time, np.array([numbers[id(m)]]), m.gathered, m.edge) for m in near]
-    return float(_extrapolate(time, marked)[0])
+class Dense:
+    """A march as a function of time: each time by the polynomial of the step that passed it."""
 
+    def __init__(self, history: Sequence[Any]) -> None:
+        self.history = history
+        self.times = np.array([moment.time for moment in history])
 
-def neighbours(history: Sequence[Moment], time: float) -> Sequence[Moment]:
-    """Return the moment at or after a time and up to three before it."""
-    last = int(np.searchsorted([m.time for m in history], time))
-    return history[max(last - 3, 0) : last + 1]
+    def steps(self, time: float) -> int:
+        """Return the number of steps up to the one that passed a time."""
+        return int(np.searchsorted(self.times, time))
+
+    def near(self, time: float) -> tuple[Sequence[Any], FloatArray]:
+        """Return the moment at or after a time with up to three before it, and their weights."""
+        last = self.steps(time)
+        near = slice(max(last - 3, 0), last + 1)
+        return self.history[near], _lagrange(self.times[near], time)
+
+    def unknowns(self, time: float) -> FloatArray:
+        """Return the unknowns at a time."""
+        moments, weights = self.near(time)
+        return np.asarray(weights @ np.array([moment.unknowns for moment in moments]))
+
+    def gathered(self, time: float) -> FloatArray:
+        """Return what the nodes have gathered at a time."""
+        moments, weights = self.near(time)
+        return np.asarray(weights @ np.array([moment.gathered for moment in moments]))
+
+    def number(self, time: float, numbers: FloatArray) -> float:
+        """Return a number known at all moments at a time."""
+        last = self.steps(time)
+        near = slice(max(last - 3, 0), last + 1)
+        return float(_lagrange(self.times[near], time) @ numbers[near])
 
 
 def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatArray:
@@ -326,61 +270,80 @@ def integral_along(history: Sequence[Moment], rates: Sequence[float]) -> FloatAr
     return total
 
 
-def settled(problem: Problem) -> Any:
-    """Return the virgin contact as the panels see it, so that the first step starts without a jump."""
-    virgin = problem.start()
-    known = problem.memory([virgin], np.zeros(1))
-    unknowns = _newton(problem, virgin.unknowns, 0.0, known)
-    return virgin if unknowns is None else problem.moment(0.0, unknowns, 0.0, known(unknowns), [virgin])
-
-
-def _try_step(problem: Problem, history: Sequence[Moment], length: float) -> tuple[Moment | None, float]:
+def _try_step(problem: Problem, newton: _Newton, history: Sequence[Moment], time: float) -> tuple[Moment | None, float]:
     """Make one step of the highest order that the past allows; return None if Newton's method fails."""
-    time = history[-1].time + length
     past = list(history[-1:-4:-1])
     order = len(past)
     shares = _backward_shares([time, *(m.time for m in past)])
     theta, shares = 1.0 / shares[0], -shares[1:] / shares[0]
-    guess = _extrapolate(time, history[-1 : -order - 2 : -1])
     known = problem.memory(past, shares)
-    unknowns = _newton(problem, guess, theta, known)
+    near = history[-1 : -order - 2 : -1]
+    guess = _lagrange(np.array([m.time for m in near]), time) @ np.array([m.unknowns for m in near])
+    if not problem.holds(guess):
+        guess = past[0].unknowns
+    unknowns = newton.solve(guess, theta, known)
     if unknowns is None:
-        unknowns = _newton(problem, past[0].unknowns.copy(), theta, known)
+        unknowns = newton.solve(past[0].unknowns, theta, known)
     if unknowns is None:
         return None, np.inf
     gap = np.max(np.abs(problem.worn(unknowns) - problem.worn(guess)))
     return problem.moment(time, unknowns, theta, known(unknowns), past), float(gap) * _ERROR_SHARE[order - 1]
 
 
-def _newton(
-    problem: Problem, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]
-) -> FloatArray | None:
-    """Solve one step; columns of the edge and what follows it are differences, renewed twice."""
-    nodes = problem.panels.nodes.size
-    unknowns = guess.copy()
-    columns = np.empty((unknowns.size, unknowns.size - nodes + 1))
-    for iteration in range(_MOST_ITERATIONS):
-        past = known(unknowns)
-        residual = problem.residual(unknowns, theta, past)
-        matrix = problem.jacobian(unknowns, theta)
-        for column in range(nodes - 1, unknowns.size):
-            if iteration < 3:
-                moved = unknowns.copy()
-                moved[column] += 1e-7
-                shifted = problem.residual(moved, theta, known(moved))
-                columns[:, column - nodes + 1] = (shifted - residual) / 1e-7
-            matrix[:, column] = columns[:, column - nodes + 1]
-        if not (np.all(np.isfinite(matrix)) and np.all(np.isfinite(residual))):
-            return None
-        change = -residual
-        if not solve_in_place(matrix, change):
-            return None
-        unknowns += change
-        if not unknowns[nodes - 1] > problem.inner(unknowns) >= 0.0:
-            return None
-        if np.max(np.abs(change)) < _LAST_CHANGE:
-            return unknowns if np.all(np.isfinite(problem.worn(unknowns))) else None
-    return None
+class _Newton:
+    """Newton's method with a Jacobian that is kept from step to step while it converges."""
+
+    def __init__(self, problem: Problem, tolerance: float) -> None:
+        self.problem, self.enough = problem, problem.newton * tolerance
+        self.factors: Factors | None = None
+        self.theta = np.nan
+
+    def solve(self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray]) -> FloatArray | None:
+        """Solve one step from a guess; None if that fails."""
+        ratio = theta / self.theta if self.theta else np.nan
+        if self.factors is not None and 1.0 / SETTINGS.theta_ratio < ratio < SETTINGS.theta_ratio:
+            found = self._iterate(guess, theta, known, fresh=False)
+            if found is not None:
+                return found
+        return self._iterate(guess, theta, known, fresh=True)
+
+    def _iterate(
+        self, guess: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], *, fresh: bool
+    ) -> FloatArray | None:
+        """Iterate; with a fresh Jacobian it is renewed whenever convergence is slow, else slow is failure."""
+        unknowns, last, renew = guess.copy(), np.inf, fresh
+        for _ in range(SETTINGS.most_iterations):
+            residual = self.problem.residual(unknowns, theta, known(unknowns))
+            if renew:
+                self._renew(unknowns, theta, known, residual)
+            if self.factors is None:
+                return None
+            change = self.factors.solve(residual)
+            unknowns = unknowns - change
+            size = float(np.max(np.abs(change)))
+            if not (np.isfinite(size) and self.problem.holds(unknowns)):
+                return None
+            rate = size / last
+            left = size * rate / (1.0 - rate) if 0.0 < rate < 0.5 else size
+            if left < self.enough:
+                return unknowns
+            renew = rate > SETTINGS.slow
+            if renew and not fresh:
+                return None
+            last = size
+        return None
+
+    def _renew(
+        self, unknowns: FloatArray, theta: float, known: Callable[[FloatArray], FloatArray], residual: FloatArray
+    ) -> None:
+        """Factorise the Jacobian; columns of the edge and what follows it are differences."""
+        matrix = self.problem.jacobian(unknowns, theta)
+        for column in range(self.problem.panels.nodes.size - 1, unknowns.size):
+            moved = unknowns.copy()
+            moved[column] += SETTINGS.difference
+            shifted = self.problem.residual(moved, theta, known(moved))
+            matrix[:, column] = (shifted - residual) / SETTINGS.difference
+        self.factors, self.theta = factorise(matrix), theta
 
 
 def _backward_shares(times: Sequence[float]) -> FloatArray:
@@ -393,10 +356,10 @@ def _backward_shares(times: Sequence[float]) -> FloatArray:
     return target
 
 
-def _extrapolate(time: float, past: Sequence[Moment]) -> FloatArray:
-    """Return the unknowns of the polynomial through the past moments at a time."""
-    result = np.zeros_like(past[0].unknowns)
-    for moment in past:
-        others = [other.time for other in past if other is not moment]
-        result += moment.unknowns * np.prod([(time - t) / (moment.time - t) for t in others])
-    return result
+def _lagrange(times: FloatArray, time: float) -> FloatArray:
+    """Return the weights of the polynomial through the times at another time."""
+    gaps = times[:, None] - times
+    np.fill_diagonal(gaps, 1.0)
+    shares = np.broadcast_to(time - times, gaps.shape).copy()
+    np.fill_diagonal(shares, 1.0)
+    return np.asarray(np.prod(shares / gaps, axis=1))

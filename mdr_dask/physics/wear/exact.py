@@ -1,256 +1,216 @@
-"""Worn contacts by the exact evolution, with an error estimate: fretting at constant depth, and sliding."""
+"""Worn contacts by the exact evolution, with their errors: fretting at constant depth or force, and sliding.
+
+One front end for the three conditions. Each is solved three times, on ever coarser panels in ever longer steps, and the
+distances tell the error.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels, interpolate
+from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile
-from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear import evolution
-from mdr_dask.physics.wear.gross_slip import GrossSlip
-from mdr_dask.physics.wear.worn import Worn, check_stick_radius, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear.evolution import Dense, NotConvergedError, Resolution, integral_along, march
+from mdr_dask.physics.wear.forced import border_moves, forced_contacts, forced_end, forced_resolution
+from mdr_dask.physics.wear.rules import limit, limit_radius
+from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
+from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
-#: Error over the distance from a solution with a four times wider tolerance: it falls about as the tolerance's square
-#: root, sometimes as its cube root.
-_SAFETY = 1.5
-
-
-@dataclass(frozen=True, eq=False)
-class Fretted(Worn):
-    """A worn contact that also knows the energy lost: `wear_volume` from the shape, `energy_volume` from the slip.
-
-    Parameters
-    ----------
-    energy_volume : float
-        The energy dissipated since the first cycle over mu, in units in which it equals the wear volume.
-    steps : int
-        Time steps taken.
-    """
-
-    energy_volume: float = np.nan
-    steps: int = 0
+Found = TypeVar("Found")
+Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
 
-def exact(profile: Profile, stick_radius: float, cycles: Sequence[float], tolerance: float = 1e-4) -> list[Fretted]:
-    """Return the worn contact after each number of cycles, by the exact rule df/dN = p (f - f_star) / eta.
-
-    Parameters
-    ----------
-    profile : Profile
-        The virgin body.
-    stick_radius : float
-        c, between 0 and 1.
-    cycles : sequence of float
-        N >= 0, in units of N0; any order.
-    tolerance : float
-        Error of f wanted, in eta d0, the scale of what can wear; below 1e-5 round-off gathered over the steps grows.
-
-    Returns
-    -------
-    list of Fretted
-        In the order of `cycles`. The error is 1.5 times the distance from a solution with a four times wider
-        tolerance.
-
-    Raises
-    ------
-    ValueError
-        Without partial slip, or if the scar would leave the table of the profile.
-    NotConvergedError
-        If the evolution cannot be advanced.
-    """
-    check_stick_radius(stick_radius)
-    wanted = sorted({float(n) for n in cycles if n > 0.0})
-    fine = _fretted(profile, stick_radius, wanted, tolerance)
-    coarse = _fretted(profile, stick_radius, wanted, 4.0 * tolerance)
-    judged = {n: replace(fine[n], error=_SAFETY * _distance(fine[n], coarse[n])) for n in fine}
-    return [judged[float(n)] for n in cycles]
-
-
-def exact_without_error(profile: Profile, stick_radius: float, cycles: float, tolerance: float = 1e-4) -> Fretted:
-    """Return one worn contact as `exact` does, at a fifth less cost, without the estimate of its error (NaN)."""
-    check_stick_radius(stick_radius)
-    return replace(_fretted(profile, stick_radius, [cycles], tolerance)[cycles], error=np.nan)
-
-
-@dataclass(frozen=True, eq=False)
-class Slid:
-    """A contact worn by gross slip.
-
-    Parameters
-    ----------
-    contact_radius, depth, wear_volume, normal_force : float
-        a, d, V (from the shape), F_N.
-    force_path : float
-        int F_N ds, equal to V.
-    radius, height, image, pressure : array
-        r, f, g, p at the nodes, the last of which is the edge.
-    profile : Profile
-        The virgin body.
-    panels : Panels
-        Interpolation between the nodes.
-    worn_depth : float
-        Largest f - f0.
-    error : float
-        Error expected of f, in d0: 1.5 times the distance from a solution with a four times wider tolerance.
-    stick_radius : float
-        0: everything slips.
-    """
-
-    contact_radius: float
-    depth: float
-    wear_volume: float
-    normal_force: float
-    force_path: float
-    radius: FloatArray
-    height: FloatArray
-    image: FloatArray
-    pressure: FloatArray
-    profile: Profile
-    panels: Panels
-    worn_depth: float
-    error: float = np.nan
-    stick_radius: float = 0.0
-
-    def curve(self, name: str, place: FloatArray) -> FloatArray:
-        """Return height, image or pressure anywhere; beyond the contact f = f0, p = 0 and the image is NaN."""
-        share = (place / self.contact_radius) ** 2
-        virgin = {"height": self.profile.height, "image": self.profile.image}.get(name, np.zeros_like)
-        inner = interpolate(self.panels, getattr(self, name) - virgin(self.radius), np.minimum(share, 1.0 - 1e-15))
-        beyond = np.nan if name == "image" else 0.0
-        return np.asarray(virgin(place) + np.where(share < 1.0, inner, beyond))
-
-
-def gross(
-    profile: Profile, paths: Sequence[float], *, constant_force: bool = False, tolerance: float = 1e-4
-) -> list[Slid]:
-    """Return the contact after sliding, df/ds = p in all of the contact.
+def exact(
+    profile: Profile,
+    stick_radius: float,
+    amounts: Sequence[float],
+    accuracy: float = 1e-3,
+    *,
+    constant_force: bool = False,
+    errors: bool = True,
+) -> list[Worn]:
+    """Return the worn contact after each amount of wear, by the exact rule df/dN = p (f - f_star) / eta.
 
     Parameters
     ----------
     profile : Profile
         The virgin body, pressed to the depth 1.
-    paths : sequence of float
-        s = k E* l / (sigma0 a0) >= 0.
+    stick_radius : float
+        c of the virgin contact, between 0 and 1; 0 is gross slip in one direction, df/ds = p in all of the contact.
+    amounts : sequence of float
+        Cycles N >= 0 in units of N0, or sliding paths s = k E* l / (sigma0 a0); any order.
+    accuracy : float
+        Error of f wanted, in eta d0, the scale of what can wear; below 1e-5 round-off gathered over the steps grows.
     constant_force : bool
         Keep the force of the virgin contact instead of its depth.
-    tolerance : float
-        Error of f in one time step, in d0.
+    errors : bool
+        Whether to estimate the errors, at about the same cost again.
 
     Returns
     -------
-    list of Slid
-        One for each path.
+    list of Worn
+        In the order of `amounts`; one does not depend on what else is asked for.
+
+    Raises
+    ------
+    ValueError
+        If the scar would leave the table of the profile.
+    NotConvergedError
+        If the evolution cannot be advanced.
     """
-    fine = _sliding(profile, paths, constant_force, tolerance)
-    coarse = _sliding(profile, paths, constant_force, 4.0 * tolerance)
-    return [replace(one, error=_SAFETY * _slid_distance(one, other)) for one, other in zip(fine, coarse, strict=True)]
+    solve: Solver
+    if stick_radius == 0.0:
+        solve = _slid_under_force if constant_force else _slid
+    else:
+        check_stick_radius(stick_radius)
+        solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
+    wanted = sorted({float(amount) for amount in amounts})
+    resolution = forced_resolution(accuracy) if solve is forced_contacts else Resolution(accuracy)
+    found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
+    judged = {amount: replace(found[amount], rougher=tuple(one[amount] for one in rougher)) for amount in wanted}
+    return [judged[float(amount)] for amount in amounts]
 
 
-def _sliding(profile: Profile, paths: Sequence[float], constant_force: bool, tolerance: float) -> list[Slid]:
-    """Solve once and describe every path.
+def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
+    """Return the shape that ends all wear under constant force.
 
-    Under constant force the pressure tends to a jump at the edge: short panels there, and steps no finer than the
-    panels, or the steps follow the panels' noise.
+    Once the image jumps at the border, the border stands and what sticks is frozen, so that the end is known. Only the
+    way to the jump needs the evolution. Parameters and errors are those of `exact`.
     """
-    panels, step_error, force = _panels(tolerance, 0.3), 0.2 * tolerance, None
-    if constant_force:
-        doubled = round(2.0 * max(-np.log10(tolerance), 2.0))
-        panels, step_error = graded_panels(doubled + 1, doubled + 4, 4), tolerance
-        virgin = GrossSlip(profile, panels)
-        force = virgin.normal_force(virgin.start().unknowns)
-    problem = GrossSlip(profile, panels, force)
-    history = evolution.march(problem, max(paths), step_error)
-    loads = evolution.integral_along(history, [problem.normal_force(m.unknowns) for m in history])
-    return [
-        _slid(problem, evolution.unknowns_at(history, path), evolution.value_at(history, loads, path)) for path in paths
-    ]
+    check_stick_radius(stick_radius)
+    if not border_moves(stick_radius, accuracy):
+        return limit(profile, stick_radius)
+    resolution = forced_resolution(accuracy)
+    found, *rougher = _solutions(lambda one: forced_end(profile, stick_radius, one), resolution, errors)
+    return replace(found, rougher=tuple(rougher))
 
 
-def _slid_distance(fine: Slid, coarse: Slid) -> float:
-    """Return the largest difference of two worn profiles at the nodes of the finer."""
-    return float(np.max(np.abs(fine.height - coarse.curve("height", fine.radius))))
+def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:
+    """Solve at a resolution, and twice rougher; a rougher way that cannot be gone is gone in shorter steps."""
+    found = [solve(resolution)]
+    for rough in resolution.rougher() if errors else ():
+        try:
+            found.append(solve(rough))
+        except NotConvergedError:
+            found.append(solve(rough.halfway_to(resolution)))
+    return found
 
 
-def _slid(problem: GrossSlip, unknowns: FloatArray, force_path: float) -> Slid:
-    image, a, depth = problem.split(unknowns)
-    gathered = problem.gathered(unknowns)
-    return Slid(
-        contact_radius=a,
-        depth=depth,
-        wear_volume=np.pi * a * a * float(problem.panels.weights @ gathered),
-        normal_force=problem.normal_force(unknowns),
-        force_path=force_path,
-        radius=problem.radii(a),
-        height=problem.worn(unknowns),
-        image=image,
-        pressure=problem.pressure(unknowns),
-        profile=problem.profile,
-        panels=problem.panels,
-        worn_depth=float(np.max(gathered)),
-    )
-
-
-def _panels(tolerance: float, smallest: float) -> Panels:
-    """Choose panels fine enough for a tolerance; next to the inner border they resolve the length `smallest`."""
-    digits = max(-np.log10(tolerance), 2.0)
-    levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
-    near = round(-2.0 * np.log2(smallest))
-    order = 4 if tolerance > 3e-5 else 6
-    return graded_panels(levels + near, levels, order)
-
-
-def _fretted(profile: Profile, c: float, wanted: Sequence[float], tolerance: float) -> dict[float, Fretted]:
-    """Solve once and describe every wanted time."""
-    panels = _panels(tolerance, c)
+def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
+    """Solve fretting at constant depth once and describe every wanted time."""
     reach = limit_radius(profile, c)
-    problem = evolution.partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
-    history = evolution.march(problem, max(wanted, default=0.0), 0.2 * tolerance * problem.eta)
-    energy = evolution.integral_along(history, [problem.wear_rate(m.unknowns) for m in history])
-    result = {}
-    for time in (0.0, *wanted):
-        unknowns = evolution.unknowns_at(history, time)
-        steps = int(np.searchsorted([m.time for m in history], time))
-        spent = evolution.value_at(history, energy, time)
-        result[time] = replace(_describe(problem, unknowns, time), energy_volume=spent, steps=steps)
-    return result
+    panels = resolution.panels(round(-2.0 * np.log2(c)))
+    problem = partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
+    dense = Dense(march(problem, max(wanted), resolution.step, resolution.first * np.sqrt(problem.virgin_width)))
+    energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
+    return {time: _fretted_contact(problem, dense, time, dense.number(time, energy)) for time in wanted}
 
 
-def _describe(problem: evolution.PartialSlip, unknowns: FloatArray, time: float) -> Fretted:
-    """Turn the nodal values at one time into a worn contact."""
-    c, a, panels = problem.inner_radius, float(unknowns[-1]), problem.panels
-    profile, eta = problem.profile, problem.eta
-    y, _, length = problem.split(unknowns)
+def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
+    """Turn the nodal values at one time into a worn contact.
+
+    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is; over the root of r^2 - c^2
+    it is smooth next to c, before and after the image has jumped there.
+    """
+    profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
+    unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
+    width, (y, factor), root = problem.width(unknowns), problem.image(unknowns), np.sqrt(panels.nodes)
+    a = float(np.sqrt(c * c + width))
+    rooted = eta * np.exp(problem.virgin_slip(width * panels.nodes)) * np.expm1(dense.gathered(time)) / root
     slope = panels.slope @ y
 
     def place(x: FloatArray) -> FloatArray:
-        return np.clip((x - c) * (x + c) / length, 0.0, 1.0 - 1e-15)
+        return np.asarray((x - c) * (x + c) / width)
 
-    def change(x: FloatArray) -> FloatArray:
-        shares = interpolate(panels, y, place(x).ravel()).reshape(x.shape)
-        return np.asarray(eta * shares - profile.rise(x, c))
+    def height(radius: FloatArray) -> FloatArray:
+        result, z = profile.height(radius), place(radius)
+        scar = (z > 0.0) & (z < 1.0)
+        result[scar] += np.sqrt(z[scar]) * interpolate(panels, rooted, z[scar])
+        return result
 
-    def change_slope(x: FloatArray) -> FloatArray:
-        slopes = interpolate(panels, slope, place(x).ravel()).reshape(x.shape)
-        return np.asarray(2.0 * eta * x / length * slopes - profile.image_slope(x))
+    def nodal(values: FloatArray, x: FloatArray) -> FloatArray:
+        return interpolate(panels, values, np.clip(place(x), 0.0, 1.0 - 1e-15).ravel()).reshape(x.shape)
 
-    breaks = tuple(float(x) for x in np.sqrt(c * c + length * panels.edges[1:-1]))
-    abscissa, weight = gauss(32)
-    stuck = 2.0 * c * float((1.0 - profile.image(c * abscissa)) @ weight)
-    slipping = float(np.sqrt(length) * eta * panels.weights @ ((1.0 - y) * np.sqrt(length) / problem.radii(a)))
-    volume = worn_volume(change, c, a, breaks) if time > 0.0 else 0.0
-    return Fretted(profile, c, a, a, volume, stuck + slipping, 0.0, change, change_slope, breaks)
+    scar = Scar(
+        c,
+        a,
+        lambda x: np.asarray(eta * nodal(y, x) - profile.rise(x - c, c)),
+        lambda x: np.asarray(2.0 * eta * x / width * nodal(slope, x) - profile.image_slope(x)),
+        tuple(float(x) for x in np.sqrt(c * c + width * panels.edges[1:-1])),
+    )
+    sticking = 2.0 * virgin_load(profile, c)
+    slipping = float(np.sqrt(width) * eta * panels.weights @ ((1.0 - y) * factor))
+    fine = np.sqrt(c * c + width * np.linspace(0.0, 1.0, 200, endpoint=False))
+    return Worn(
+        contact_radius=a,
+        stick_border=c,
+        depth=1.0,
+        normal_force=sticking + slipping,
+        wear_volume=float(np.pi * width * panels.weights @ (rooted * root)),
+        worn_depth=float(np.max(height(fine) - profile.height(fine))),
+        height=height,
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, a, 1.0, c),
+        energy_volume=energy,
+        steps=dense.steps(time),
+    )
 
 
-def _distance(fine: Worn, coarse: Worn) -> float:
-    """Return the largest difference of two worn profiles."""
-    c = fine.stick_radius
-    r = c + (fine.contact_radius - c) * np.sin(0.5 * np.pi * np.arange(1, 80) / 80.0) ** 4
-    first = worn_height(fine.change, c, r, fine.breaks)
-    outer = r < coarse.contact_radius
-    second = np.where(outer, worn_height(coarse.change, c, r, coarse.breaks), 0.0)
-    return float(np.max(np.abs(first - second)))
+def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
+    """Solve gross slip at constant depth."""
+    return _slid_contacts(GrossSlip(profile, resolution.panels(3)), wanted, resolution.step, resolution.first)
+
+
+def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
+    """Solve gross slip at constant force.
+
+    The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps
+    follow the panels' noise.
+    """
+    panels = resolution.panels_of_a_punch()
+    virgin = GrossSlip(profile, panels)
+    problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
+    return _slid_contacts(problem, wanted, 5.0 * resolution.step, resolution.first)
+
+
+def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, first: float) -> dict[float, Worn]:
+    """March once and describe every wanted path."""
+    dense = Dense(march(problem, max(wanted), step, first))
+    energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
+    return {path: _slid_contact(problem, dense, path, dense.number(path, energy)) for path in wanted}
+
+
+def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) -> Worn:
+    """Turn the nodal values after one path into a worn contact; its image is not known beyond the contact."""
+    profile, panels = problem.profile, problem.panels
+    unknowns, gathered = (dense.unknowns(path), dense.gathered(path)) if path > 0.0 else (problem.start().unknowns, 0.0)
+    worn = np.zeros(panels.nodes.size) + gathered
+    (image, depth), width, radii = problem.image(unknowns), problem.width(unknowns), problem.radii(unknowns)
+
+    def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
+        def function(place: FloatArray) -> FloatArray:
+            share = place**2 / width
+            within = interpolate(panels, values, np.minimum(share, 1.0 - 1e-15))
+            return np.where(share < 1.0, within, beyond)
+
+        return function
+
+    depths, changes = inside(worn, 0.0), inside(image - profile.image(radii), np.nan)
+    return Worn(
+        contact_radius=float(np.sqrt(width)),
+        stick_border=0.0,
+        depth=depth,
+        normal_force=problem.normal_force(unknowns),
+        wear_volume=energy,  # int F ds exactly
+        worn_depth=float(np.max(worn)),
+        height=lambda r: np.asarray(profile.height(r) + depths(r)),
+        image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
+        pressure=inside(problem.rate(unknowns), 0.0),
+        energy_volume=energy,
+        steps=dense.steps(path),
+    )

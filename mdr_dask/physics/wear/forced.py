@@ -1,245 +1,268 @@
-"""Worn contacts under constant force: exact, their end, and the fast rule with the depth that keeps the force.
+"""The exact evolution under constant force: while the border moves, while it stands, and the end.
 
-See `mdr_dask.physics.wear.forced_slip` for the equations. Units are those of the virgin contact, as in
-`mdr_dask.physics.wear.worn`; the force kept is that of the virgin contact under the depth d0.
+See `mdr_dask.physics.wear.forced_slip` for the equations; the force kept is that of the virgin contact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.mdr.half_integrals import graded_panels, interpolate
+from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
-from mdr_dask.physics.wear import evolution
-from mdr_dask.physics.wear.exact import Fretted
-from mdr_dask.physics.wear.forced_slip import ForcedSlip, Pressed, forced_slip, virgin_areas
-from mdr_dask.physics.wear.worn import Worn, check_stick_radius, worn_height, worn_volume
-
-#: The border stands when y rises so far in the panel next to it, or a tenth of it and the border would return.
-_JUMP = 0.1
-#: Stick radius below which the panels become no finer: the border soon leaves it.
-_NEAREST = 0.1
-#: Error over the distance from a solution with a four times wider tolerance.
-_SAFETY = 3.0
-#: Wider steps than this tolerance asks for do not follow the edge.
-_COARSEST = 1e-3
-#: N by which the image jumps at the border, with much to spare.
-_LATEST_JUMP = 1e3
-
-
-@dataclass(frozen=True, eq=False)
-class _March:
-    """Both parts of an evolution: while the border moves, and while it stands."""
-
-    moving: ForcedSlip
-    first: list[Pressed]
-    standing: ForcedSlip
-    second: list[Pressed]
-
-    def parts(self, time: float) -> tuple[ForcedSlip, list[Pressed]]:
-        """Return the problem and the moments that a time belongs to."""
-        return (self.moving, self.first) if time <= self.first[-1].time else (self.standing, self.second)
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear.evolution import Dense, Resolution, integral_along, march, settled
+from mdr_dask.physics.wear.forced_slip import ForcedSlip, Pressed, forced_slip, rising
+from mdr_dask.physics.wear.worn import (
+    Scar,
+    Worn,
+    contact_pressure,
+    largest_wear,
+    virgin_load,
+    worn_height,
+    worn_image,
+    worn_profile,
+    worn_volume,
+)
 
 
-def exact_forced(
-    profile: Profile, stick_radius: float, cycles: Sequence[float], tolerance: float = 1e-4
-) -> list[Fretted]:
-    """Return the worn contact after each number of cycles under constant force, by the exact rule.
+class Settings(NamedTuple):
+    """Tuned numbers of the two parts of the evolution.
 
     Parameters
     ----------
-    profile : Profile
-        The virgin body.
-    stick_radius : float
-        The first c, between 0 and 1.
-    cycles : sequence of float
-        N >= 0, in units of N0 of the virgin contact; any order.
-    tolerance : float
-        Error of depth and border wanted, in eta d0, at most 1e-3; f rises as a root at the border and is less exact
-        there.
-
-    Returns
-    -------
-    list of Fretted
-        In the order of `cycles`, with depth and border. The error is 3 times the distance from a solution with a
-        four times wider tolerance, or the tolerance if that is more.
-
-    Raises
-    ------
-    ValueError
-        Without partial slip, or if the scar would leave the table of the profile in the end.
-    NotConvergedError
-        If the evolution cannot be advanced.
+    jump : float
+        The border stands when y rises so far in the panel next to it, or a tenth of it and the border would return.
+    nearest : float
+        Stick radius below which the panels become no finer: the border soon leaves it.
+    finer : int
+        How many more halvings the border needs than at constant depth.
+    latest_jump : float
+        N by which the image jumps at the border, with much to spare.
+    torn : float
+        The image is torn where y falls below minus this: the border stands from the moment before.
+    coarsest : float
+        Accuracy beyond which steps do not follow the border.
+    rougher : tuple of float
+        How much wider the accuracy of the two rougher solutions is.
     """
-    check_stick_radius(stick_radius)
-    wanted = sorted({float(n) for n in cycles})
-    fine, coarse = (_forced(profile, stick_radius, wanted, t) for t in _tolerances(tolerance))
-    judged = {n: replace(fine[n], error=_error(profile, fine[n], coarse[n], tolerance)) for n in wanted}
-    return [judged[float(n)] for n in cycles]
+
+    jump: float = 0.1
+    nearest: float = 0.1
+    finer: int = 5
+    latest_jump: float = 1e3
+    torn: float = 1e-2
+    coarsest: float = 1e-3
+    rougher: tuple[float, float] = (2.0, 4.0)
 
 
-def limit_forced(profile: Profile, stick_radius: float, tolerance: float = 1e-4) -> Worn:
-    """Return the shape that ends all wear under constant force.
+SETTINGS = Settings()
 
-    Once the image jumps at the border c, the border stands and what sticks is frozen, so that the end is known: g = d
-    beyond c, with the depth d = (F/2 + int_0^c g dx) / c under which the stick zone carries the force alone, and the
-    scar's radius from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0. Only c and the frozen g need the evolution, up to the
-    jump.
 
-    Parameters, errors and the error estimate are those of `exact_forced`.
+def forced_contacts(
+    profile: Profile, stick_radius: float, wanted: Sequence[float], resolution: Resolution
+) -> dict[float, Worn]:
+    """Solve once and describe every wanted time."""
+    moving, first = _until_jump(profile, stick_radius, resolution)
+    _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
+    standing, start = moving.stand(first[-1])
+    second = march(standing, max(wanted), resolution.step, _first(moving, resolution), start)
+    early, late = Dense(first), Dense(second)
+    energy = integral_along(first, [moving.wear_rate(moment.unknowns) for moment in first])
+    more = energy[-1] + integral_along(second, [standing.wear_rate(moment.unknowns) for moment in second])
+    contacts = {}
+    for time in wanted:
+        if time <= first[-1].time:
+            contacts[time] = _contact(moving, early, time, early.number(time, energy), early.steps(time))
+        else:
+            steps = len(first) + late.steps(time)
+            contacts[time] = _contact(standing, late, time, late.number(time, more), steps)
+    return contacts
+
+
+def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) -> Worn:
+    """Return what a contact ends in under constant force.
+
+    What sticks is frozen and carries the force alone: g = d beyond the border b, with d = (F/2 + int_0^b g dx) / b, and
+    the scar's radius from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
-    check_stick_radius(stick_radius)
-    fine, coarse = (_end(*_jumped(profile, stick_radius, t)) for t in _tolerances(tolerance))
-    return replace(fine, error=_error(profile, fine, coarse, tolerance))
+    problem, moments = _until_jump(profile, stick_radius, resolution)
+    return _end(problem, moments[-1])
 
 
-def _tolerances(tolerance: float) -> tuple[float, float]:
-    """Return the tolerance of the answer, and of the solution that it is judged by."""
-    fine = min(tolerance, _COARSEST)
-    return fine, 4.0 * fine
+def forced_resolution(accuracy: float) -> Resolution:
+    """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
+    return Resolution(min(accuracy, SETTINGS.coarsest), rough=SETTINGS.rougher)
 
 
-def _problem(profile: Profile, stick_radius: float, tolerance: float) -> ForcedSlip:
-    """Prepare the evolution, with panels fine enough for a tolerance."""
-    digits = max(-np.log10(tolerance), 3.0)
-    levels = round(2.7 * digits - 3.3)
-    near = round(-2.0 * np.log2(max(stick_radius, _NEAREST)))
-    panels = graded_panels(levels + near + 5, levels, 4 if tolerance > 3e-5 else 6)
-    return forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
+def border_moves(stick_radius: float, accuracy: float) -> bool:
+    """Tell whether constant force is not constant depth to an accuracy: next to full stick the border hardly moves.
+
+    The depth grows by up to (1 - c) eta / 2, the square of the border by the same share of 1 - c^2, and f next to it by
+    the root of that share.
+    """
+    return 0.5 * (1.0 - stick_radius) > accuracy**2
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:
     """Return a radius that no contact under constant force exceeds: that of the end, had the border not moved."""
     if np.isfinite(profile.largest_radius):
         return profile.largest_radius
-    deepest = 1.0 + virgin_areas(profile, stick_radius)[1] / stick_radius
-    radius = 2.0
+    abscissa, weight = gauss(64)
+    x = stick_radius + (1.0 - stick_radius) * abscissa
+    slipping = (1.0 - stick_radius) * float((1.0 - profile.image(x)) @ weight)
+    deepest = 1.0 + slipping / stick_radius
+    radius = 1.0 + 4.0 * (1.0 - stick_radius)
     while float(profile.height(np.array([radius]))[0]) < deepest:
         radius *= 1.5
     return radius
 
 
-def _until_jump(profile: Profile, stick_radius: float, tolerance: float) -> tuple[ForcedSlip, list[Pressed], float]:
-    """March while the border moves; return problem, moments and the error allowed in a step."""
-    problem = _problem(profile, stick_radius, tolerance)
-    step_error = 0.2 * tolerance * problem.eta
-    moving, start = problem.move(evolution.settled(problem))
-    last = problem.panels.order - 1
+def _first(problem: ForcedSlip, resolution: Resolution) -> float:
+    return resolution.first * float(np.sqrt(problem.virgin.virgin_width))
+
+
+def _until_jump(profile: Profile, stick_radius: float, resolution: Resolution) -> tuple[ForcedSlip, list[Pressed]]:
+    """March while the border moves; return problem and moments."""
+    near = round(-2.0 * np.log2(max(stick_radius, SETTINGS.nearest)))
+    panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
+    problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
+    moving, start = problem.move(settled(problem))
+    last, size = panels.order - 1, panels.nodes.size
+
+    def is_torn(moment: Pressed) -> bool:
+        return bool(np.min(moment.unknowns[: size - 1]) < -SETTINGS.torn)
 
     def stops(moment: Pressed) -> bool:
-        returns = moment.border < np.max(moment.path[0]) - 1e-2 * tolerance
-        jumps = moment.unknowns[last] > (0.1 * _JUMP if returns else _JUMP)
-        return bool(jumps or moment.edge > profile.largest_radius)
+        returns = moment.border < np.max(moment.path[0]) - 5e-2 * resolution.step
+        jumps = moment.unknowns[last] > (0.1 * SETTINGS.jump if returns else SETTINGS.jump)
+        beyond = problem.radius(moment.border + moment.unknowns[size - 1]) > profile.largest_radius
+        return bool(jumps or beyond or is_torn(moment))
 
-    return moving, evolution.march(moving, _LATEST_JUMP, step_error, start, stops), step_error
-
-
-def _forced(profile: Profile, c: float, wanted: Sequence[float], tolerance: float) -> dict[float, Fretted]:
-    """Solve once and describe every wanted time."""
-    moving, first, step_error = _until_jump(profile, c, tolerance)
-    _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
-    standing, start = moving.stand(first[-1])
-    second = evolution.march(standing, max(wanted), step_error, start)
-    march = _March(moving, first, standing, second)
-    early = evolution.integral_along(first, [moving.wear_rate(m.unknowns) for m in first])
-    late = early[-1] + evolution.integral_along(second, [standing.wear_rate(m.unknowns) for m in second])
-    result = {}
-    for time in wanted:
-        problem, history = march.parts(time)
-        spent = evolution.value_at(history, early if problem is moving else late, time)
-        steps = int(np.searchsorted([m.time for m in history], time)) + (len(first) if problem is standing else 0)
-        result[time] = replace(_describe(problem, history, time), energy_volume=spent, steps=steps)
-    return result
+    moments = march(moving, SETTINGS.latest_jump, resolution.step, _first(problem, resolution), start, stops)
+    return moving, moments[:-1] if is_torn(moments[-1]) else moments
 
 
-def _jumped(profile: Profile, c: float, tolerance: float) -> tuple[ForcedSlip, Pressed]:
-    """Return the problem and its last moment before the border stands."""
-    problem, moments, _ = _until_jump(profile, c, tolerance)
-    return problem, moments[-1]
+class _Frozen(NamedTuple):
+    """The image that the border left behind, as pairs of radius and depth over d0."""
+
+    reached: FloatArray
+    depths: FloatArray
+
+    def slope(self, x: FloatArray) -> FloatArray:
+        """Return its slope."""
+        if self.reached.size == 1:
+            return np.zeros_like(x)
+        slopes = np.diff(self.depths) / np.diff(self.reached)
+        return np.asarray(slopes[np.clip(np.searchsorted(self.reached, x) - 1, 0, slopes.size - 1)])
+
+
+def _frozen(problem: ForcedSlip, path: FloatArray) -> _Frozen:
+    places, depths = rising(path)
+    radii = np.sqrt(problem.virgin.inner_radius**2 + problem.virgin.virgin_width * places)
+    return _Frozen(radii, 1.0 + problem.eta * depths)
 
 
 def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
     """Return what a contact ends in whose border stands from a moment on."""
     profile, c, eta = problem.profile, problem.virgin.inner_radius, problem.eta
-    border, (reached, depths) = moment.border, _rising(moment.path)
-    stuck = problem.virgin_area + float(np.trapezoid(depths - eta, reached))
-    depth = (0.5 * problem.force + stuck) / border
+    border, frozen = problem.radius(moment.border), _frozen(problem, moment.path)
+    # the load of the virgin slip zone is carried by what sticks: b d = ... - int_c^b (d' - eta) db'
+    annulus = float(np.trapezoid((frozen.depths - 1.0) / eta - 1.0, frozen.reached))
+    depth = 1.0 + eta * (problem.virgin_load + annulus) / border
 
     def change(x: FloatArray) -> FloatArray:
-        frozen = np.interp(x, reached, depths) - 1.0 - profile.rise(x, c)
-        return np.asarray(np.where(x < border, frozen, depth - profile.image(x)))
+        inside = np.interp(x, frozen.reached, frozen.depths) - 1.0 - profile.rise(x - c, c)
+        return np.asarray(np.where(x < border, inside, depth - 1.0 + eta - profile.rise(x - c, c)))
 
-    def change_slope(x: FloatArray) -> FloatArray:
-        return np.asarray(_frozen_slope(x, reached, depths) - profile.image_slope(x))
+    def slope(x: FloatArray) -> FloatArray:
+        return np.asarray(frozen.slope(x) * (x < border) - profile.image_slope(x))
 
-    breaks = _breaks(c, border)
+    virgin = Scar(c, border, change, slope, _breaks(c, border))
 
     def excess(radius: float) -> float:
-        return -float(worn_height(change, c, np.array([radius]), breaks)[0])
+        return -float(worn_height(virgin, np.array([radius]))[0])
 
-    high = min(2.0, profile.largest_radius)
+    high = min(border + 4.0 * (1.0 - c), profile.largest_radius)
     while not excess(high) > 0.0:
-        if high == profile.largest_radius or moment.edge > profile.largest_radius:
+        if high == profile.largest_radius:
             raise ValueError(
                 f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
                 f"extend it, got stick radius {c!r} under constant force"
             )
         high = min(1.5 * high, profile.largest_radius)
-    a = bisect(excess, border, high)
-    volume = worn_volume(change, c, a, breaks)
+    scar = virgin._replace(radius=bisect(excess, border, high))
     return Worn(
-        profile, c, a, border, volume, problem.force, np.nan, change, change_slope, breaks, depth=depth, border=border
+        contact_radius=scar.radius,
+        stick_border=border,
+        depth=depth,
+        normal_force=2.0 * (virgin_load(profile, c) + eta * problem.virgin_load),
+        wear_volume=worn_volume(scar),
+        worn_depth=largest_wear(scar),
+        height=worn_profile(profile, scar),
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, border, depth, border),
     )
 
 
-def _describe(problem: ForcedSlip, history: Sequence[Pressed], time: float) -> Fretted:
+def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, steps: int) -> Worn:
     """Turn the nodal values at one time into a worn contact."""
-    unknowns = evolution.unknowns_at(history, time)
-    y, a, depth, border = problem.split(unknowns)
-    panels, profile, eta, c = problem.panels, problem.profile, problem.eta, problem.virgin.inner_radius
-    length, slope = problem.length(unknowns), panels.slope @ y
-    before = history[max(int(np.searchsorted([m.time for m in history], time)) - 1, 0)].path
-    path = np.append(before, [[border], [depth]], axis=1)
-    reached, depths = _rising(path)
+    profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.virgin.inner_radius
+    unknowns = dense.unknowns(time)
+    y, width, deeper, place = problem.split(unknowns)
+    before = dense.history[max(dense.steps(time) - 1, 0)].path
+    path = np.append(before, [[place], [deeper]], axis=1)
+    moment = Pressed(time, unknowns, dense.gathered(time), path, panels.nodes)
+    frozen, slope = _frozen(problem, path), panels.slope @ y
+    border, a, depth = problem.radius(max(place, 0.0)), problem.radius(place + width), 1.0 + eta * deeper
+    square = problem.virgin.virgin_width
 
-    def place(x: FloatArray) -> FloatArray:
-        return np.clip((x - border) * (x + border) / length, 0.0, 1.0 - 1e-15).ravel()
+    def worn(q: FloatArray) -> FloatArray:
+        inner = problem.frozen_depth(path, np.where(q < place, q, 0.0))
+        return np.asarray(eta * np.where(q < place, inner, problem.worn_depth(moment, np.maximum(q, place))))
+
+    def height(radius: FloatArray) -> FloatArray:
+        result, q = profile.height(radius), (radius - c) * (radius + c) / square
+        scar = (q > 0.0) & (q < place + width)
+        if time > 0.0:
+            result[scar] += np.maximum(worn(q[scar]), 0.0)
+        return result
+
+    def nodal(values: FloatArray, x: FloatArray) -> FloatArray:
+        z = np.clip((x - border) * (x + border) / (square * width), 0.0, 1.0 - 1e-15)
+        return interpolate(panels, values, z.ravel()).reshape(x.shape)
 
     def change(x: FloatArray) -> FloatArray:
-        slipping = depth - eta + eta * interpolate(panels, y, place(x)).reshape(x.shape)
-        image = np.where(x < border, np.interp(x, reached, depths) - eta, slipping)
-        return np.asarray(image - (1.0 - eta) - profile.rise(x, c))
+        slipping = depth - 1.0 + eta * nodal(y, x)
+        sticking = np.interp(x, frozen.reached, frozen.depths) - 1.0
+        return np.asarray(np.where(x < border, sticking, slipping) - profile.rise(x - c, c))
 
     def change_slope(x: FloatArray) -> FloatArray:
-        slipping = 2.0 * eta * x / length * interpolate(panels, slope, place(x)).reshape(x.shape)
-        image = np.where(x < border, _frozen_slope(x, reached, depths), slipping)
-        return np.asarray(image - profile.image_slope(x))
+        slipping = 2.0 * eta * x / (square * width) * nodal(slope, x)
+        return np.asarray(np.where(x < border, frozen.slope(x), slipping) - profile.image_slope(x))
 
-    breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + length * panels.edges[1:-1])))
-    volume = worn_volume(change, c, a, breaks) if time > 0.0 else 0.0
-    force = problem.sticking_force(before, border, depth) + problem.slipping_force(unknowns)
-    return Fretted(
-        profile, c, a, a, volume, force, np.nan, change, change_slope, breaks, depth=depth, border=max(border, c)
+    breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + square * width * panels.edges[1:-1])))
+    scar = Scar(c, a, change, change_slope, breaks)
+    load = problem.slipping_load(unknowns) + problem.sticking_load(before, place, deeper)
+    abscissa, weight = gauss(24)
+    annulus = max(place, 0.0) * float(worn(place * abscissa) @ weight)
+    fine = np.sqrt(c * c + square * (place + width) * np.linspace(0.0, 1.0, 200, endpoint=False))
+    return Worn(
+        contact_radius=a,
+        stick_border=border,
+        depth=depth,
+        normal_force=2.0 * (virgin_load(profile, c) + eta * load),
+        wear_volume=float(np.pi * square * (annulus + width * eta * panels.weights @ moment.gathered)),
+        worn_depth=float(np.max(height(fine) - profile.height(fine))),
+        height=height,
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, a, depth, border),
+        energy_volume=energy,
+        steps=steps,
     )
-
-
-def _rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the places c that the border passed, and the depths at which it left them."""
-    furthest = np.maximum.accumulate(path[0])
-    new = np.append(True, np.diff(furthest) > 0.0)
-    return furthest[new], path[1, new]
-
-
-def _frozen_slope(x: FloatArray, reached: FloatArray, depths: FloatArray) -> FloatArray:
-    """Return the slope of the image that the border left behind it."""
-    if reached.size == 1:
-        return np.zeros_like(x)
-    slopes = np.diff(depths) / np.diff(reached)
-    return np.asarray(slopes[np.clip(np.searchsorted(reached, x) - 1, 0, slopes.size - 1)])
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
@@ -247,17 +270,3 @@ def _breaks(c: float, border: float) -> tuple[float, ...]:
     if not border > c * (1.0 + 1e-12):
         return ()
     return (*(border - (border - c) * 0.25**k for k in range(1, 8)), border)
-
-
-def _error(profile: Profile, fine: Worn, coarse: Worn, tolerance: float) -> float:
-    """Return the error expected of f: not below the tolerance, which both solutions may miss alike at the edge."""
-    eta = float(profile.rise(np.array(1.0), fine.stick_radius))
-    return max(_SAFETY * _distance(fine, coarse), _tolerances(tolerance)[0] * eta)
-
-
-def _distance(fine: Worn, coarse: Worn) -> float:
-    """Return the largest difference of two worn profiles."""
-    border, a, c = fine.stick_border, fine.contact_radius, fine.stick_radius
-    shares = np.sin(0.5 * np.pi * np.arange(1, 80) / 80.0) ** 4
-    r = np.concatenate([c + (border - c) * (1.0 - shares[::-2]), border + (a - border) * shares])
-    return float(np.max(np.abs(fine.height(r) - coarse.height(r))))

@@ -15,6 +15,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
+from mdr_dask.physics.wear.worn import Worn
 
 #: Share of the largest stable explicit step, 1.7 h.
 _STEP_SHARE = 0.45
@@ -50,39 +51,9 @@ class LoadBlock:
             )
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
-    """The contact at the end of a block.
-
-    Parameters
-    ----------
-    contact_radius, stick_radius, depth, normal_force : float
-        a, c (zero in gross slip), d, F_N.
-    worn_depth : float
-        Largest f - f0.
-    wear_volume, energy_volume : float
-        V from the shape, and from the energy lost over mu: equal up to the grid's error.
-    radius, height, image, pressure : array, shape (n,)
-        r, f, g, p.
-    error : float
-        Largest difference of f from a grid of half as many cells.
-    """
-
-    contact_radius: float
-    stick_radius: float
-    depth: float
-    normal_force: float
-    worn_depth: float
-    wear_volume: float
-    energy_volume: float
-    radius: FloatArray
-    height: FloatArray
-    image: FloatArray
-    pressure: FloatArray
-    error: float = np.nan
-
-
-def history(profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0) -> list[Record]:
+def history(
+    profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, reach: float = 2.0, errors: bool = True
+) -> list[Worn]:
     """Wear a virgin body through blocks of load.
 
     Parameters
@@ -92,14 +63,16 @@ def history(profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, 
     blocks : sequence of LoadBlock
         One after the other.
     cells : int
-        Cells of the grid, even; the error falls about linearly with their width.
+        Cells of the grid; the error falls about linearly with their width, and as its root once the image has jumped.
     reach : float
         Radius that the grid covers.
+    errors : bool
+        Whether to estimate the errors, on grids of a half and a quarter as many cells.
 
     Returns
     -------
-    list of Record
-        One for every block.
+    list of Worn
+        One for the end of every block.
 
     Raises
     ------
@@ -107,10 +80,11 @@ def history(profile: Profile, blocks: Sequence[LoadBlock], *, cells: int = 200, 
         If the contact grows beyond the grid or the table of the profile.
     """
     length = min(reach, profile.largest_radius)
-    fine = _run(profile, blocks, uniform_grid(cells, length))
-    coarse = _run(profile, blocks, uniform_grid(cells // 2, length))
-    errors = [float(np.max(np.abs(one.height[::2] - two.height))) for one, two in zip(fine, coarse, strict=True)]
-    return [replace(record, error=error) for record, error in zip(fine, errors, strict=True)]
+    fine, *rough = (
+        _run(profile, blocks, uniform_grid(number, length))
+        for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
+    )
+    return [replace(one, rougher=tuple(others)) for one, *others in zip(fine, *rough, strict=True)] if rough else fine
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +96,15 @@ class _State:
     power: float
 
 
-def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> list[Record]:
-    image_0, virgin = profile.image(grid.nodes), profile.height(grid.nodes)
-    worn, energy = np.zeros_like(virgin), 0.0
+def _run(profile: Profile, blocks: Sequence[LoadBlock], grid: UniformGrid) -> list[Worn]:
+    image_0 = profile.image(grid.nodes)
+    worn, energy = np.zeros_like(image_0), 0.0
     records = []
     for block in blocks:
         worn, spent = _advance(grid, image_0, worn, block)
         energy += spent
         state = _state(grid, image_0 + grid.forward @ worn, block)
-        records.append(_record(grid, virgin, worn, state, block, energy))
+        records.append(_record(grid, profile, worn, state, block, energy))
     return records
 
 
@@ -162,24 +136,24 @@ def _state(grid: UniformGrid, image: FloatArray, block: LoadBlock) -> _State:
 
 
 def _record(
-    grid: UniformGrid, virgin: FloatArray, worn: FloatArray, state: _State, block: LoadBlock, energy: float
-) -> Record:
+    grid: UniformGrid, profile: Profile, worn: FloatArray, state: _State, block: LoadBlock, energy: float
+) -> Worn:
+    """Turn the state at the end of a block into a worn contact; image and pressure are not known beyond the grid."""
     stuck = np.flatnonzero(state.depth - state.image < block.slip_share)
     k = int(stuck[0]) if stuck.size else 0
     border = 0.0
     if k > 0:
         excess = state.depth - state.image[k - 1 : k + 1] - block.slip_share
         border = float(grid.nodes[k - 1] + grid.spacing * excess[0] / (excess[0] - excess[1]))
-    return Record(
+    return Worn(
         contact_radius=grid.edge(state.image, state.depth),
-        stick_radius=border,
+        stick_border=border,
         depth=state.depth,
         normal_force=grid.force(state.image, state.depth),
-        worn_depth=float(np.max(worn)),
         wear_volume=float(2.0 * np.pi * np.trapezoid(worn * grid.nodes, grid.nodes)),
+        worn_depth=float(np.max(worn)),
+        height=lambda r: np.asarray(profile.height(r) + np.interp(r, grid.nodes, worn, right=0.0)),
+        image=lambda x: np.asarray(np.interp(np.abs(x), grid.nodes, state.image, right=np.nan)),
+        pressure=lambda r: np.asarray(np.interp(r, grid.nodes, state.pressure, right=0.0)),
         energy_volume=energy,
-        radius=grid.nodes,
-        height=virgin + worn,
-        image=state.image,
-        pressure=state.pressure,
     )

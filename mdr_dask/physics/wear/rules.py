@@ -1,24 +1,118 @@
-"""The limiting shape and the fast rule for many power-law bodies at once: compiled, one case after the other."""
+"""The fast rule of the thesis at constant depth and the limiting shape in which it ends, compiled, for any body.
+
+The fast rule (thesis eq. 6.11) in closed form: inside the first contact y = (g - g_c) / eta follows a logistic law,
+outside it g - 1 decays, both with the exponent xi N / a(c). All it needs is how much is left, exp(-xi N / a(c));
+the limit (thesis eqs. 6.8-6.10) has nothing left. The profile is cut where it would fall below the virgin one.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.worn import LAYER_GROWTH, SMALLEST_REST
+from mdr_dask.physics.wear.worn import (
+    Scar,
+    Worn,
+    check_stick_radius,
+    contact_pressure,
+    largest_wear,
+    worn_image,
+)
 
-_NODES = 16
-#: Error of the scar's integral, over eta.
-SCAR_ERROR = 1e-10
+#: Factor of the fast rule: the thesis's fit by eye. The best one lies between 0.9 and 1 (see docs/wear.md).
+THESIS_XI = 0.8
+
+
+class Settings(NamedTuple):
+    """Tuned numbers of the rules; `tests/physics/wear/test_rules.py` compares them with quadrature to 1e-12.
+
+    Parameters
+    ----------
+    nodes : int
+        Gauss nodes in each of four pieces.
+    layer_growth : float
+        Widths of the pieces next to the stick border, where the rule builds a layer as thin as what is left.
+    least : float
+        Floor of what is left by the fast rule: the layer must not become thinner than numbers are.
+    scar : float
+        Error of the integral that is zero at the scar's radius, over eta.
+    error : float
+        Error of every output over its largest value: that of the rule's own equation, no more.
+    """
+
+    nodes: int = 16
+    layer_growth: float = 30.0
+    least: float = 1e-30
+    scar: float = 1e-10
+    error: float = 2e-6
+
+
+SETTINGS = Settings()
+_NO_TABLE = PowerProfile(1.0).pieces()
+
+
+class Rule(NamedTuple):
+    """One body under the rule: its image, c, g0(c), eta and what is left."""
+
+    image: Image
+    c: float
+    level: float
+    eta: float
+    rest: float
+
+
+def limit_radius(profile: Profile, stick_radius: float) -> float:
+    """Return a(c): the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10, exact).
+
+    Raises
+    ------
+    ValueError
+        Without partial slip, or if the scar would reach beyond the table of the profile.
+    """
+    check_stick_radius(stick_radius)
+    radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, np.empty(5), *_nodes()))
+    if np.isnan(radius):
+        raise ValueError(
+            f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
+            f"extend it, got stick radius {stick_radius!r}"
+        )
+    return radius
+
+
+def limit(profile: Profile, stick_radius: float) -> Worn:
+    """Return the shape that ends all wear at constant depth: g = g0 up to c, then 1."""
+    radius = limit_radius(profile, stick_radius)
+    return _worn(profile, _rule(profile, stick_radius, 0.0), radius, stick_radius)
+
+
+def fast(profile: Profile, stick_radius: float, cycles: float, xi: float = THESIS_XI) -> Worn:
+    """Return the worn contact by the fast rule.
+
+    Parameters
+    ----------
+    profile : Profile
+        The virgin body.
+    stick_radius : float
+        c, between 0 and 1.
+    cycles : float
+        N >= 0.
+    xi : float
+        Factor of the order of one.
+    """
+    radius = limit_radius(profile, stick_radius)
+    rest = max(math.exp(-xi * cycles / radius), SETTINGS.least)
+    return _worn(profile, _rule(profile, stick_radius, rest), radius, 1.0)
 
 
 def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return contact radius, volume and normal force of limiting shapes.
+    """Return contact radius, volume and normal force of limiting shapes of power laws.
 
     Parameters
     ----------
@@ -32,7 +126,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArra
     """
     n, c = (np.array(part, dtype=float) for part in np.broadcast_arrays(exponent, stick_radius))
     result = np.empty((3, n.size))
-    _limits(n.ravel(), c.ravel(), *gauss(2 * _NODES), result)
+    _limits(n.ravel(), c.ravel(), _NO_TABLE, np.empty(5), *_nodes(), result)
     radius, volume, force = result.reshape((3, *n.shape))
     return radius, volume, force
 
@@ -40,7 +134,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArra
 def fast_cases(
     exponent: ArrayLike, stick_radius: ArrayLike, cycles: ArrayLike, xi: ArrayLike, limit_radius: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return scar radius, volume and normal force by the fast rule.
+    """Return scar radius, volume and normal force of power laws by the fast rule.
 
     Parameters
     ----------
@@ -50,90 +144,135 @@ def fast_cases(
     Returns
     -------
     contact_radius, wear_volume, normal_force : array
-        As :func:`mdr_dask.physics.wear.worn.fast` defines them.
+        As :func:`fast` has them.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
-    flat = [np.array(part, dtype=float).ravel() for part in parts]
-    result = np.empty((3, flat[0].size))
-    n, c, cycles_flat, xi_flat, limit = flat
-    abscissa, weight = gauss(_NODES)
-    _fasts(n, c, cycles_flat, xi_flat, limit, abscissa, weight, result)
+    n, c, cycles_flat, xi_flat, limits = (np.array(part, dtype=float).ravel() for part in parts)
+    result = np.empty((3, n.size))
+    _fasts(n, c, cycles_flat, xi_flat, limits, _NO_TABLE, np.empty(5), *_nodes(), result)
     radius, volume, force = result.reshape((3, *parts[0].shape))
     return radius, volume, force
 
 
-@njit(nogil=True, cache=True)
-def _power(x: float, n: float) -> float:
-    if n == 2.0:
-        return x * x
-    if n == 1.0:
-        return x
-    return math.pow(x, n)
+def parabola_limit_radius(half_angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return (c, a) of a parabola as functions of t = arccos(c/a): a = sqrt(2 / (1 + sin(2t)/(2t)))."""
+    t = np.asarray(half_angle, dtype=float)
+    a = np.sqrt(2.0 / (1.0 + np.sinc(2.0 * t / np.pi)))
+    return np.asarray(a * np.cos(t)), a
 
 
-@njit(nogil=True, cache=True)
-def _narrowed(low, low_value, high, high_value, side, x, value):  # type: ignore[no-untyped-def]
+def cone_limit_radius(half_angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return (c, a) of a cone as functions of t = arccos(c/a): a = t / sin(t), c = t cot(t) (thesis eq. 6.17)."""
+    t = np.asarray(half_angle, dtype=float)
+    a = 1.0 / np.sinc(t / np.pi)
+    return np.asarray(a * np.cos(t)), np.asarray(a)
+
+
+def printed_parabola_limit(stick_radius: ArrayLike) -> FloatArray:
+    """Return a(c) as printed in thesis eq. 6.16, sqrt(2 + c^2/4) - c/2: an approximation, up to 3.6 % low."""
+    half = 0.5 * np.asarray(stick_radius, dtype=float)
+    return np.asarray(np.sqrt(2.0 + half**2) - half)
+
+
+def _nodes() -> tuple[FloatArray, FloatArray]:
+    return gauss(SETTINGS.nodes)
+
+
+def _rule(profile: Profile, c: float, rest: float) -> Rule:
+    eta = float(profile.rise(np.array(1.0 - c), c))
+    return Rule(profile.pieces(), c, float(profile.image(np.array(c))), eta, rest)
+
+
+def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
+    """Turn the rule into a worn contact whose load ends at an edge."""
+    nodes, cuts = _nodes(), np.empty(5)
+    radius, volume, force = _numbers(rule, radius, cuts, *nodes)
+    c, eta, rest = rule.c, rule.eta, rule.rest
+
+    def change(x: FloatArray) -> FloatArray:
+        result = np.empty(x.size)
+        _changes(rule, x.ravel(), result)
+        return result.reshape(x.shape)
+
+    def slope(x: FloatArray) -> FloatArray:
+        start = profile.rise(np.maximum(x - c, 0.0), c) / eta
+        left = start + (1.0 - start) * rest
+        inside = np.where(left > 0.0, rest / np.maximum(left, 1e-100) ** 2, 0.0) - 1.0
+        return np.asarray(profile.image_slope(x) * np.where(x <= 1.0, inside, rest - 1.0))
+
+    def height(r: FloatArray) -> FloatArray:
+        result = profile.height(r)
+        inside = (r > c) & (r < radius)
+        worn = np.empty(int(np.sum(inside)))
+        _heights(rule, r[inside], cuts, *nodes, worn)
+        result[inside] += np.maximum(worn, 0.0)
+        return result
+
+    scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in cuts[1:] if cut > c))
+    return Worn(
+        contact_radius=radius,
+        stick_border=c,
+        depth=1.0,
+        normal_force=force,
+        wear_volume=volume,
+        worn_depth=largest_wear(scar),
+        height=height,
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, edge, 1.0, c),
+        relative_error=SETTINGS.error,
+    )
+
+
+@compiled
+def _narrowed(
+    low: float, low_value: float, high: float, high_value: float, side: int, x: float, value: float
+) -> tuple[float, float, float, float, int]:
     """Return a bracket of a falling function, its values and its newer end, -1 or 1: false position by Illinois."""
     if value > 0.0:
         return x, value, high, 0.5 * high_value if side == -1 else high_value, -1
     return low, 0.5 * low_value if side == 1 else low_value, x, value, 1
 
 
-@njit(nogil=True, cache=True)
-def _limits(n, c, abscissa, weight, result):  # type: ignore[no-untyped-def]
-    """Find a(c) by false position; then volume and force."""
-    for case in range(n.size):
-        low, high = 1.0, 1.5
-        low_value = _plateau(n[case], c[case], low, abscissa, weight, 0)
-        high_value = _plateau(n[case], c[case], high, abscissa, weight, 0)
-        while high_value > 0.0:
-            low, low_value = high, high_value
-            high *= 1.5
-            high_value = _plateau(n[case], c[case], high, abscissa, weight, 0)
-        a, side = low, 0
-        for _ in range(200):
-            last = a
-            a = (low * high_value - high * low_value) / (high_value - low_value)
-            if abs(a - last) < 4e-16 * a or not low < a < high:
-                break
-            value = _plateau(n[case], c[case], a, abscissa, weight, 0)
-            low, low_value, high, high_value, side = _narrowed(low, low_value, high, high_value, side, a, value)
-        result[0, case] = a
-        result[1, case] = 4.0 * _plateau(n[case], c[case], a, abscissa, weight, 1)
-        result[2, case] = 2.0 * (c[case] - c[case] * _power(c[case], n[case]) / (n[case] + 1.0))
+@inlined
+def _change(rule: Rule, gap: float) -> float:
+    """Return g - g0 at c + gap."""
+    rise = image_rise(rule.image, rule.c, rule.level, gap)
+    if rule.c + gap > 1.0:
+        return (rise - rule.eta) * (rule.rest - 1.0)
+    start = rise / rule.eta
+    left = start + (1.0 - start) * rule.rest
+    return rule.eta * start * (1.0 - start) * (1.0 - rule.rest) / left if left > 0.0 else rule.eta
 
 
-@njit(nogil=True, cache=True)
-def _plateau(n, c, a, abscissa, weight, moment):  # type: ignore[no-untyped-def]
-    """Return int_c^a (1 - x^n) (a^2 - x^2)^(moment - 1/2) dx."""
-    span = math.atan2(math.sqrt((a - c) * (a + c)), c)
-    total = 0.0
-    for k in range(abscissa.size):
-        angle = span * abscissa[k]
-        term = 1.0 - _power(a * math.cos(angle), n)
-        if moment == 1:
-            term *= (a * math.sin(angle)) ** 2
-        total += weight[k] * term
-    return span * total
+@compiled
+def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
+    for k in range(places.size):
+        result[k] = _change(rule, max(places[k] - rule.c, 0.0))
 
 
-@njit(nogil=True, cache=True)
-def _change(x, n, c, at_c, eta, rest):  # type: ignore[no-untyped-def]
-    """Return g - g0 of the fast rule."""
-    if x > 1.0:
-        return (_power(x, n) - 1.0) * (rest - 1.0)
-    if n == 2.0:
-        rise = (x - c) * (x + c)
-    elif n == 1.0:
-        rise = x - c
+@compiled
+def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
+    """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
+    low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
+    if rule.image.knots.size == 0:
+        high = rule.c * math.expm1(math.log1p(level / rule.level) / rule.image.exponent)
     else:
-        rise = at_c * math.expm1(n * math.log1p((x - c) / c))
-    start = rise / eta
-    return eta * start * (1.0 - start) * (1.0 - rest) / (start + (1.0 - start) * rest)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if image_rise(rule.image, rule.c, rule.level, middle) < level:
+                low = middle
+            else:
+                high = middle
+    cuts[0], cuts[1] = rule.c, min(rule.c + high, 1.0)
+    for piece in range(2, 4):
+        cuts[piece] = min(rule.c + SETTINGS.layer_growth * (cuts[piece - 1] - rule.c), 1.0)
+    cuts[4] = 1.0
 
 
-@njit(nogil=True, cache=True)
-def _scar_integral(radius, moment, n, c, at_c, eta, rest, cuts, abscissa, weight):  # type: ignore[no-untyped-def]
+@compiled
+def _scar_integral(
+    rule: Rule, radius: float, moment: int, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> float:
     """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx in pieces between the cuts."""
     total = 0.0
     for piece in range(cuts.size):
@@ -145,47 +284,119 @@ def _scar_integral(radius, moment, n, c, at_c, eta, rest, cuts, abscissa, weight
         end = math.atan2(math.sqrt((radius - low) * (radius + low)), low)
         for k in range(abscissa.size):
             angle = begin + (end - begin) * abscissa[k]
-            x = max(radius * math.cos(angle), c)
-            term = _change(x, n, c, at_c, eta, rest) * weight[k] * (end - begin)
+            gap = max(radius * math.cos(angle) - rule.c, 0.0)
+            term = _change(rule, gap) * weight[k] * (end - begin)
             if moment == 1:
                 term *= (radius * math.sin(angle)) ** 2
             total += term
     return total
 
 
-@njit(nogil=True, cache=True)
-def _fasts(n, c, cycles, xi, limit, abscissa, weight, result):  # type: ignore[no-untyped-def]
-    cuts = np.empty(5)
+@compiled
+def _heights(
+    rule: Rule, radii: FloatArray, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray, result: FloatArray
+) -> None:
+    """Put f - f0 at radii beyond c."""
+    for k in range(radii.size):
+        result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, cuts, abscissa, weight)
+
+
+@compiled
+def _scar_radius(
+    rule: Rule, low: float, high: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> float:
+    """Return the root of the scar's integral between 1 and a radius, or that radius if there is none."""
+    low_value = _scar_integral(rule, low, 0, cuts, abscissa, weight)
+    high_value = _scar_integral(rule, high, 0, cuts, abscissa, weight)
+    if not high_value < 0.0 < low_value:
+        return high
+    error = 1e-16 if rule.rest == 0.0 else SETTINGS.scar
+    radius, side = high, 0
+    for _ in range(100):
+        last = radius
+        radius = (low * high_value - high * low_value) / (high_value - low_value)
+        value = _scar_integral(rule, radius, 0, cuts, abscissa, weight)
+        if abs(value) < error * rule.eta or abs(radius - last) < 4e-16 * radius or high - low <= 1e-15 * high:
+            break
+        low, low_value, high, high_value, side = _narrowed(low, low_value, high, high_value, side, radius, value)
+    return radius
+
+
+@compiled
+def _limit_radius(rule: Rule, largest: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray) -> float:
+    """Return a(c) of a rule with nothing left, NaN if it lies beyond the largest radius."""
+    _put_cuts(rule, cuts)
+    low, high = 1.0, min(1.5, largest)
+    while _scar_integral(rule, high, 0, cuts, abscissa, weight) > 0.0:
+        if high == largest:
+            return np.nan
+        low, high = high, min(1.5 * high, largest)
+    return _scar_radius(rule, low, high, cuts, abscissa, weight)
+
+
+@compiled
+def _numbers(
+    rule: Rule, limit: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
+) -> tuple[float, float, float]:
+    """Return scar radius, volume and normal force; put the cuts."""
+    _put_cuts(rule, cuts)
+    radius = limit if rule.rest == 0.0 else _scar_radius(rule, 1.0, limit, cuts, abscissa, weight)
+    volume = 4.0 * _scar_integral(rule, radius, 1, cuts, abscissa, weight)
+    load, worn = 0.0, 0.0
+    for k in range(abscissa.size):
+        x = rule.c * abscissa[k] ** 4  # smooths a power at the axis
+        load += (
+            weight[k]
+            * 4.0
+            * rule.c
+            * abscissa[k] ** 3
+            * (rule.eta - image_rise(rule.image, rule.c, rule.level, x - rule.c))
+        )
+    for piece in range(4):
+        width = cuts[piece + 1] - cuts[piece]
+        for k in range(abscissa.size):
+            gap = cuts[piece] - rule.c + width * abscissa[k]
+            unworn = rule.eta - image_rise(rule.image, rule.c, rule.level, gap)
+            worn += weight[k] * width * (unworn - _change(rule, gap))
+    return radius, volume, 2.0 * (load + worn)
+
+
+@compiled
+def _limits(
+    n: FloatArray,
+    c: FloatArray,
+    no_table: Image,
+    cuts: FloatArray,
+    abscissa: FloatArray,
+    weight: FloatArray,
+    result: FloatArray,
+) -> None:
     for case in range(n.size):
-        rest = max(math.exp(-xi[case] * cycles[case] / limit[case]), SMALLEST_REST)
-        at_c = _power(c[case], n[case])
-        eta = -math.expm1(n[case] * math.log(c[case]))
-        steep = math.pow(at_c + eta * rest / (1.0 + rest), 1.0 / n[case])
-        cuts[0], cuts[1] = c[case], steep
-        for piece in range(2, 4):
-            cuts[piece] = min(c[case] + LAYER_GROWTH * (cuts[piece - 1] - c[case]), 1.0)
-        cuts[4] = 1.0
-        low, high = 1.0, limit[case]
-        low_value = _scar_integral(low, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-        high_value = _scar_integral(high, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-        radius = high
-        if high_value < 0.0 < low_value:
-            side = 0
-            for _ in range(60):
-                radius = (low * high_value - high * low_value) / (high_value - low_value)
-                value = _scar_integral(radius, 0, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-                if abs(value) < SCAR_ERROR * eta or high - low <= 1e-13 * high:
-                    break
-                low, low_value, high, high_value, side = _narrowed(
-                    low, low_value, high, high_value, side, radius, value
-                )
-        volume = _scar_integral(radius, 1, n[case], c[case], at_c, eta, rest, cuts, abscissa, weight)
-        result[0, case], result[1, case] = radius, 4.0 * volume
-        worn = 0.0
-        for piece in range(4):
-            for k in range(abscissa.size):
-                width = cuts[piece + 1] - cuts[piece]
-                worn += (
-                    weight[k] * width * _change(cuts[piece] + width * abscissa[k], n[case], c[case], at_c, eta, rest)
-                )
-        result[2, case] = 2.0 * (n[case] / (n[case] + 1.0) - worn)
+        rule = _power_rule(no_table, n[case], c[case], 0.0)
+        radius = _limit_radius(rule, np.inf, cuts, abscissa, weight)
+        result[0, case], result[1, case], result[2, case] = _numbers(rule, radius, cuts, abscissa, weight)
+
+
+@compiled
+def _fasts(
+    n: FloatArray,
+    c: FloatArray,
+    cycles: FloatArray,
+    xi: FloatArray,
+    limit: FloatArray,
+    no_table: Image,
+    cuts: FloatArray,
+    abscissa: FloatArray,
+    weight: FloatArray,
+    result: FloatArray,
+) -> None:
+    for case in range(n.size):
+        rest = max(math.exp(-xi[case] * cycles[case] / limit[case]), SETTINGS.least)
+        rule = _power_rule(no_table, n[case], c[case], rest)
+        result[0, case], result[1, case], result[2, case] = _numbers(rule, limit[case], cuts, abscissa, weight)
+
+
+@compiled
+def _power_rule(no_table: Image, exponent: float, c: float, rest: float) -> Rule:
+    image = Image(exponent, no_table.knots, no_table.coefficients)
+    return Rule(image, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)

@@ -3,20 +3,20 @@ import pytest
 from schemes import material_on_line, on_line
 
 from mdr_dask.physics import solids as rheology
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.element import Foundation
-from mdr_dask.physics.transients.elements import CONVERGED, OUTSIDE_LINE
-from mdr_dask.physics.transients.forces import Line
-from mdr_dask.physics.transients.protocol import (
-    KELVIN,
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.transients.elements.edges import Line
+from mdr_dask.physics.transients.elements.follow import (
     Response,
     closed_line,
     follow_line,
-    foundation,
     indented_line,
     steady_start,
 )
-from mdr_dask.physics.transients.velocity_jump import velocity_jump
+from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
+from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS = 50
 STANDARD = foundation([3.0], [0.25], 0.0)
@@ -34,7 +34,7 @@ def rough(oversampling: int = 8) -> tuple[np.ndarray, np.ndarray]:
 
 def bowl(nodes: int, coefficient: float = 10.0) -> Line:
     """Return a smooth parabola."""
-    return indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), coefficient, 2.0)
+    return indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, 2.0))
 
 
 def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
@@ -47,11 +47,11 @@ def jump(
     line: Line, solid: Foundation, reaches: tuple[float, float], load: float, last: float, cells: float = 0.5
 ) -> tuple[np.ndarray, Response]:
     state, depth, status = steady_start(line, solid, reaches[0], load)
-    assert status == CONVERGED
+    assert status == Outcome.CONVERGED
     moments = moments_to(last, reaches[1], line.height.size - 1, cells)
     one = np.ones(moments.size)
     found = follow_line(line, solid, moments, moments * reaches[1], reaches[1] * one, load * one, state, depth)
-    assert found.status == CONVERGED
+    assert found.status == Outcome.CONVERGED
     return moments, found
 
 
@@ -98,7 +98,7 @@ def test_second_order_in_the_grid(solid: Foundation) -> None:
 def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     """The solver for one jump shares nothing with this one but the line; the immediate value at its own."""
     reaches = 0.1, 0.1 * (1 + change)
-    march = velocity_jump(*rough(64), 0.3, reaches, TIMES, np.pi * POINTS, 96)
+    march = velocity_jump(periodic_line(*rough(64)), 0.3, reaches, Course(TIMES, np.pi * POINTS, 96))
     exact = np.append(march.at, march.trace)
     found = [np.abs(at_times(closed_line(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
     assert found[1][0] < 2e-4
@@ -122,7 +122,7 @@ def test_every_course_keeps_the_balance() -> None:
     moments = np.linspace(0, 4, 4001)
     speed, load = 0.1 * np.sin(2 * moments), 0.2 + 0.1 * np.sin(3 * moments)
     found = follow_line(line, STANDARD, moments, 0.05 * (1 - np.cos(2 * moments)), speed, load, state, depth)
-    assert found.status == CONVERGED
+    assert found.status == Outcome.CONVERGED
     assert missing(found) < BALANCE
     assert np.all(np.diff(found.lost) > -1e-15)
 
@@ -189,13 +189,13 @@ def test_full_contact_is_exact(solid: Foundation) -> None:
 
 
 def test_contact_that_leaves_the_line_is_a_status() -> None:
-    assert steady_start(bowl(100, 0.1), KELVIN, 0.05, 1.0)[2] == OUTSIDE_LINE
+    assert steady_start(bowl(100, 0.1), KELVIN, 0.05, 1.0)[2] == Outcome.OUTSIDE_LINE
     line = bowl(100)
     state, depth, status = steady_start(line, KELVIN, 0.05, 0.05)
     moments = np.linspace(0, 20, 2001)
     one = np.ones(moments.size)
     found = follow_line(line, KELVIN, moments, 0.05 * moments, 0.05 * one, 0.05 * np.exp(moments), state, depth)
-    assert (status, found.status) == (CONVERGED, OUTSIDE_LINE)
+    assert (status, found.status) == (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
 
 
 def test_rest_is_static() -> None:

@@ -7,18 +7,17 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from mdr_dask.physics.transients.element import Foundation
-from mdr_dask.physics.transients.elements import CONVERGED
-from mdr_dask.physics.transients.forces import Line
-from mdr_dask.physics.transients.protocol import (
-    KELVIN,
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.transients.elements.edges import Line
+from mdr_dask.physics.transients.elements.follow import (
     Response,
     closed_line,
     follow_line,
-    foundation,
     indented_line,
     steady_start,
 )
+from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 
 Array = np.ndarray
 STANDARD = foundation([3.0], [0.25], 0.0)
@@ -44,13 +43,13 @@ def load(time: Array) -> Array:
 def followed(line: Line, solid: Foundation, before: float, cells: float = 0.5) -> tuple[Array, Response]:
     """Follow the course above from a steady state, in steps that begin finely."""
     state, depth, status = steady_start(line, solid, before, LOAD)
-    assert status == CONVERGED
+    assert status == Outcome.CONVERGED
     step = cells / (line.height.size - 1) / 0.08
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
     moments = np.concatenate([grown, np.linspace(grown[-1], LAST, int((LAST - grown[-1]) / step) + 2), TIMES])
     moments = np.unique(moments)
     found = follow_line(line, solid, moments, travel(moments), reach(moments), load(moments), state, depth)
-    assert found.status == CONVERGED
+    assert found.status == Outcome.CONVERGED
     return moments, found
 
 
@@ -124,7 +123,7 @@ def test_arms_under_indenters(coefficient: float, exponent: float) -> None:
     drag, depth = at_rest_then_slide(STANDARD, 2000, height, 1.25)
     errors = []
     for nodes in (200, 800):
-        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), coefficient, exponent)
+        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
         moments, found = followed(line, STANDARD, 0.0)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) - drag)) / np.max(np.abs(drag)))
         off = np.max(np.abs(np.interp(TIMES, moments, found.depth) / depth - 1))
@@ -171,7 +170,7 @@ def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
     instant = forces(start, rate_of(start, reach(0.0), LOAD), reach(0.0))[1]
     errors, first = [], []
     for nodes in (200, 800):
-        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), coefficient, exponent)
+        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
         moments, found = followed(line, KELVIN, 0.05)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) / np.array(drag) - 1)))
         first.append(abs(found.drag[0] / instant - 1))

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
 
+from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.transients.velocity_jump import CONVERGED, velocity_jumps
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients.ends import Line, ends_on
+from mdr_dask.physics.transients.velocity_jump import Course, velocity_jumps
 
 POINTS = 500
 TIMES = np.geomspace(1e-3, 20, 30)
@@ -15,14 +18,15 @@ CHANGES = np.array([-0.2, 0.2, 0.3])
 def test_extremes_come_to_rest(hurst: float) -> None:
     """Between the extremes of thesis chapter 4, near full contact at v tau > L too, nothing runs away."""
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(2014, 0, POINTS // 2)
-    line = (roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1))
+    line = periodic_line(*(roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1)))
     load, reach, change = (axis.ravel() for axis in np.meshgrid(LOADS, REACHES, CHANGES))
     both = np.column_stack([reach, reach * (1 + change)])
-    jumps = velocity_jumps(*line, load, both, TIMES, np.pi * POINTS, 8, np.zeros(load.size))
-    failed = sum(jump.status != CONVERGED for jump in jumps)
+    line = Line.of(line)
+    jumps = velocity_jumps(line, load, both, ends_on(line, load, both), Course(TIMES, np.pi * POINTS, 8))
+    failed = sum(jump.outcome != Outcome.CONVERGED for jump in jumps)
     assert failed <= 0.02 * load.size  # single asperities that come and go at the lowest velocity
     for jump in jumps:
-        if jump.status == CONVERGED:
+        if jump.outcome == Outcome.CONVERGED:
             span = abs(jump.at - jump.after) + abs(jump.after - jump.before)
             away = np.max(np.abs(jump.trace - jump.after))
             # a single line may overshoot, by as much as it jumps

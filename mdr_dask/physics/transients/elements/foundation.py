@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.solids import recovery_times
 
 
 class Foundation(NamedTuple):
@@ -40,6 +42,39 @@ class Foundation(NamedTuple):
     outward: FloatArray
     inward: FloatArray
     push: FloatArray
+
+
+def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
+    """Return the foundation of a solid, with the modes in which it recovers without force.
+
+    Parameters
+    ----------
+    moduli, times : array_like, shape (arms,)
+        G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
+    viscosity : float
+        eta / G_inf in that unit; 1 for the Kelvin body (no arms) if the unit is tau.
+
+    Raises
+    ------
+    ValueError
+        If the solid is elastic, so that nothing relaxes.
+    """
+    g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
+    if g.size == 0 and not viscosity > 0:
+        raise ValueError("expected a solid with an arm or a dashpot, got an elastic one")
+    order = np.argsort(tau)
+    g, tau = g[order], tau[order]
+    pole, weight = (np.append(0.0, tau), np.append(viscosity, g * tau)) if viscosity > 0 else (tau, g * tau)
+    zeros, distance = recovery_times(weight, pole)
+    # a mode of unit displacement, u = 1 and a_m = -lambda / (tau_m - lambda): orthogonal under the weights
+    modes = -zeros / distance
+    modes /= np.sqrt(weight @ modes**2)
+    load = np.append(1.0, 0 * g) if viscosity > 0 else g / (1 + g.sum())
+    inward = np.ascontiguousarray((weight[:, None] * modes).T)
+    return Foundation(g, tau, float(viscosity), 1 / zeros, modes, inward, modes.T @ load)
+
+
+KELVIN = foundation([], [], 1.0)
 
 
 class Scratch(NamedTuple):

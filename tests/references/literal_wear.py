@@ -11,7 +11,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
 from mdr_dask.physics.wear.forced import farthest_contact
-from mdr_dask.physics.wear.worn import Worn, check_stick_radius, limit_radius, worn_volume
+from mdr_dask.physics.wear.rules import limit_radius
+from mdr_dask.physics.wear.worn import Worn, check_stick_radius
 
 
 def literal(
@@ -82,13 +83,14 @@ def _describe(profile: Profile, c: float, grid: UniformGrid, worn: FloatArray, d
     eta = 1.0 - float(profile.image(np.array(c)))
     border = max(grid.edge(image, depth - eta), c)
 
-    def change(x: FloatArray) -> FloatArray:
-        return np.asarray(np.interp(x, grid.nodes, shift))
-
-    slopes = np.gradient(shift, grid.spacing)
-
-    def change_slope(x: FloatArray) -> FloatArray:
-        return np.asarray(np.interp(x, grid.nodes, slopes))
-
-    volume, force = worn_volume(change, c, a), grid.force(image, depth)
-    return Worn(profile, c, a, a, volume, force, np.nan, change, change_slope, depth=depth, border=border)
+    return Worn(
+        contact_radius=a,
+        stick_border=border,
+        depth=depth,
+        normal_force=grid.force(image, depth),
+        wear_volume=float(2.0 * np.pi * np.trapezoid(worn * grid.nodes, grid.nodes)),
+        worn_depth=float(np.max(worn)),
+        height=lambda r: np.asarray(profile.height(r) + np.interp(r, grid.nodes, worn, right=0.0)),
+        image=lambda x: np.asarray(np.interp(np.abs(x), grid.nodes, image)),
+        pressure=lambda r: np.asarray(np.interp(r, grid.nodes, grid.pressure(image, depth), right=0.0)),
+    )

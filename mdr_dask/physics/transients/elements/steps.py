@@ -11,7 +11,9 @@ import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.transients.element import (
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.transients.elements.edges import Edges, Line, balance, depth_for, under_elements
+from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Scratch,
     advance,
@@ -24,9 +26,7 @@ from mdr_dask.physics.transients.element import (
     scratch_for,
     stored,
 )
-from mdr_dask.physics.transients.forces import Edges, Line, balance, depth_for, under_elements
 
-CONVERGED, NOT_CONVERGED, OUTSIDE_LINE = 0, 1, 2
 DRAG, DEPTH, RATE, CONTACT, STORED, WORK, LOST = range(7)
 ROWS = 7
 CORRECTIONS = 2  # of the moments of release and the depth within a step
@@ -353,7 +353,7 @@ def follow_elements(
     if solid.viscosity == 0:
         depth, work, good = _instant(solid, state, room.under, loads[0], depth)
         if not good:
-            return NOT_CONVERGED
+            return Outcome.DEPTH_NOT_FOUND
     for now in range(moments.size):
         if now > 0:
             step = moments[now] - moments[now - 1]
@@ -370,17 +370,17 @@ def follow_elements(
                 solid, state, room, mean, old_depth, guess, reaches[now - 1], reaches[now], step
             )
             if not good:
-                return NOT_CONVERGED
+                return Outcome.DEPTH_NOT_FOUND
             work, lost = work + done, lost + gone
             if solid.viscosity == 0:
                 rate = (depth - old_depth) / step
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
-            return OUTSIDE_LINE
+            return Outcome.OUTSIDE_LINE
         exact, rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
-    return CONVERGED
+    return Outcome.CONVERGED
 
 
 @njit(nogil=True, cache=True)

@@ -8,16 +8,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.element import Foundation
-from mdr_dask.physics.transients.elements import (
-    CONVERGED,
-    NOT_CONVERGED,
-    OUTSIDE_LINE,
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces.shapes import Shape
+from mdr_dask.physics.transients.elements.edges import Edges, Line, under_elements
+from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation
+from mdr_dask.physics.transients.elements.steps import (
     ROWS,
     State,
     follow_elements,
@@ -25,12 +23,7 @@ from mdr_dask.physics.transients.elements import (
     note_edges,
     orbit,
 )
-from mdr_dask.physics.transients.forces import Edges, Line, under_elements
 
-MESSAGES = {
-    NOT_CONVERGED: "the depth for the load was not found at one moment of the protocol",
-    OUTSIDE_LINE: "the contact leaves the line: a longer line or a smaller load is needed",
-}
 TURNS = 3000  # of an element around the line before it is as it was
 STEADY = 1e-14  # of the depth at the start
 NEARLY = 1e-6  # of the load: what the steady state at the start may miss
@@ -52,8 +45,7 @@ class Response(NamedTuple):
         all that it will lose.
     displacement : array, shape (n,)
         Of every element at the end.
-    status : int
-        `CONVERGED` or a key of `MESSAGES`.
+    status : Outcome
     state : State
         Of every element at the end, for going on from there.
     """
@@ -66,44 +58,8 @@ class Response(NamedTuple):
     work: FloatArray
     lost: FloatArray
     displacement: FloatArray
-    status: int
+    status: Outcome
     state: State
-
-
-def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundation:
-    """Return the foundation of a solid, with the modes in which it recovers without force.
-
-    Parameters
-    ----------
-    moduli, times : array_like, shape (arms,)
-        G_m / G_inf, positive, and tau_m, distinct, in the unit of time used.
-    viscosity : float
-        eta / G_inf in that unit; 1 for the Kelvin body (no arms) if the unit is tau.
-
-    Raises
-    ------
-    ValueError
-        If the solid is elastic, so that nothing relaxes.
-    """
-    g, tau = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
-    if g.size == 0 and not viscosity > 0:
-        raise ValueError("expected a solid with an arm or a dashpot, got an elastic one")
-    glass = 1 + g.sum()
-    arms, load = np.diag(g), np.zeros(g.size)
-    if viscosity > 0:
-        weight = np.append(viscosity, g * tau)
-        stiffness = np.block([[np.array([[glass]]), -g[None, :]], [-g[:, None], arms]])
-        load = np.append(1.0, load)
-    else:
-        weight, stiffness, load = g * tau, arms - np.outer(g, g) / glass, g / glass
-    root = np.sqrt(weight)
-    rates, modes = np.linalg.eigh(stiffness / root / root[:, None])
-    outward = np.ascontiguousarray(modes / root[:, None])
-    inward = np.ascontiguousarray(modes.T * root)
-    return Foundation(g, tau, float(viscosity), rates, outward, inward, modes.T @ (load / root))
-
-
-KELVIN = foundation([], [], 1.0)
 
 
 def closed_line(height: FloatArray, slope: FloatArray) -> Line:
@@ -111,18 +67,18 @@ def closed_line(height: FloatArray, slope: FloatArray) -> Line:
     return Line(np.append(height, height[0]), np.append(slope, slope[0]), True)
 
 
-def indented_line(height: FloatArray, slope: FloatArray, coefficient: float, exponent: float) -> Line:
-    """Return a rough indenter h(x) - c |x|^n on a line that does not close.
+def indented_line(height: FloatArray, slope: FloatArray, body: Shape) -> Line:
+    """Return the line of a rough indenter, which does not close.
 
     Parameters
     ----------
     height, slope : array, shape (n + 1,)
         The roughness and its derivative at the nodes of a line of unit length, both ends included.
-    coefficient, exponent : float
-        c > 0 and n >= 1; x is measured from node n // 2. The kink of a cone is rounded over one cell.
+    body : Shape
+        What is under the roughness, its tip at node n // 2. The kink of a cone is rounded over one cell.
     """
     n = height.size - 1
-    smooth, left, right = PowerLaw(coefficient, exponent).at((np.arange(n + 1) - n // 2) / n)
+    smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
     return Line(height + smooth, slope + 0.5 * (left + right), False)
 
 
@@ -146,7 +102,7 @@ def _copy(state: State) -> State:
     )
 
 
-def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tuple[State, float, int]:
+def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
     One element is carried around the line until it comes back as it was, in steps of half a cell by the method of
@@ -157,8 +113,7 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
     -------
     state : State
     depth : float
-    status : int
-        `CONVERGED` or a key of `MESSAGES`.
+    status : Outcome
     """
     n, arms = line.height.size - 1, solid.times.size
     state = untouched(n, arms)
@@ -173,13 +128,13 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
     while (found := excess(low + width)) < 0:
         low, width = low + width, 2 * width
     if not np.isfinite(found):
-        return state, np.nan, NOT_CONVERGED
+        return state, np.nan, Outcome.DEPTH_NOT_FOUND
     depth = brentq(excess, low, low + width, xtol=1e-15 * width, rtol=STEADY)
     if not abs(excess(depth)) < NEARLY:
-        return state, depth, NOT_CONVERGED
+        return state, depth, Outcome.DEPTH_NOT_FOUND
     outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
     note_edges(solid, line, state, depth, reach, load)
-    return state, depth, OUTSIDE_LINE if outside else CONVERGED
+    return state, depth, Outcome.OUTSIDE_LINE if outside else Outcome.CONVERGED
 
 
 def _halved(line: Line) -> Line:
@@ -255,7 +210,7 @@ def follow_line(
     out = np.full((ROWS, moments.size), np.nan)
     status = follow_elements(solid, line, moments, travels, reaches, loads, now, depth, out)
     drag, depths, rate, contact, stored, work, lost = out
-    return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, status, now)
+    return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, Outcome(status), now)
 
 
 def follow(

@@ -10,18 +10,45 @@ alone, it is found once for a few dozen places; any other place follows it. a is
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
-from mdr_dask.physics.wear.forced_slip import virgin_areas
-from mdr_dask.physics.wear.worn import THESIS_XI, Worn, limit_radius, worn_height, worn_volume
+from mdr_dask.physics.wear.rules import THESIS_XI, limit_radius
+from mdr_dask.physics.wear.worn import (
+    Scar,
+    Worn,
+    contact_pressure,
+    largest_wear,
+    virgin_load,
+    worn_height,
+    worn_image,
+    worn_profile,
+    worn_volume,
+)
 
-#: Steps of the classical Runge-Kutta rule in xi N / a, and where nothing changes any more.
-_STEP = 0.05
-_LAST = 60.0
+
+class Settings(NamedTuple):
+    """Tuned numbers; `tests/physics/wear/test_forced.py` halves the step.
+
+    Parameters
+    ----------
+    step, last : float
+        Step of the classical Runge-Kutta rule in xi N / a, and where nothing changes any more.
+    error : float
+        Error of every output over its largest value: that of the rule's own equation, no more.
+    """
+
+    step: float = 0.05
+    last: float = 60.0
+    error: float = 1e-5
+
+
+SETTINGS = Settings()
 
 
 def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float = THESIS_XI) -> Worn:
@@ -44,51 +71,64 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
         With the depth and the border up to which the contact sticks.
     """
     c, reach = stick_radius, limit_radius(profile, stick_radius)
-    eta = float(profile.rise(np.array(1.0), c))
-    step, stages = _depth_stages(profile, c, eta, min(xi * cycles / reach, _LAST))
+    eta = float(profile.rise(np.array(1.0 - c), c))
+    step, stages, load = _depth_stages(profile, c, eta, min(xi * cycles / reach, SETTINGS.last))
     rise = float(stages[:, 4].sum())
 
     def share(x: FloatArray) -> FloatArray:
-        y = (profile.rise(np.atleast_1d(x), c) / eta).ravel()
+        y = (profile.rise(np.atleast_1d(x) - c, c) / eta).ravel()
         _follow(stages, step, y)
         return y.reshape(np.shape(x))
 
     def change(x: FloatArray) -> FloatArray:
-        return np.asarray(eta * (rise + share(x)) - profile.rise(x, c))
+        return np.asarray(eta * (rise + share(x)) - profile.rise(x - c, c))
 
-    def change_slope(x: FloatArray) -> FloatArray:
-        step = 1e-6 * np.maximum(x - c, 1e-3)
-        return np.asarray((change(x + step) - change(x)) / step)
+    def slope(x: FloatArray) -> FloatArray:
+        gap = 1e-6 * np.maximum(x - c, 1e-3 * (1.0 - c))
+        return np.asarray((change(x + gap) - change(x)) / gap)
 
-    border = c
-    if rise > 0.0:
-        border = bisect(lambda x: float(share(np.array(x))[()]), c, 1.0)
+    border = bisect(lambda x: float(share(np.array(x))[()]), c, 1.0) if rise > 0.0 else c
     near = (*(border + (1.0 - border) * 0.25**k for k in range(1, 8)), border, 1.0)
     breaks = tuple(sorted({*near, *(border - (border - c) * 0.25**k for k in range(1, 4))} - {c}))
+    whole = Scar(c, reach, change, slope, breaks)
+
+    def fall(radius: float) -> float:
+        return -float(worn_height(whole, np.array([radius]))[0])
+
     high = reach
-    while worn_height(change, c, np.array([high]), breaks)[0] > 0.0 and high < profile.largest_radius:
+    while fall(high) < 0.0 and high < profile.largest_radius:
         high = min(1.3 * high, profile.largest_radius)
-    scar = bisect(lambda r: -float(worn_height(change, c, np.array([r]), breaks)[0]), 1.0, high) if cycles > 0 else 1.0
-    edge = bisect(lambda x: float(share(np.array(x))[()]) - 1.0, border, scar) if scar > 1.0 else 1.0
-    area, slipping = virgin_areas(profile, c)
-    force = 2.0 * (c - area + slipping)
-    volume = worn_volume(change, c, scar, breaks)
+    scar = whole._replace(radius=bisect(fall, 1.0, high) if cycles > 0.0 else 1.0)
+    reached = scar.radius > 1.0
+    edge = bisect(lambda x: float(share(np.array(x))[()]) - 1.0, border, scar.radius) if reached else 1.0
     depth = 1.0 + eta * rise
-    return Worn(profile, c, scar, edge, volume, force, 1e-5, change, change_slope, breaks, depth=depth, border=border)
+    return Worn(
+        contact_radius=scar.radius,
+        stick_border=border,
+        depth=depth,
+        normal_force=2.0 * (virgin_load(profile, c) + eta * load),
+        wear_volume=worn_volume(scar),
+        worn_depth=largest_wear(scar),
+        height=worn_profile(profile, scar),
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, edge, depth, border),
+        relative_error=SETTINGS.error,
+    )
 
 
-def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray]:
-    """Return the length of the steps, and for each the four rates of d / eta met in it and what d / eta grew by."""
+def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray, float]:
+    """Return length of the steps, for each four rates and growth of d / eta, and the load of the virgin slip zone."""
     abscissa, weight = gauss(24)
     cuts = np.array([0.0, 0.02, 0.1, 0.3, 1.0])
     widths = np.diff(cuts)
-    places = c + (1.0 - c) * (cuts[:-1, None] + widths[:, None] * abscissa).ravel()
+    gaps = (1.0 - c) * (cuts[:-1, None] + widths[:, None] * abscissa).ravel()
     weights = (1.0 - c) * (widths[:, None] * weight).ravel()
-    y = profile.rise(places, c) / eta
-    stages = np.zeros((int(np.ceil(duration / _STEP)), 5))
+    y = profile.rise(gaps, c) / eta
+    load = float((1.0 - y) @ weights)
+    stages = np.zeros((int(np.ceil(duration / SETTINGS.step)), 5))
     step = duration / max(stages.shape[0], 1)
     _advance(y, weights, step, stages)
-    return step, stages
+    return step, stages, load
 
 
 @njit(nogil=True, cache=True)

@@ -1,0 +1,285 @@
+"""Parameters and outputs of ``fretting_wear``, dimensionless or dimensional."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
+
+
+class Parabola(Parameters):
+    """A paraboloid, which stands for a sphere."""
+
+    shape: Literal["parabola"] = "parabola"
+    radius: float | None = quantity("m", "radius of curvature R at the apex", gt=0, default=None)
+
+    @property
+    def power_law(self) -> tuple[float, float]:
+        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        return (math.nan if self.radius is None else 0.5 / self.radius), 2.0
+
+
+class Cone(Parameters):
+    """A cone."""
+
+    shape: Literal["cone"]
+    angle: float | None = quantity(
+        "rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2, default=None
+    )
+
+    @property
+    def power_law(self) -> tuple[float, float]:
+        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        return (math.nan if self.angle is None else math.tan(self.angle)), 1.0
+
+
+class Power(Parameters):
+    """A body of revolution c r^n."""
+
+    shape: Literal["power"]
+    exponent: float = quantity("1", "exponent n of the body c r^n", gt=0.1, le=50)
+    coefficient: float | None = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0, default=None)
+
+    @property
+    def power_law(self) -> tuple[float, float]:
+        """Coefficient, NaN if it is not given, and exponent of the body c r^n."""
+        return (math.nan if self.coefficient is None else self.coefficient), self.exponent
+
+
+class Table(Parameters):
+    """A measured profile: a CSV table with two columns, radius and height, in metres, and a header line."""
+
+    shape: Literal["table"]
+    file: NamedFile
+
+    @property
+    def power_law(self) -> tuple[float, float]:
+        """A table has none."""
+        return math.nan, math.nan
+
+    @field_validator("file")
+    @classmethod
+    def _is_profile(cls, file: NamedFile) -> NamedFile:
+        from mdr_dask.physics.mdr.profile_table import read_table
+
+        try:
+            read_table(file.read_text())
+        except ValueError as problem:
+            raise ValueError(f"{file.name}: {problem}") from None
+        return file
+
+
+Indenter = Annotated[Parabola | Cone | Power | Table, Field(discriminator="shape")]
+
+#: What gives the size of a body in a dimensional campaign.
+_SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
+
+
+class LoadStep(Parameters):
+    """One block of a load history."""
+
+    cycles: float = quantity("1", "cycles of the block (N in a dimensionless campaign)", ge=0)
+    amplitude_factor: float = quantity("1", "amplitude over the campaign's amplitude", gt=0, default=1.0)
+    load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
+
+
+class FrettingWear(Parameters):
+    """Parameters of fretting wear, dimensionless (no modulus) or dimensional; sliding if a `path` is given."""
+
+    gone: ClassVar[Mapping[str, str]] = {
+        "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
+        "method": "write wear_rule: exact, fast or limit; exact is the default",
+        "tolerance": "write accuracy",
+        "load": "write normal_force",
+        "modulus": "write contact_modulus",
+        "curvature_radius": "write indenter: {shape: parabola, radius: ...}",
+        "angle": "write indenter: {shape: cone, angle: ...}",
+        "block_normal_force": "write block_contact_force",
+        "discretisation_error": "every output comes with its own error, such as wear_volume_error",
+    }
+    indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
+    wear_rule: Literal["exact", "fast", "limit"] = Field(
+        "exact",
+        description="exact evolution; fast rule of the thesis, whose stated error is that of its own equation; "
+        "or limit, the end of all wear",
+    )
+    hold: Literal["depth", "force"] = Field("depth", description="what stays constant while the body wears")
+    cycles: float = quantity("1", "number of cycles; N = cycles / N0 in a dimensionless campaign", ge=0, default=1.0)
+    path: float | None = quantity(
+        "m",
+        "sliding path, in place of cycles and amplitude: gross slip in one direction "
+        "(k E* l / (sigma0 a0) in a dimensionless campaign)",
+        ge=0,
+        default=None,
+    )
+    stick_radius: float | None = quantity(
+        "1", "stick radius c over the first contact radius a0", gt=0, lt=1, default=None
+    )
+    amplitude: float | None = quantity("m", "amplitude U0 of the tangential oscillation", gt=0, default=None)
+    contact_modulus: float | None = quantity("Pa", "contact modulus E*", gt=0, default=None)
+    shear_modulus: float | None = quantity("Pa", "effective shear modulus G* of the pair", gt=0, default=None)
+    friction: float | None = quantity("1", "coefficient of friction", gt=0, default=None)
+    normal_force: float | None = quantity("N", "normal force of the virgin contact", gt=0, default=None)
+    depth: float | None = quantity("m", "indentation depth of the virgin contact", gt=0, default=None)
+    hardness: float | None = quantity("Pa", "hardness in the wear law", gt=0, default=None)
+    wear_coefficient: float | None = quantity(
+        "1", "wear coefficient k of the law V = k F u / hardness", ge=0, default=None
+    )
+    xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
+    accuracy: float = quantity(
+        "1", "error of the exact profile wanted, over the depth eta d0 that can wear", ge=1e-5, le=1e-1, default=1e-3
+    )
+    cells: int = quantity("1", "cells of the grid of histories", ge=20, le=2000, default=200)
+    friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
+    amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
+    wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
+    history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load instead of `cycles`")] = ()
+    measured: NamedFile | None = Field(
+        default=None, description="table of cycles and volume, or of radius and height, for mdr-dask fit"
+    )
+    extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
+    points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
+
+    @field_validator("history", mode="before")
+    @classmethod
+    def _as_tuple(cls, value: object) -> object:
+        return tuple(value) if isinstance(value, list) else value
+
+    @property
+    def dimensionless(self) -> bool:
+        """Whether lengths are over a0, heights over d0 and so on."""
+        return self.stick_radius is not None or (self.path is not None and self.contact_modulus is None)
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> FrettingWear:
+        given = [name for name in (*self._needed(), "normal_force", "depth") if getattr(self, name) is not None]
+        size = _SIZES.get(self.indenter.shape)
+        if self.dimensionless and size is not None and getattr(self.indenter, size) is not None:
+            given.append(f"indenter.{size}")
+        if self.stick_radius is not None and given:
+            raise ValueError(
+                f"a dimensionless campaign has stick_radius only, got {', '.join(given)} as well; leave one kind out"
+            )
+        if not self.dimensionless:
+            self._check_dimensional()
+        if isinstance(self.indenter, Table) and self.depth is None:
+            raise ValueError("a table of a profile needs a dimensional campaign with its depth")
+        return self
+
+    @model_validator(mode="after")
+    def _sliding(self) -> FrettingWear:
+        if self.path is None:
+            return self
+        oscillating = ("stick_radius", "amplitude", "history", "amplitude_scatter", "friction_scatter")
+        given = [name for name in oscillating if getattr(self, name)]
+        if given:
+            raise ValueError(f"a path is sliding in one direction, got {', '.join(given)} of an oscillation as well")
+        if self.wear_rule != "exact":
+            raise ValueError(f"sliding along a path has wear_rule exact only, got {self.wear_rule!r}")
+        return self
+
+    @model_validator(mode="after")
+    def _history(self) -> FrettingWear:
+        if self.history and self.wear_rule != "exact":
+            raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
+        return self
+
+    def _check_dimensional(self) -> None:
+        missing = [name for name in self._needed() if getattr(self, name) is None]
+        size = _SIZES.get(self.indenter.shape)
+        if size is not None and getattr(self.indenter, size) is None:
+            missing.insert(0, f"indenter.{size}")
+        if missing:
+            raise ValueError(f"give stick_radius, or for a dimensional campaign also {', '.join(missing)}")
+        if (self.normal_force is None) == (self.depth is None):
+            raise ValueError(
+                f"give either normal_force or depth, got normal_force {self.normal_force!r} and depth {self.depth!r}"
+            )
+
+    def _needed(self) -> tuple[str, ...]:
+        oscillating = ("shear_modulus", "friction", "amplitude") if self.path is None else ()
+        return ("contact_modulus", *oscillating, "hardness", "wear_coefficient")
+
+
+def _output(name: str, unit: str, meaning: str, dims: tuple[str, ...] = (), *, default: bool = False) -> Output:
+    return Output(name, unit, meaning, dims, default=default, has_error=True)
+
+
+OUTPUTS = (
+    _output("contact_radius", "m", "radius of the wear scar (a0 = 1 in a dimensionless campaign)", default=True),
+    _output("wear_volume", "m^3", "worn volume (a0^2 d0 = 1 in a dimensionless campaign)", default=True),
+    _output(
+        "contact_force",
+        "N",
+        "normal force on the worn contact (E* d0 a0 = 1 in a dimensionless campaign)",
+        default=True,
+    ),
+    _output("stick_border", "m", "stick radius (a0 = 1 in a dimensionless campaign)"),
+    _output("worn_depth", "m", "largest worn depth (d0 = 1 in a dimensionless campaign)"),
+    _output("worn_profile", "m", "worn profile f(r), from the virgin apex", ("radius",)),
+    _output("worn_image", "m", "worn one-dimensional image g(x)", ("position",)),
+    _output("pressure", "Pa", "contact pressure p(r) (E* d0 / a0 = 1 in a dimensionless campaign)", ("radius",)),
+    _output("block_contact_radius", "m", "contact radius after every block of load", ("block",)),
+    _output("block_stick_border", "m", "stick radius at the end of every block of load", ("block",)),
+    _output("block_depth", "m", "depth at the end of every block of load", ("block",)),
+    _output("block_contact_force", "N", "normal force at the end of every block of load", ("block",)),
+    _output("block_wear_volume", "m^3", "worn volume after every block of load", ("block",)),
+    _output("block_worn_profile", "m", "worn profile after every block of load", ("block", "radius")),
+)
+
+
+def axis(parameters: FrettingWear) -> FloatArray:
+    """Return the radii, or positions, of the profiles, over a0."""
+    return np.linspace(0.0, parameters.extent, parameters.points)
+
+
+def coordinates(parameters: FrettingWear) -> dict[str, Coordinate]:
+    """Return radii, positions and numbers of blocks."""
+    places = axis(parameters)
+    return {
+        "radius": Coordinate(places, "1", "radius over the first contact radius a0"),
+        "position": Coordinate(places, "1", "position over the first contact radius a0"),
+        "block": Coordinate(np.arange(1.0, max(len(parameters.history), 1) + 1.0), "1", "block of the load history"),
+    }
+
+
+def units(parameters: FrettingWear) -> dict[str, str]:
+    """Return the units of a dimensionless campaign: every output is a pure number, and so is the path."""
+    return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
+
+
+def notes(parameters: FrettingWear) -> tuple[str, ...]:
+    """Say what a simplified rule leaves out."""
+    if parameters.wear_rule != "fast":
+        return ()
+    return (
+        "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance from "
+        "the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
+    )
+
+
+_SOLVE = "mdr_dask.models.fretting_wear.solve"
+MODEL = Model(
+    name="fretting_wear",
+    version=4,
+    summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
+    parameters=FrettingWear,
+    outputs=OUTPUTS,
+    compute=deferred(_SOLVE, "compute"),
+    seconds=deferred(_SOLVE, "seconds"),
+    whole=(
+        *("cycles", "path", "wear_coefficient", "hardness"),
+        *("friction", "amplitude", "shear_modulus", "contact_modulus", "depth", "normal_force"),
+        *("indenter.radius", "indenter.angle", "indenter.coefficient"),
+    ),
+    coordinates=coordinates,
+    distinct=deferred(_SOLVE, "distinct"),
+    units=units,
+    notes=notes,
+)

@@ -1,0 +1,354 @@
+"""From a block of fretting wear to arrays: each distinct (body, c, rule) is solved once, for all its cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.fretting_wear.declaration import MODEL, FrettingWear, Indenter, Table, axis
+from mdr_dask.models.fretting_wear.reduction import (
+    Numbers,
+    has_tables,
+    indenters,
+    reduce_block,
+    refuse_gross_slip,
+    table_profile,
+)
+from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear import rules
+from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.forced_rule import fast_forced
+from mdr_dask.physics.wear.history import LoadBlock, history
+from mdr_dask.physics.wear.worn import Worn
+
+#: Numbers of the closed forms, which are computed for many cases at once.
+_CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
+#: Outputs whose name in a campaign is not that of a worn contact's number: a parameter has it.
+_RENAMED = {"contact_force": "normal_force"}
+#: Accuracies that are tried in turn where the campaign asks for a relative one: each a quarter of the last.
+_FINEST, _FINER = 1e-5, 0.25
+
+#: Positions of cases in a block.
+Places = list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Task:
+    """What makes a solution that several cases share: everything but the number of cycles and xi."""
+
+    table: Table | None
+    depth: float
+    exponent: float
+    level: float
+    rule: str
+    hold: str
+    accuracy: float
+    cells: int
+    blocks: tuple[tuple[float, float, float], ...]
+
+    @property
+    def profile(self) -> Profile:
+        """The virgin body."""
+        return PowerProfile(self.exponent) if self.table is None else table_profile(self.table, self.depth)
+
+
+def compute(block: Block[FrettingWear]) -> Result:
+    """Compute all cases of a block."""
+    numbers, messages, status = _reduced(block)
+    wanted = [name for name in block.outputs if name != "status"]
+    values = {name: np.full(status.shape + _sizes(block.parameters, name), np.nan) for name in wanted}
+    if _is_plain(block):
+        solves = _solve_plain(block, numbers, values, status == Status.DONE)
+    else:
+        solves = _solve_each(block, numbers, values, status, messages)
+    _scale(values, numbers)
+    return Result(values, status, messages, solves)
+
+
+def distinct(block: Block[FrettingWear]) -> int:
+    """Count the different solutions among the cases of a block, those of `compute`."""
+    numbers, _, status = _reduced(block)
+    if _is_plain(block):
+        return _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
+    return sum(_solves_of(task, wanted) for task, wanted in _tasks(block, numbers, status).items())
+
+
+def seconds(block: Block[FrettingWear]) -> float:
+    """Estimate the time of a block."""
+    parameters, size = block.parameters, block.cases * len(block.realisations)
+    if _is_plain(block):
+        return 0.01 + 3e-5 * size
+    if parameters.history:
+        return 0.01 + 1.2e-7 * parameters.cells**3 * size
+    finer = (1e-3 / parameters.accuracy) ** 0.6
+    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.03 * finer}[parameters.wear_rule]
+    if parameters.hold == "force":
+        each = {"limit": 0.3 * finer, "fast": 0.03, "exact": 0.5 * finer}[parameters.wear_rule]
+    numbers, _ = reduce_block(block)
+    moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
+    solves = moments if parameters.wear_rule == "fast" else _count(numbers.exponent, numbers.level)
+    return float(0.01 + each * solves + 4e-3 * moments + 5e-5 * size)
+
+
+def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
+    """Return the numbers of a block, what is wrong with cases, and their status so far."""
+    numbers, messages = reduce_block(block)
+    refuse_gross_slip(block, numbers, messages)
+    status = np.full(numbers.level.shape, Status.DONE, dtype=np.int8)
+    for position in messages:
+        status[position] = Status.FAILED
+    return numbers, messages, status
+
+
+def _plain_name(name: str) -> tuple[str, bool]:
+    """Return the output of one contact that an output, or an error, of a campaign is, and whether it is an error."""
+    owners = {companion.name: owner for owner, companion in MODEL.companions.items()}
+    plain = owners.get(name, name).removeprefix("block_")
+    return _RENAMED.get(plain, plain), name in owners
+
+
+def _sizes(parameters: FrettingWear, name: str) -> tuple[int, ...]:
+    """Return the lengths of the dimensions that an output has of its own."""
+    lengths = {"block": max(len(parameters.history), 1)}
+    return tuple(lengths.get(dim, parameters.points) for dim in MODEL.output(name).dims)
+
+
+def _scale(values: dict[str, FloatArray], numbers: Numbers) -> None:
+    """Give the outputs of dimensional cases their units; dimensionless cases have units of one."""
+    units = {
+        "contact_radius": numbers.length,
+        "stick_border": numbers.length,
+        "depth": numbers.height,
+        "wear_volume": numbers.length**2 * numbers.height,
+        "normal_force": numbers.force,
+        "worn_profile": numbers.height,
+        "worn_image": numbers.height,
+        "worn_depth": numbers.height,
+        "pressure": numbers.force / numbers.length**2,
+    }
+    for name, array in values.items():
+        unit = units[_plain_name(name)[0]]
+        array *= unit.reshape(unit.shape + (1,) * (array.ndim - 2))
+
+
+def _is_plain(block: Block[FrettingWear]) -> bool:
+    """Tell whether every case is a power law with scalar outputs by the limit or the fast rule at constant depth."""
+    simple = set(block.columns.get("wear_rule", [block.parameters.wear_rule])) <= {"limit", "fast"}
+    depth = set(block.columns.get("hold", [block.parameters.hold])) == {"depth"}
+    wanted = {
+        name if name == "status" else _plain_name(name)[0] for name in block.outputs if not name.startswith("block")
+    }
+    blocks = any(name.startswith("block") for name in block.outputs)
+    plain_load = depth and not block.parameters.history and "history" not in block.columns
+    return simple and plain_load and not blocks and not has_tables(block) and wanted <= {*_CLOSED_FORMS, "status"}
+
+
+def _solve_plain(
+    block: Block[FrettingWear], numbers: Numbers, values: dict[str, FloatArray], good: NDArray[np.bool_]
+) -> int:
+    """Solve limits and fast rules of power laws, all at once; return how many were distinct."""
+    is_fast = np.asarray(block.column("wear_rule") == "fast")
+    fast = np.broadcast_to(is_fast[:, None], good.shape)[good]
+    cycles, xi = np.where(fast, numbers.cycles[good], np.inf), np.where(fast, numbers.xi[good], 0.0)
+    rows, back = _distinct(np.stack([numbers.exponent[good], numbers.level[good], cycles, xi]))
+    pairs, to_pair = _distinct(rows[:2])
+    results = np.array(rules.limit_cases(pairs[0], pairs[1] ** (1.0 / pairs[0])))[:, to_pair]
+    finite = np.isfinite(rows[2])
+    n, level, cycles, xi = rows[:, finite]
+    stick = rows[1] ** (1.0 / rows[0])
+    results[:, finite] = rules.fast_cases(n, level ** (1.0 / n), cycles, xi, results[0, finite])
+    found = dict(zip(_CLOSED_FORMS, (*results, stick), strict=True))
+    for name, array in values.items():
+        plain, is_error = _plain_name(name)
+        array[good] = (rules.SETTINGS.error if is_error else 1.0) * found[plain][back]
+    return int(rows.shape[1])
+
+
+def _distinct(rows: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Return the distinct columns and where each column stands among them."""
+    if rows.shape[1] == 0:
+        return rows, np.zeros(0, dtype=np.intp)
+    order = np.lexsort(rows)
+    ordered = rows[:, order]
+    new = np.append(True, np.any(ordered[:, 1:] != ordered[:, :-1], axis=0))
+    back = np.empty(order.size, dtype=np.intp)
+    back[order] = np.cumsum(new) - 1
+    return ordered[:, new], back
+
+
+def _count(*parts: FloatArray) -> int:
+    return int(_distinct(np.stack([np.nan_to_num(part).ravel() for part in parts]))[0].shape[1])
+
+
+def _solve_each(
+    block: Block[FrettingWear],
+    numbers: Numbers,
+    values: dict[str, FloatArray],
+    status: NDArray[np.int8],
+    messages: dict[tuple[int, int], str],
+) -> int:
+    """Solve one task after the other, with all the cycles asked of it."""
+    solves, places = 0, axis(block.parameters)
+    for task, wanted in _tasks(block, numbers, status).items():
+        try:
+            contacts = _contacts(task, list(wanted), _Demand(block, places))
+        except (ValueError, ArithmeticError) as problem:
+            kind = Status.FAILED if isinstance(problem, ValueError) else Status.NOT_CONVERGED
+            for position in (p for positions in wanted.values() for p in positions):
+                status[position], messages[position] = kind, str(problem)
+            continue
+        solves += _solves_of(task, wanted)
+        for positions, (records, missed) in zip(wanted.values(), contacts, strict=True):
+            for name, array in values.items():
+                answer = _answer(records, name, places)
+                for position in positions:
+                    array[position] = answer
+            messages.update(dict.fromkeys(positions, missed) if missed else {})
+    return solves
+
+
+def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | FloatArray:
+    """Return one output of a solution; those of the blocks of a history have a row for each block."""
+    plain, is_error = _plain_name(name)
+    answers = [
+        one.error(plain, places) if is_error else one.value(plain, places)
+        for one in (records if name.startswith("block_") else records[-1:])
+    ]
+    return np.array(answers) if name.startswith("block_") else answers[0]
+
+
+class _Demand:
+    """What a block asks of the accuracy of a solution."""
+
+    def __init__(self, block: Block[FrettingWear], places: FloatArray) -> None:
+        self.accuracy, self.places = block.accuracy, places
+        self.outputs = [name for name in block.outputs if name in MODEL.companions]
+        self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
+
+    def missed(self, records: Sequence[Worn]) -> str:
+        """Say which outputs miss the relative accuracy and by how much; nothing if none does."""
+        if self.accuracy is None:
+            return ""
+        shares = {name: self._share(records, name) for name in self.outputs}
+        told = [f"{name} {share:.1e}" for name, share in shares.items() if share > self.accuracy]
+        return f"estimated relative error of {', '.join(told)}, {self.accuracy:.1e} was asked for" if told else ""
+
+    def _share(self, records: Sequence[Worn], name: str) -> float:
+        """Return the error of an output over its largest value; 0 over 0 is none."""
+        error, value = (np.asarray(_answer(records, each, self.places)) for each in (MODEL.companions[name].name, name))
+        known = np.isfinite(error) & np.isfinite(value)
+        largest = np.max(error, initial=0.0, where=known)
+        return float(largest / np.max(np.abs(value), initial=0.0, where=known)) if largest > 0.0 else 0.0
+
+
+def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:
+    """Return how many solutions a task takes: one for all cycles if they are moments of one march, or none matter."""
+    marched = task.rule == "sliding" or (task.rule == "exact" and not task.blocks)
+    return 1 if marched or task.rule == "limit" else len(wanted)
+
+
+def _tasks(
+    block: Block[FrettingWear], numbers: Numbers, status: NDArray[np.int8]
+) -> dict[Task, dict[tuple[float, float], Places]]:
+    """Gather the positions of each task by (N, xi)."""
+    tasks: dict[Task, dict[tuple[float, float], Places]] = {}
+    bodies = indenters(block)
+    for case in range(block.cases):
+        parameters = block.case(case)
+        for position in range(len(block.realisations)):
+            place = (case, position)
+            if status[place] != Status.DONE:
+                continue
+            task = _task(parameters, bodies[case % len(bodies)], numbers, place)
+            key = (float(numbers.cycles[place]), float(numbers.xi[place]) if task.rule == "fast" else 0.0)
+            tasks.setdefault(task, {}).setdefault(key, []).append(place)
+    return tasks
+
+
+def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place: tuple[int, int]) -> Task:
+    dimensional = not parameters.dimensionless
+    blocks = tuple(
+        (
+            step.cycles * float(numbers.advance[place]) * (step.amplitude_factor if dimensional else 1.0),
+            step.amplitude_factor,
+            step.load_factor,
+        )
+        for step in parameters.history
+    )
+    table = indenter if isinstance(indenter, Table) else None
+    followed = parameters.wear_rule == "exact" or (parameters.wear_rule == "limit" and parameters.hold == "force")
+    return Task(
+        table,
+        1.0 if table is None else float(numbers.height[place]),
+        float(numbers.exponent[place]) if table is None else 0.0,
+        float(numbers.level[place]),
+        "sliding" if parameters.path is not None else parameters.wear_rule,
+        parameters.hold,
+        parameters.accuracy if followed else 0.0,
+        parameters.cells if blocks else 0,
+        blocks,
+    )
+
+
+def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
+    """Solve a task for all its (N, xi), more finely for those that miss the accuracy asked; say which still do."""
+    accuracy, left = task.accuracy, dict.fromkeys(range(len(wanted)), True)
+    found: dict[int, tuple[Sequence[Worn], str]] = {}
+    while left:
+        numbers = list(left)
+        contacts = _solved(task, [wanted[number] for number in numbers], accuracy, errors=demand.errors)
+        for number, records in zip(numbers, contacts, strict=True):
+            found[number] = (records, demand.missed(records))
+            if not found[number][1]:
+                del left[number]
+        if accuracy <= _FINEST or task.blocks:
+            break
+        accuracy = max(_FINER * accuracy, _FINEST)
+    return [found[number] for number in range(len(wanted))]
+
+
+def _solved(
+    task: Task, wanted: Sequence[tuple[float, float]], accuracy: float, *, errors: bool
+) -> list[Sequence[Worn]]:
+    """Solve a task for (N, xi) at an accuracy: the contact, or those after every block of a history."""
+    profile, force = task.profile, task.hold == "force"
+    if task.blocks:
+        return [_loaded(task, profile, errors=errors)] * len(wanted)
+    stick = profile.inside(task.level) if task.level > 0.0 else 0.0
+    amounts = [amount for amount, _ in wanted]
+    if task.rule in ("exact", "sliding"):
+        contacts = exact(profile, stick, amounts, accuracy, constant_force=force, errors=errors)
+    elif task.rule == "limit":
+        end: Callable[[], Worn] = partial(rules.limit, profile, stick)
+        if force:
+            end = partial(limit_under_force, profile, stick, accuracy, errors=errors)
+        contacts = [end()] * len(wanted)
+    else:
+        rule = fast_forced if force else rules.fast
+        contacts = [rule(profile, stick, cycles, xi) for cycles, xi in wanted]
+    return [(contact,) for contact in contacts]
+
+
+def _loaded(task: Task, profile: Profile, *, errors: bool) -> list[Worn]:
+    """Run the blocks of a history."""
+    abscissa, weight = gauss(64)
+    first = 2.0 * float((1.0 - profile.image(abscissa)) @ weight)
+    blocks = [
+        LoadBlock(
+            path,
+            (1.0 - task.level) * amplitude,
+            depth=factor if task.hold == "depth" else None,
+            force=first * factor if task.hold == "force" else None,
+        )
+        for path, amplitude, factor in task.blocks
+    ]
+    deepest = max(block.depth or 1.0 for block in blocks) if task.hold == "depth" else 2.0
+    reach = min(1.7 * deepest, profile.largest_radius)
+    return history(profile, blocks, cells=task.cells, reach=reach, errors=errors)

@@ -1,0 +1,95 @@
+"""What a campaign can name of the kinetics of friction: parameters, outputs, and where it is solved."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
+from mdr_dask.models.parts.loading_history import Jump, Protocol
+from mdr_dask.models.parts.material import solid_of
+from mdr_dask.models.parts.sliding_body import SlidingBody
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.solids import LinearSolid
+
+TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
+
+
+class VelocityJump(SlidingBody):
+    """A viscoelastic body under a load on a rough line, whose velocity jumps from v_1 to v_1 + dv."""
+
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
+    oversampling: int = quantity(
+        "1", "grid points for every Nyquist point of the transient", default=4, ge=2, le=256, multiple_of=2
+    )
+    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
+    velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
+    protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
+    relaxation_times: tuple[float, ...] = quantity(
+        "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
+    )
+
+    @field_validator("relaxation_times")
+    @classmethod
+    def _increasing(cls, times: tuple[float, ...]) -> tuple[float, ...]:
+        if times[0] < 0 or np.any(np.diff(times) <= 0):
+            raise ValueError(f"expected increasing times from 0 on, got {times!r}")
+        return times
+
+    @model_validator(mode="after")
+    def _changes(self) -> VelocityJump:
+        if self.velocity_change == 0:
+            raise ValueError("expected a velocity_change other than 0")
+        return self
+
+    def solid(self) -> LinearSolid:
+        """Return the solid of the body."""
+        from mdr_dask.physics.solids import kelvin
+
+        if self.material is not None:
+            return solid_of(self.material)
+        assert self.shear_modulus is not None
+        assert self.relaxation_time is not None
+        return kelvin(self.shear_modulus, self.relaxation_time)
+
+    def time_unit(self) -> float:
+        """Return tau, in which times are stored: the longest time of the solid's arms and dashpot."""
+        solid = self.solid()
+        return float(max([solid.viscosity / solid.static_modulus, *solid.times]))
+
+
+OUTPUTS = (
+    Output("friction_coefficient_before", "1", "coefficient of friction mu_1, steady at v_1", has_error=True),
+    Output("friction_coefficient_jump", "1", "immediate change d_mu_0 of the coefficient of friction", has_error=True),
+    Output("friction_coefficient_after", "1", "coefficient of friction mu_2, steady at v_2", has_error=True),
+    Output(
+        "friction_coefficient", "1", "coefficient of friction after the jump", ("relaxation_times",), has_error=True
+    ),
+    Output("indentation_depth", "m", "penetration of the mean line", ("relaxation_times",), False, has_error=True),
+    Output("rms_slope", "1", "spectral rms slope of the line"),
+)
+
+
+def coordinates(parameters: VelocityJump) -> dict[str, Coordinate]:
+    """Return the times at which friction is stored."""
+    times = np.array(parameters.relaxation_times)
+    return {"relaxation_times": Coordinate(times, "1", "time after the jump over the relaxation time, (t - t_0) / tau")}
+
+
+SOLVE = "mdr_dask.models.velocity_jump.solve"
+
+MODEL = Model(
+    name="velocity_jump",
+    version=4,
+    summary="friction before, at and after a jump of the sliding velocity at constant load",
+    parameters=VelocityJump,
+    outputs=OUTPUTS,
+    compute=deferred(SOLVE, "compute"),
+    seconds=deferred(SOLVE, "seconds"),
+    coordinates=coordinates,
+    distinct=deferred(SOLVE, "distinct"),
+)

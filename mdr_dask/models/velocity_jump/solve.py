@@ -1,0 +1,278 @@
+"""Kinetics of a block of cases: jumps of a Kelvin body are marched, each different one once; all else is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.parts.loading_history import pieces
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.rough_line import Measured, Roughness
+from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.velocity_jump.declaration import VelocityJump
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.problem import Line
+from mdr_dask.physics.surfaces.waves import Waves
+from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
+from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
+from mdr_dask.physics.transients.elements.foundation import foundation
+from mdr_dask.physics.transients.elements.loading_history import Trace, trace
+from mdr_dask.physics.transients.velocity_jump import Course
+
+ACCURACY = 0.01  # of the ends, where the campaign does not say
+SECONDS_NODE, SECONDS_MOMENT = 5e-8, 2.7e-9  # for every node of a line, and of a moment
+MOMENTS = 60
+SECONDS_STEPPED = 3e-7  # for every node in square: a history of some turns of the line
+FLAT = 1e-12  # of the largest height
+
+#: Outputs that have errors, and the level of a jump that decides the accuracy of each.
+LEVELS = {
+    "friction_coefficient_before": "before",
+    "friction_coefficient_jump": "jump",
+    "friction_coefficient_after": "after",
+    "friction_coefficient": "after",
+    "indentation_depth": "depth",
+}
+TRANSIENT = ("friction_coefficient", "indentation_depth")
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Outputs of some cases and their errors, without units: friction over h / L, depth over h."""
+
+    values: dict[str, FloatArray]
+    errors: dict[str, FloatArray]
+    outcome: NDArray[np.int8]
+
+
+def compute(block: Block[VelocityJump]) -> Result:
+    """Solve the cases of a block."""
+    shape, times = (block.cases, len(block.realisations)), (len(block.parameters.relaxation_times),)
+    vectors = {name + error for name in TRANSIENT for error in ("", "_error")}
+    values = {name: np.full(shape + (times if name in vectors else ()), np.nan) for name in block.outputs}
+    result = Result(values, np.full(shape, Status.FAILED, np.int8))
+    problems, solves = sliding_problems(block), 0
+    groups = list(_groups(block, problems))
+    for r, realisation in enumerate(block.realisations):  # outside: every line of one has the same phases
+        for group in groups:
+            solves += group.solve(result, r, realisation)
+    result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
+    return replace(result, solves=solves)
+
+
+def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
+    """Yield the cases that are solved together: marched on one grid of a line, or each followed alone."""
+    alone = [
+        j if setting.arms is not None or setting.body is not None or protocol.shape != "jump" else None
+        for j, (setting, protocol) in enumerate(zip(problems.settings, each(block, "protocol"), strict=True))
+    ]
+    grids = block.column("oversampling").tolist(), block.column("steps_per_decade").tolist()
+    for setting, (oversampling, steps, followed), members in problems.groups(*grids, alone):
+        kind = _Marched if followed is None else _Followed
+        yield kind(block, problems, setting, oversampling, steps, members)
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Cases that share line, grid and steps."""
+
+    block: Block[VelocityJump]
+    problems: SlidingProblems
+    setting: Setting
+    oversampling: int
+    steps: int
+    members: IntArray
+
+    @property
+    def outputs(self) -> list[str]:
+        """The outputs asked for that have errors."""
+        return [name for name in LEVELS if name in self.block.outputs]
+
+    def found(self, waves: Waves) -> tuple[_Found, int]:
+        """Solve the cases on one realisation of the roughness; return how many were solved, too."""
+        raise NotImplementedError
+
+    def solve(self, result: Result, r: int, realisation: int) -> int:
+        """Write the cases of one realisation, the r-th of the block; return how many were solved."""
+        members = self.members
+        height, length = self.problems.height[members], self.problems.length[members]
+        try:
+            _check_rough(self.setting.roughness)
+            waves = self.setting.roughness.waves(self.block.seed, realisation)
+            found, solves = self.found(waves) if self.outputs else (_Found({}, {}, np.zeros(members.size, np.int8)), 0)
+        except (DataError, ValueError) as problem:
+            result.messages.update({(int(j), r): str(problem) for j in members})
+            return 0
+        result.status[members, r] = STATUS[found.outcome]
+        good = np.flatnonzero(found.outcome == Outcome.CONVERGED)
+        steep = height / length
+        for name in self.outputs:
+            unit = height if name == "indentation_depth" else steep
+            for output, values in ((name, found.values[name]), (f"{name}_error", found.errors[name])):
+                if output in result.values:
+                    result.values[output][members[good], r] = (values.T * unit).T[good]
+        if "rms_slope" in result.values:
+            result.values["rms_slope"][members[good], r] = (self.setting.roughness.slope() * steep)[good]
+        for k, sentence in self._sentences(found):
+            result.messages[int(members[k]), r] = sentence
+        return solves
+
+    def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
+        """Yield why a case failed, or which outputs miss the accuracy and by how much."""
+        for k, outcome in enumerate(found.outcome):
+            if outcome != Outcome.CONVERGED:
+                more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
+                yield k, Outcome(int(outcome)).sentence + more
+                continue
+            missed = {name: self._relative(found, name, k) for name in self.outputs}
+            named = ", ".join(f"{name} by {late:.2g}" for name, late in missed.items() if late > self._allowed(name))
+            if named:
+                yield k, f"an accuracy of {self.block.accuracy or ACCURACY:.2g} is missed: {named} (estimated)"
+
+    def _allowed(self, name: str) -> float:
+        """Return the relative error allowed: of a transient only where the campaign says."""
+        if self.block.accuracy is not None:
+            return self.block.accuracy
+        return np.inf if name in TRANSIENT else ACCURACY
+
+    def _relative(self, found: _Found, name: str, k: int) -> float:
+        """Return the estimated error of an output of one case over its size, the largest of all times; 0 of unknown."""
+        with np.errstate(all="ignore"):
+            sizes = np.asarray(found.errors[name][k] / np.abs(found.values[name][k]))
+        return float(np.max(sizes, initial=0.0, where=~np.isnan(sizes)))
+
+
+class _Marched(_Group):
+    """Jumps of a Kelvin body on one line: each different one is solved once."""
+
+    def found(self, waves: Waves) -> tuple[_Found, int]:
+        """Solve the different cases together."""
+        loads, deborah, which = self._different()
+        transient = any(name in self.outputs for name in TRANSIENT)
+        times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
+        course = Course(times, wavenumber, self.steps, self.block.accuracy or 0.0) if transient else None
+        with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
+        aim = Aim(
+            {LEVELS[name] for name in self.outputs},
+            self.block.accuracy or (ACCURACY if with_errors else None),
+            self.oversampling,
+            course,
+            any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
+        )
+        jumps = solve_jumps(Problem(Line(waves, None), loads, deborah), aim)
+        return self._of(jumps, loads, which), loads.size
+
+    def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return loads and Deborah numbers of the different cases, and the entry of every member."""
+        before = self.problems.deborah[self.members]
+        change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
+        numbers = np.stack([self.problems.loads[self.members], before, before * (1 + change)])
+        (loads, *deborah), which = np.unique(numbers, axis=1, return_inverse=True)
+        return loads, np.column_stack(deborah), which
+
+    @staticmethod
+    def _of(jumps: Jumps, loads: FloatArray, which: IntArray) -> _Found:
+        """Return the outputs of the members."""
+        named = {
+            "friction_coefficient_before": (jumps.levels.before / loads, jumps.errors.before / loads),
+            "friction_coefficient_jump": (jumps.levels.jump / loads, jumps.errors.jump / loads),
+            "friction_coefficient_after": (jumps.levels.after / loads, jumps.errors.after / loads),
+            "friction_coefficient": ((jumps.trace.T / loads).T, (jumps.trace_error.T / loads).T),
+            "indentation_depth": (jumps.depth, jumps.depth_error),
+        }
+        values = {name: value[which] for name, (value, _) in named.items()}
+        errors = {name: error[which] for name, (_, error) in named.items()}
+        return _Found(values, errors, jumps.outcome[which])
+
+
+class _Followed(_Group):
+    """One case whose elements are all followed: any history, solid and indenter."""
+
+    def found(self, waves: Waves) -> tuple[_Found, int]:
+        """Follow it on the grid given, and on half the nodes with twice the steps: their difference is the error."""
+        fine, coarse = (self._trace(waves, every) for every in (1, 2))
+        outcome = fine.outcome if fine.outcome != Outcome.CONVERGED else coarse.outcome
+        levels = [np.array([t.before, t.at - t.before, t.after]) for t in (fine, coarse)]
+        courses = [np.concatenate([[t.before, t.at], t.friction]) for t in (fine, coarse)]
+        error = float(np.max(np.abs(courses[0] - courses[1])))
+        sinking = np.max(np.abs(fine.depth - coarse.depth))
+        names = list(LEVELS)
+        values = {name: level[None] for name, level in zip(names, levels[0], strict=False)}
+        values |= {"friction_coefficient": fine.friction[None], "indentation_depth": fine.depth[None]}
+        changes = np.maximum(np.abs(levels[0] - levels[1]), error)
+        errors = {name: change[None] for name, change in zip(names, changes, strict=False)}
+        errors |= {
+            "friction_coefficient": np.full_like(values["friction_coefficient"], error),
+            "indentation_depth": np.full_like(values["indentation_depth"], sinking),
+        }
+        return _Found(values, errors, np.array([outcome], np.int8)), 1
+
+    def _trace(self, waves: Waves, every: int) -> Trace:
+        """Follow the case on every so many of its nodes."""
+        case = self.block.case(int(self.members[0]))
+        height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
+        solid, unit = case.solid(), case.time_unit()
+        static = solid.static_modulus
+        before, course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+        velocity, force = length / unit, 4 * static * length * height
+        course = [piece.scaled(unit, velocity, force) for piece in course]
+        nodes = waves.points * self.oversampling
+        heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
+        body = self.setting.body
+        line = (
+            closed_line(heights, slopes)
+            if body is None
+            else indented_line(np.append(heights, heights[0]), np.append(slopes, slopes[0]), body)
+        )
+        elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
+        times = np.array(case.relaxation_times)
+        return trace(line, elements, before / velocity, course, times, self.steps / every)
+
+
+def _check_rough(roughness: Roughness) -> None:
+    """Raise DataError for a measured line that is flat."""
+    if isinstance(roughness, Measured):
+        height = line_of(roughness.profile).height
+        if not height.std() > FLAT * float(np.max(np.abs(height), initial=0.0)):
+            raise DataError(f"expected a rough line, got {roughness.profile.file.name}, which is flat")
+
+
+STATUS = np.array(
+    [
+        Status.DONE
+        if outcome == Outcome.CONVERGED
+        else Status.FAILED
+        if outcome.is_impossible
+        else Status.NOT_CONVERGED
+        for outcome in Outcome
+    ],
+    dtype=np.int8,
+)
+
+
+def distinct(block: Block[VelocityJump]) -> int:
+    """Return how many different cases a block holds, over all realisations."""
+    different = 0
+    for group in _groups(block, sliding_problems(block)):
+        different += group._different()[0].size if isinstance(group, _Marched) else 1
+    return different * len(block.realisations)
+
+
+def seconds(block: Block[VelocityJump]) -> float:
+    """Estimate the time of a block from nodes and moments."""
+    total = 1e-3
+    for group in _groups(block, sliding_problems(block)):
+        nodes = group.setting.roughness.points * group.oversampling
+        if isinstance(group, _Marched):
+            errors = any(f"{name}_error" in block.outputs for name in TRANSIENT)
+            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS) * (1.4 if errors else 1.0)
+            total += group._different()[0].size * per_case * len(block.realisations)
+        else:
+            total += nodes**2 * SECONDS_STEPPED * len(block.realisations)
+    return total

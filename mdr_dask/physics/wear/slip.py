@@ -1,0 +1,252 @@
+"""Partial slip at constant depth, and gross slip, as the equations of one step for `evolution.march`.
+
+Nodes lie at r^2 = c^2 + width z, with the panels' z from 0 to 1 and the width a^2 - c^2. The unknown of the edge is
+that width over the virgin one, so that contacts next to full stick are as well determined as any.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.interpolate import CubicSpline
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.mdr.half_integrals import Panels, interpolate_weighted
+from mdr_dask.physics.mdr.revolution import Profile
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear.evolution import Moment
+
+
+class FixedBorder(ABC):
+    """What problems with a fixed inner border share: the memory of a radius is a value of a function on the panels."""
+
+    panels: Panels
+    inner_radius: float
+    newton = 1e-2
+
+    def holds(self, unknowns: FloatArray) -> bool:
+        """Tell whether unknowns describe a contact."""
+        return bool(unknowns[self.panels.nodes.size - 1] > 0.0)
+
+    @property
+    def virgin_width(self) -> float:
+        """The width a^2 - c^2 of the virgin contact."""
+        return (1.0 - self.inner_radius) * (1.0 + self.inner_radius)
+
+    def width(self, unknowns: FloatArray) -> float:
+        """Return a^2 - c^2."""
+        return float(self.virgin_width * unknowns[self.panels.nodes.size - 1])
+
+    def radii(self, unknowns: FloatArray) -> FloatArray:
+        """Return the radii of the nodes."""
+        return np.asarray(np.sqrt(self.inner_radius**2 + self.width(unknowns) * self.panels.nodes))
+
+    @abstractmethod
+    def rate(self, unknowns: FloatArray) -> FloatArray:
+        """Return the rate at which the radii gather."""
+
+    def memory(self, past: Sequence[Moment], shares: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return, as a function of the unknowns, what past moments in these shares had gathered at the nodes."""
+        last = self.panels.nodes.size - 1
+        memories = np.array([moment.gathered for moment in past])
+        widths = np.array([moment.unknowns[last] for moment in past])
+
+        def known(unknowns: FloatArray) -> FloatArray:
+            return interpolate_weighted(self.panels, memories, shares, unknowns[last] / widths)
+
+        return known
+
+    def moment(
+        self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Moment]
+    ) -> Moment:
+        """Return the moment that a solved step ends in, from what was known and what the step added."""
+        gathered = known + theta * self.rate(unknowns)
+        gathered[-1] = 0.0
+        return Moment(time, unknowns, gathered)
+
+
+class LogTable(NamedTuple):
+    """The slip of the virgin body, ln s0 as a function of ln(r^2 - c^2).
+
+    s0(r) = (2/pi) int_c^r (g0 - g_c) / (eta sqrt(r^2 - x^2)) dx. The coefficients are those of a cubic spline from
+    `first` on, `step` apart.
+    """
+
+    first: float
+    step: float
+    coefficients: FloatArray
+
+    def __call__(self, squares: FloatArray) -> FloatArray:
+        """Return ln s0 where r^2 - c^2 > 0 has the values `squares`."""
+        result = np.empty(squares.size)
+        _look_up(self.first, self.step, self.coefficients, squares.ravel(), result)
+        return result.reshape(squares.shape)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _slip_rows(first, step, coefficients, width, nodes, slip, stress, share, known):  # type: ignore[no-untyped-def]
+    """Turn the slip into the residual of `PartialSlip`, in place."""
+    last = nodes.size - 1
+    for i in range(nodes.size):
+        place = np.log(width * nodes[i]) - first
+        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
+        local, virgin = place - cell * step, coefficients[0, cell]
+        for power in range(1, 4):
+            virgin = virgin * local + coefficients[power, cell]
+        slip[i] = np.log(max(slip[i], 1e-300)) - virgin
+        if i < last:
+            slip[i] -= known[i] + share * stress[i]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _look_up(first, step, coefficients, squares, result):  # type: ignore[no-untyped-def]
+    for i in range(squares.size):
+        place = np.log(squares[i]) - first
+        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
+        local = place - cell * step
+        k = coefficients[:, cell]
+        result[i] = ((k[0] * local + k[1]) * local + k[2]) * local + k[3]
+
+
+@dataclass(frozen=True, eq=False)
+class PartialSlip(FixedBorder):
+    """Slip outside the stick radius c at constant depth; unknowns y = (g - g_c) / eta at the nodes, and the edge.
+
+    The slip is s = (f - f_star) / eta, f_star the profile of the plateau g = g_c beyond c. A radius gathers
+    ln(s / s0) = int p dN / eta, s0 the slip of the virgin body.
+    """
+
+    profile: Profile
+    inner_radius: float
+    panels: Panels
+    virgin_slip: LogTable
+    eta: float
+
+    def start(self) -> Moment:
+        """Return the virgin contact."""
+        y = np.ones(self.panels.nodes.size)
+        gap = self.width(y) * self.panels.nodes / (self.radii(y) + self.inner_radius)
+        y[:-1] = self.profile.rise(gap, self.inner_radius)[:-1] / self.eta
+        return Moment(0.0, y, np.zeros_like(y))
+
+    def image(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return y at all nodes, and the factor sqrt(a^2 - c^2) / r that turns it into a half-integrand."""
+        y = unknowns.copy()
+        y[-1] = 1.0
+        return y, 1.0 / np.sqrt(self.inner_radius**2 / self.width(unknowns) + self.panels.nodes)
+
+    def slip(self, unknowns: FloatArray) -> FloatArray:
+        """Return s at the nodes."""
+        y, factor = self.image(unknowns)
+        return np.asarray(self.panels.inner @ (y * factor))
+
+    def rate(self, unknowns: FloatArray) -> FloatArray:
+        """Return p / eta at the nodes."""
+        y, _ = self.image(unknowns)
+        return np.asarray(self.panels.outer @ y / np.sqrt(self.width(unknowns)))
+
+    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
+        y, factor = self.image(unknowns)
+        slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
+        share = theta / np.sqrt(width)
+        _slip_rows(*self.virgin_slip, width, self.panels.nodes, slip, stress, share, known)
+        return np.asarray(slip)
+
+    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
+        """Return the derivatives by y."""
+        _, factor = self.image(unknowns)
+        result = self.panels.inner * (factor / self.slip(unknowns)[:, None])
+        result[:-1] -= theta / np.sqrt(self.width(unknowns)) * self.panels.outer[:-1]
+        return result
+
+    def worn(self, unknowns: FloatArray) -> FloatArray:
+        """Return the slip: the part of f that changes, over eta."""
+        return self.slip(unknowns)
+
+    def wear_rate(self, unknowns: FloatArray) -> float:
+        """Return dV/dN = 2 int_c^a (1 - g)(g - g_c) / eta dx, the dissipation of a cycle over mu."""
+        y, factor = self.image(unknowns)
+        return float(self.eta * np.sqrt(self.width(unknowns)) * self.panels.weights @ (y * (1.0 - y) * factor))
+
+
+def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> PartialSlip:
+    """Prepare partial slip: tabulate the virgin slip, free of cancellation next to c, up to the radius `reach`."""
+    c = stick_radius
+    eta = float(profile.rise(np.array(1.0 - c), c))
+    smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
+    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 600)
+    step = table[1] - table[0]
+    r = np.sqrt(c * c + np.exp(table))
+    abscissa, weight = gauss(40)
+    span = np.arctan2(np.exp(0.5 * table), c)
+    angle = span[:, None] * abscissa
+    # x - c = r (cos angle - cos span), as a product
+    gap = 2.0 * r[:, None] * np.sin(0.5 * (span[:, None] + angle)) * np.sin(0.5 * (span[:, None] - angle))
+    slip = 2.0 / np.pi * span * (profile.rise(gap, c) @ weight) / eta
+    coefficients = np.ascontiguousarray(CubicSpline(table, np.log(slip)).c)
+    return PartialSlip(profile, c, panels, LogTable(float(table[0]), float(step), coefficients), eta)
+
+
+@dataclass(frozen=True, eq=False)
+class GrossSlip(FixedBorder):
+    """Slip everywhere; unknowns g at the nodes but the last, the edge, and the depth d if the force is given.
+
+    A radius gathers its worn depth, int p ds.
+    """
+
+    profile: Profile
+    panels: Panels
+    force: float | None = None
+    inner_radius: float = 0.0
+
+    def start(self) -> Moment:
+        """Return the virgin contact."""
+        unknowns = np.ones(self.panels.nodes.size + (self.force is not None))
+        unknowns[: self.panels.nodes.size - 1] = self.profile.image(np.sqrt(self.panels.nodes[:-1]))
+        return Moment(0.0, unknowns, np.zeros(self.panels.nodes.size))
+
+    def image(self, unknowns: FloatArray) -> tuple[FloatArray, float]:
+        """Return g at all nodes, and the depth."""
+        last = self.panels.nodes.size - 1
+        depth = 1.0 if self.force is None else float(unknowns[-1])
+        return np.append(unknowns[:last], depth), depth
+
+    def rate(self, unknowns: FloatArray) -> FloatArray:
+        """Return p at the nodes."""
+        return np.asarray(self.panels.outer @ self.image(unknowns)[0] / np.sqrt(self.width(unknowns)))
+
+    def worn(self, unknowns: FloatArray) -> FloatArray:
+        """Return f at the nodes."""
+        return np.asarray(self.panels.full @ self.image(unknowns)[0])
+
+    def normal_force(self, unknowns: FloatArray) -> float:
+        """Return F_N = 2 int_0^a (d - g) dx."""
+        g, depth = self.image(unknowns)
+        # int_0^1 u dz / sqrt(z) is the last row of the full half-integral of u sqrt(1 - z)
+        load = (depth - g) * np.sqrt(1.0 - self.panels.nodes)
+        return float(np.pi * np.sqrt(self.width(unknowns)) * self.panels.full[-1] @ load)
+
+    wear_rate = normal_force
+
+    def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
+        """Return f - f0 - known - theta p; then continuity at the edge, and the force."""
+        gathered = known + theta * self.rate(unknowns)
+        gathered[-1] = 0.0
+        rows = self.worn(unknowns) - self.profile.height(self.radii(unknowns)) - gathered
+        return rows if self.force is None else np.append(rows, self.normal_force(unknowns) - self.force)
+
+    def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
+        """Return the derivatives by g."""
+        a, nodes = np.sqrt(self.width(unknowns)), self.panels.nodes.size
+        result = np.zeros((unknowns.size, unknowns.size))
+        result[:nodes, :nodes] = self.panels.full
+        result[: nodes - 1, :nodes] -= theta / a * self.panels.outer[:-1]
+        if self.force is not None:
+            result[-1, :nodes] = -np.pi * a * self.panels.full[-1] * np.sqrt(1.0 - self.panels.nodes)
+        return result

@@ -1,0 +1,97 @@
+"""Figures on the command line: what is run, drawn, left out and said."""
+
+from pathlib import Path
+
+import pytest
+
+from mdr_dask import datasets, plots
+from mdr_dask.cli import main
+from mdr_dask.plots.base import Plot
+
+CAMPAIGN = """\
+name: small
+model: sliding_friction
+seed: 7
+realisations: 3
+parameters:
+  length: 20 mm
+  points: 200
+  hurst: 0.7
+  rms_roughness: 0.5 um
+  shear_modulus: 10 MPa
+  relaxation_time: 1 ms
+  normal_force: [0.1 N, 10 N]
+  velocity: {geometric: [1 mm/s, 10 m/s, 4]}
+"""
+#: What four speeds and two loads hold; whether they can be merged into a master curve is not the matter here.
+HELD = {"regions", "velocity", "force", "plateau", "collapse", "contact_growth", "contact"}
+
+
+@pytest.fixture
+def campaign(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "small.yaml"
+    path.write_text(CAMPAIGN)
+    return path
+
+
+@pytest.fixture
+def filled(campaign) -> str:
+    assert main(["run", str(campaign), "--quiet"]) == 0
+    return "results/small.zarr"
+
+
+def test_figures_runs_what_is_missing_and_draws_what_the_store_holds(campaign, capsys):
+    assert main(["figures", str(campaign), "-o", "drawn", "--quiet"]) == 0
+    streams = capsys.readouterr()
+    files = {path.name for path in Path("drawn").iterdir()}
+    assert files - {"small-master_curve.png"} == {f"small-{name}.png" for name in HELD}
+    assert {line.rpartition("/")[2] for line in streams.out.splitlines() if "drawn/" in line} == files
+    assert all((Path("drawn") / file).stat().st_size > 10_000 for file in files)
+    (data,) = datasets("results/small.zarr").values()
+    assert bool((data["status"] == 1).all())
+    for name in set(plots.available("sliding_friction")) - HELD - {"master_curve"}:
+        assert f"{name}: left out: " in streams.err
+    assert "Traceback" not in streams.err
+    before = {path: path.stat().st_mtime_ns for path in Path("results").rglob("*") if "/c/" in str(path)}
+    assert main(["figures", str(campaign), "-o", "drawn", "--quiet"]) == 0
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def test_what_is_not_drawn_is_said_and_can_be_selected(filled, capsys):
+    capsys.readouterr()
+    assert main(["plot", filled, "regions", "-o", "one.png"]) == 0
+    assert "regions: not drawn: 1 of 2 values of normal_force (drawn: $F_N$ = 10 N)" in capsys.readouterr().err
+    assert main(["plot", filled, "regions", "--select", "normal_force=0.1 N", "-o", "one.png"]) == 0
+    assert "not drawn" not in capsys.readouterr().err
+    assert main(["plot", filled, "regions", "--select", "normal_farce=1"]) == 2
+    assert "did you mean 'normal_force'" in capsys.readouterr().err
+    assert main(["plot", filled, "regions", "--series", "nowhere"]) == 2
+
+
+def test_a_fault_of_one_figure_ends_neither_the_others_nor_in_a_traceback(filled, capsys, monkeypatch):
+    def faulty(groups):
+        raise KeyError("no such name")
+
+    known = {name: plot for name, plot in plots.available("sliding_friction").items() if name == "velocity"}
+    broken = Plot("broken", ("sliding_friction",), "a figure with a fault", faulty)
+    monkeypatch.setattr(plots, "available", lambda model: {"broken": broken, **known})
+    capsys.readouterr()
+    assert main(["plot", filled, "--all", "-o", "drawn"]) == 0
+    streams = capsys.readouterr()
+    assert streams.out == "drawn/small-velocity.png\n"
+    assert "broken: left out: a fault of this figure" in streams.err
+    assert "Traceback" not in streams.err
+    assert main(["plot", filled, "broken"]) != 0
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_failed_and_missing_results_are_counted_under_a_figure(campaign, capsys):
+    campaign.write_text(CAMPAIGN.replace("length: 20 mm", "length: 0.2 mm\n  indenter: {shape: cone, angle: 1 deg}"))
+    assert main(["run", str(campaign), "--quiet"]) in (0, 1)
+    capsys.readouterr()
+    (data,) = datasets("results/small.zarr").values()
+    failed = int((data["status"] != 1).sum())
+    assert 0 < failed < data["status"].size
+    assert main(["plot", "results/small.zarr", "velocity"]) == 0
+    assert f"{failed} of {data['status'].size} results of the store, which" in capsys.readouterr().err
