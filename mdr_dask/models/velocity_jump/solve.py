@@ -157,9 +157,10 @@ class _Marched(_Group):
         transient = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         course = Course(times, wavenumber, self.steps, self.block.accuracy or 0.0) if transient else None
+        with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
         aim = Aim(
             {LEVELS[name] for name in self.outputs},
-            self.block.accuracy or ACCURACY,
+            self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
             course,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
