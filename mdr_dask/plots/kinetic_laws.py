@@ -47,9 +47,10 @@ def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, x
     return {best: groups[best]}, [f"series {', '.join(rest)}"] if rest else []
 
 
-def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str) -> None:
+def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str, *fits: xr.Dataset) -> None:
     text = subject + (f", series {name}" if name else "")
-    style.title(figure, text, curves.fixed_text(held, HELD), INTERVALS)
+    bars = "; ".join(part for part in (INTERVALS, curves.verdict(fits)) if part)
+    style.title(figure, text, curves.fixed_text(held, HELD), bars)
 
 
 def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -144,7 +145,7 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set_ylim(jumps[jumps > 0].min() / 2, 3 * np.nanmax(jumps))
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "the jump against friction before it", curves.scalars(found), name)
+    _title(figure, "the jump against friction before it", curves.scalars(found), name, law)
     style.leave_out(figure, told)
     return figure
 
@@ -174,7 +175,7 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set(xlabel=r"$v_1 \tau q_{max}$", ylabel="rate of relaxation $b$")
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "rate of relaxation", curves.scalars(found), name)
+    _title(figure, "rate of relaxation, one exponential", curves.scalars(found), name, found)
     unknown = f"{left} rates not known to a factor of 1.6" if left else ""
     style.leave_out(figure, [unknown, *told])
     return figure
@@ -229,6 +230,6 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.plot(line, [1, 1], "k:", lw=1, label="1")
     axes.set(xlabel=style.label("hurst"), ylabel="power of $b$")
     style.legend(axes)
-    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name)
+    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name, found)
     style.leave_out(figure, told)
     return figure

@@ -9,6 +9,7 @@ import xarray as xr
 from mdr_dask.errors import DataError
 from mdr_dask.plots import available
 from mdr_dask.plots.protocols import draw_protocols
+from mdr_dask.plots.style import left_out
 
 TIMES = np.array([0.0, 1.0, 2.0, 4.0])
 BASE = {
@@ -60,7 +61,8 @@ def test_one_column_a_series_with_friction_velocity_and_load() -> None:
 def test_an_axis_stands_at_its_first_value() -> None:
     axis = {"path": "protocol.velocity", "name": "v", "dim": "v", "values": [0.2, 0.3], "labels": None}
     ramp = {"shape": "ramp", "duration": 4e-3, "velocity": None}
-    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], "v")
+    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], xr.Variable("v", [0.2, 0.3]))
+    assert "1 of 2 values of v" in left_out(draw_protocols({"": data}))
     _, velocity, _ = curves(draw_protocols({"": data}), 0, 1)
     assert velocity[-1, 1] == pytest.approx(0.2)
 
