@@ -91,14 +91,28 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
 
 
 def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:
-    """Solve at a resolution, and twice rougher; a rougher way that cannot be gone is gone in shorter steps."""
-    found = [solve(resolution)]
+    """Solve at a resolution, and twice rougher; one rougher solution is enough where the other cannot be found."""
+    found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
+    reasons = []
     for rough in resolution.rougher() if errors else ():
         try:
-            found.append(solve(rough))
-        except NotConvergedError:
-            found.append(solve(rough.halfway_to(resolution)))
+            between = rough.halfway_to(resolution)
+            found.append(_first_of(solve, (rough, between, between._replace(fewer=max(rough.fewer - 1, 0)))))
+        except NotConvergedError as reason:
+            reasons.append(reason)
+    if len(reasons) > 1:
+        raise NotConvergedError(f"the error of the worn contact is not known: {reasons[0]}")
     return found
+
+
+def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) -> Found:
+    """Solve at the first resolution at which the evolution can be advanced."""
+    for way in ways[:-1]:
+        try:
+            return solve(way)
+        except NotConvergedError:
+            continue
+    return solve(ways[-1])
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
