@@ -38,6 +38,8 @@ class Settings(NamedTuple):
         How much longer or shorter a step may be than that of the Jacobian.
     difference : float
         Step of the differences by the edge and what follows it.
+    first : float
+        Longest first step, over the time in which a contact changes: little wear is right to 2 %.
     """
 
     most_steps: int = 20000
@@ -46,6 +48,7 @@ class Settings(NamedTuple):
     slow: float = 0.4
     theta_ratio: float = 1.7
     difference: float = 1e-7
+    first: float = 1e-3
 
 
 SETTINGS = Settings()
@@ -79,7 +82,7 @@ class Resolution(NamedTuple):
     @property
     def first(self) -> float:
         """The length of the first step, over the time in which a contact changes."""
-        return 0.1 * self.accuracy * self.wider
+        return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
     def panels(self, near: int, fewest_digits: float = 2.0) -> Panels:
         """Return panels, halved `near` times more towards the inner border than towards the edge."""
