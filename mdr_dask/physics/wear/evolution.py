@@ -67,12 +67,15 @@ class Resolution(NamedTuple):
         Nodes that each panel, and halvings that each end, has less.
     rough : tuple of float
         How much wider the accuracy of two rougher solutions is, which tell the error.
+    slowness : float
+        How much more slowly than usual the error falls from them.
     """
 
     accuracy: float
     wider: float = 1.0
     fewer: int = 0
     rough: tuple[float, float] = (8.0, 64.0)
+    slowness: float = 1.0
 
     @property
     def step(self) -> float:

@@ -72,7 +72,10 @@ def exact(
     wanted = sorted({float(amount) for amount in amounts})
     resolution = forced_resolution(accuracy) if solve is forced_contacts else Resolution(accuracy)
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
-    judged = {amount: replace(found[amount], rougher=tuple(one[amount] for one in rougher)) for amount in wanted}
+    judged = {
+        amount: replace(one, rougher=tuple(other[amount] for other in rougher), slowness=resolution.slowness)
+        for amount, one in found.items()
+    }
     return [judged[float(amount)] for amount in amounts]
 
 
@@ -87,7 +90,7 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
         return limit(profile, stick_radius)
     resolution = forced_resolution(accuracy)
     found, *rougher = _solutions(lambda one: forced_end(profile, stick_radius, one), resolution, errors)
-    return replace(found, rougher=tuple(rougher))
+    return replace(found, rougher=tuple(rougher), slowness=resolution.slowness)
 
 
 def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:
@@ -144,7 +147,7 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
     def height(radius: FloatArray) -> FloatArray:
         result, z = profile.height(radius), place(radius)
         scar = (z > 0.0) & (z < 1.0)
-        result[scar] += np.sqrt(z[scar]) * interpolate(panels, rooted, z[scar])
+        result[scar] += np.sqrt(z[scar]) * np.maximum(interpolate(panels, rooted, z[scar]), 0.0)
         return result
 
     def nodal(values: FloatArray, x: FloatArray) -> FloatArray:

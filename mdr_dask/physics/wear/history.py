@@ -86,7 +86,11 @@ def history(
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    return [replace(one, rougher=tuple(others), slowness=_SLOWNESS) for one, *others in zip(fine, *rough, strict=True)] if rough else fine
+    return (
+        [replace(one, rougher=tuple(others), slowness=_SLOWNESS) for one, *others in zip(fine, *rough, strict=True)]
+        if rough
+        else fine
+    )
 
 
 @dataclass(frozen=True, eq=False)

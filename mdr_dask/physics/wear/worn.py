@@ -29,7 +29,7 @@ class Settings(NamedTuple):
     Parameters
     ----------
     safety, edges : float
-        Error over the distance from rougher solutions, and that of the radii of scar and stick zone, which are the least
+        Error over the distance from rougher solutions; of the radii of scar and stick zone, which are the least
         determined quantities.
     second : float
         Share of the distance from the second one, which counts where the first is close by chance.
