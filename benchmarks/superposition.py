@@ -1,6 +1,7 @@
 """How often the bars of shift factors cover the truth, and processor time: python -m benchmarks.superposition [40]
 
-Families of ten curves of thirty points on one curve, two decades wide, 0.2 to 0.6 decades apart.
+Families of ten curves of thirty points on one curve, two decades wide, 0.2 to 0.6 decades apart; then families that run
+into a plateau, with short overlaps, for which intervals of 95 % are judged.
 """
 
 import sys
@@ -19,6 +20,27 @@ SHAPES = {
     "power law": lambda x: 0.3 * x,
     "flat plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
 }
+ON_PLATEAUS = {
+    "sigmoid": lambda x: np.tanh(x / 5),
+    "steep": lambda x: 2 + 1.5 * np.tanh(x / 2),
+    "decay": lambda x: -np.log10(1 + 10**x),
+}
+PLATEAUS = (
+    ("decay", 15, 10, 0.02, 0.3),
+    ("decay", 15, 20, 0.005, 0.3),
+    ("decay", 15, 20, 0.02, 0.6),
+    ("decay", 8, 20, 0.02, 0.3),
+    ("decay", 3, 20, 0.02, 0.3),
+    ("steep", 15, 10, 0.02, 0.3),
+    ("steep", 15, 20, 0.005, 0.3),
+    ("steep", 15, 20, 0.02, 0.6),
+    ("steep", 5, 20, 0.01, 0.4),
+    ("sigmoid", 15, 10, 0.02, 0.3),
+    ("sigmoid", 8, 20, 0.005, 0.5),
+    ("sigmoid", 3, 10, 0.02, 0.3),
+)
+"""Shape, curves, points, relative scatter of the ordinate, and overlap of neighbours."""
+
 SCATTER = (0.003, 0.01, 0.03)
 FIRST_SEED = {False: 500_000, True: 1_200_000}
 RISE = 0.02
@@ -57,6 +79,40 @@ def judged(shape, scatter, vertical, families):
     return float(np.mean(inside)), times, refused
 
 
+def plateau_family(shape, curves, points, noise, overlap, seed):
+    """Return groups, curves two decades wide, and true factors, zero for the middle one; overlaps vary by an eighth."""
+    random = np.random.default_rng(seed)
+    steps = 2 * (1 - overlap) * (1 + 0.25 * random.uniform(-0.5, 0.5, curves - 1))
+    shifts = np.append(0, np.cumsum(steps))
+    shifts -= shifts[curves // 2]
+    x = np.linspace(-1, 1, points)
+    scatter = np.log10(1 + noise * random.standard_normal((curves, points)))
+    pieces = [(x, ON_PLATEAUS[shape](x + shift) + each) for shift, each in zip(shifts, scatter, strict=True)]
+    return np.arange(curves, dtype=float), pieces, shifts
+
+
+def on_plateaus(families=40, first=900_000):
+    """Print for each setting how many intervals of 95 % hold, the largest error, its half width, and processor time."""
+    print("intervals of 95 % on plateaus: held, median largest error and its half width, families beyond three of them")
+    for setting in PLATEAUS:
+        held, largest, half, beyond, times = [], [], [], 0, []
+        for seed in range(first, first + families):
+            groups, pieces, shifts = plateau_family(*setting, seed)
+            start = time.process_time()
+            result = superpose(groups, pieces)
+            times.append(time.process_time() - start)
+            width = student.ppf(0.975, result.freedom) * result.horizontal_error
+            others = np.arange(shifts.size) != shifts.size // 2
+            error = np.abs(result.horizontal - shifts)
+            held.append(np.mean(error[others] <= width[others]))
+            largest.append(error.max())
+            half.append(width[np.argmax(error)])
+            beyond += bool(np.any(error[others] > 3 * width[others]))
+        middle = np.median(largest), np.median(half)
+        print(f"{setting!s:34s} {np.mean(held):.3f} {middle[0]:.3f} {middle[1]:.3f} {beyond}/{families}", end=" ")
+        print(f"{1e3 * np.median(times):.1f} ms")
+
+
 def main(families=40):
     for vertical in (False, True):
         superpose(*family(0, 0.01, "sigmoid", vertical)[:2], vertical)  # compiles
@@ -67,6 +123,7 @@ def main(families=40):
             median, most = (" / ".join(f"{1e3 * of(times):.1f}" for _, times, _ in found) for of in (np.median, np.max))
             refused = sum(number for *_, number in found)
             print(f"{shape:16s} covered {shares}, median time {median} ms, longest {most} ms, refused {refused}")
+    on_plateaus(families)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ import zarr
 
 from mdr_dask import campaign, plan, store
 from mdr_dask.models.base import Status
-from mdr_dask.models.fretting_wear import FrettingWear
 from mdr_dask.physics.sliding import laws
 
 LINE = """
@@ -26,7 +25,7 @@ SLIDING = f"model: sliding_friction\nparameters:{LINE}"
 JUMP = f"model: velocity_jump\nparameters:{LINE}"
 ROLLERS = """
 model: mixed_lubrication
-outputs: [breakthrough_probability, contact_length, contact_half_width, film, film_ratio, load_share,
+outputs: [breakthrough_probability, contact_length, contact_half_width, film, film_ratio, asperity_load_share,
           friction_coefficient]
 parameters:
   rms_roughness: 0.2 um
@@ -37,7 +36,7 @@ model: ehl_line
 outputs: [central_film, minimum_film, film, pressure, traction_coefficient]
 parameters:
 """
-RULE = "wear_rule" if "wear_rule" in FrettingWear.model_fields else "method"
+RULE = "wear_rule"
 FRETTING = """
 model: fretting_wear
 outputs: [wear_volume, contact_radius, worn_profile, worn_image]
@@ -73,6 +72,9 @@ def _fill(group: zarr.Group, model: str, data: xr.Dataset, failed: bool) -> None
         if name == "status":
             continue
         value = numbers.get(name, _anything(data[name], noise))
+        of = numbers.get(str(name).removesuffix("_error"))
+        if of is not None and str(name).endswith("_error"):
+            value = 0.005 * abs(of).mean("realisation") * xr.ones_like(noise)
         value = _as_limit(value.broadcast_like(data[name]), data).transpose(*data[name].dims)
         group[str(name)][...] = value.where(status == Status.DONE.value).transpose(*data[name].dims).values
     group["status"][...] = status.values
@@ -108,7 +110,6 @@ def _sliding(data: xr.Dataset, noise: xr.DataArray) -> dict[str, xr.DataArray]:
     fraction = np.minimum(0.5 * force ** (1 / (1 + data["hurst"])), 1.0)
     return {
         "friction_coefficient": np.sqrt(2) * slope * law * noise,
-        "friction_coefficient_error": 0.01 * slope * law * xr.ones_like(noise),
         "rms_slope": slope * xr.ones_like(noise),
         "contact_fraction": fraction * noise,
         "contact_slope": slope * (1 - 0.1 * fraction) * noise,

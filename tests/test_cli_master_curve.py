@@ -119,14 +119,6 @@ def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
     assert figure.stat().st_size > 10_000
 
 
-def test_errors_that_rest_on_few_points_are_told(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("mdr_dask.physics.superposition.posterior.MOST_STAGES", 1)
-    path = tmp_path / "table.csv"
-    table_of_two_groups(path)
-    assert main(["master-curve", str(path), "--vertical"]) == 0
-    assert "sampled points instead of 500 and are rough" in capsys.readouterr().err
-
-
 def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
     path = tmp_path / "table.csv"
     table_of_two_groups(path)

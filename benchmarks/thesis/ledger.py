@@ -137,7 +137,8 @@ def power(x: np.ndarray, y: np.ndarray) -> float:
 def interval(fitted: xr.Dataset, name: str, digits: int = 3) -> str:
     """Return a constant with its interval: ``0.41 (0.40, 0.42)``."""
     value, low, high = (float(fitted[name + end]) for end in ("", "_low", "_high"))
-    return f"{value:.{digits}g} ({low:.{digits}g}, {high:.{digits}g})"
+    known = np.isfinite(low) and np.isfinite(high)
+    return f"{value:.{digits}g} ({low:.{digits}g}, {high:.{digits}g})" if known else f"{value:.{digits}g}"
 
 
 def page(chapters: Iterable[tuple[str, Iterable[Claim]]], studies: Studies) -> str:

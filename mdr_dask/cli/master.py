@@ -27,9 +27,6 @@ LAWS = ("power", "arrhenius", "wlf")
 FAR, LEAST = 5.0, 0.002
 """Distance of a point from the merged curve, in standard deviations of the scatter and in decades, that is told."""
 
-ENOUGH, FEW = 500, 200
-"""Sampled points that errors of vertical fits should rest on, and below which it is told that they do not."""
-
 KEPT = (".json", ".csv")
 
 
@@ -209,12 +206,9 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
                 f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
             )
     _print_outliers(curve)
-    if 0 < curve.attrs["sampled"] < FEW:
-        click.echo(
-            f"the errors rest on {curve.attrs['sampled']:.0f} sampled points instead of {ENOUGH:.0f} and are rough: "
-            "the curves hardly decide between horizontal and vertical factors",
-            err=True,
-        )
+    for sentence in ("left_out", "undetermined"):
+        if curve.attrs.get(sentence):
+            click.echo(curve.attrs[sentence], err=True)
 
 
 def _print_outliers(curve: xr.Dataset) -> None:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import Fit
+from mdr_dask.fit.base import Fit, law_holds
 from mdr_dask.models.ehl_line import groups as groups_of
 
 _FILMS = {"central_film": "central", "minimum_film": "minimum"}
@@ -59,7 +59,15 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     covariance = np.linalg.inv(design[:, varied].T @ design[:, varied]) * np.sum(residuals**2) / freedom
     constants[varied] = solution
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
+    if _sentence([residuals]).startswith("no"):
+        # films have no scatter: what a law misses may point one way everywhere
+        width[varied] += np.abs(np.linalg.pinv(design[:, varied])) @ np.abs(residuals)
     return constants, width, residuals
+
+
+def _sentence(residuals: list[FloatArray]) -> str:
+    """Say whether the law holds: films have no scatter that could explain a departure."""
+    return law_holds(np.concatenate(residuals), 0.0)
 
 
 def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -77,7 +85,8 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     Dataset, dims (series,)
         ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
         with ``_low`` and ``_high``; NaN for an exponent whose number is not varied. ``<film>_rms`` and ``<film>_worst``
-        are the deviations of ``ln h``: the law is an approximation, and the intervals measure its misfit, not noise.
+        are the deviations of ``ln h``: the law is an approximation, and the intervals measure its misfit, not noise;
+        in full where ``law_holds`` says *no*.
 
     Raises
     ------
@@ -85,16 +94,21 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
         If no series has enough points.
     """
     results: dict[str, dict[str, float]] = {}
+    sentences: list[str] = []
     problem = "expected a series with central_film or minimum_film over W, U or G, got none"
     for name, dataset in _maps(groups):
         constants: dict[str, float] = {}
+        departures = []
         try:
-            for output in _FILMS.keys() & set(dataset.data_vars):
-                constants |= _named(_FILMS[str(output)], *_regression(_logarithms(dataset, str(output))))
+            for output in sorted(_FILMS.keys() & set(dataset.data_vars)):
+                found = _regression(_logarithms(dataset, str(output)))
+                constants |= _named(_FILMS[str(output)], *found)
+                departures.append(found[-1])
         except FitError as error:
             problem = str(error)
             continue
         results[name] = constants
+        sentences.append(_sentence(departures))
     if not results:
         raise FitError(problem)
     variables = sorted({key for constants in results.values() for key in constants})
@@ -102,7 +116,8 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
         {
             key: ("series", [constants.get(key, np.nan) for constants in results.values()], {"units": "1"})
             for key in variables
-        },
+        }
+        | {"law_holds": ("series", sentences)},
         coords={"series": list(results)},
     )
 

@@ -239,7 +239,7 @@ def _jump_law(series: Series) -> xr.Dataset:
     cases = Cases.of(series, *LEVELS, "rms_slope")
     numbers = _numbers(cases)
     before, jump = numbers["before_over_slope"], numbers["jump_over_slope"]
-    known = _rising(cases, numbers) & (np.nanmin(before, axis=0) > 0) & (np.nanmin(jump, axis=0) > 0)
+    known = _rising(cases, numbers) & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
         raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
     rows = _rows_of(cases.column("hurst"))

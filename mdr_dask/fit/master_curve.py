@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
@@ -31,6 +32,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
 ABSOLUTE_ZERO = -273.15
+LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
 SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
 
 
@@ -103,15 +105,17 @@ def master_curve(
     frame = _frame(table)
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
+    frame, left_out = _finite(frame, [over, values, by] + ([second] if second else []))
     if second is not None:
-        return _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
+        found = _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
+        return found.assign_attrs(left_out=left_out)
     groups, curves = _curves(frame, over, values, by)
     zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
     free = superposition.superpose(groups, curves, vertical, None, draws)
     result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
-    return dataset.assign(_laws(result, over, by, units.get(by, "")))
+    return dataset.assign(_laws(result, over, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
 
 
 def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
@@ -122,6 +126,30 @@ def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
     frame = mean[[name for name in numeric if name in mean.data_vars]].to_dataframe().reset_index()
     frame.attrs["units"] = {str(name): str(mean[name].attrs.get("units", "1")) for name in numeric}
     return frame
+
+
+def _finite(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
+    """Return the rows that have a finite number in each of the columns, and a sentence about the others, if any."""
+    missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
+    anywhere = np.logical_or.reduce(list(missing.values()))
+    if not anywhere.any():
+        return frame, ""
+    where = ", ".join(f"{name!r} in {lines.sum()}" for name, lines in missing.items() if lines.any())
+    kept = frame[~anywhere]
+    kept.attrs.update(frame.attrs)
+    return kept, f"{anywhere.sum()} of {anywhere.size} rows are left out, which have no finite number: {where}"
+
+
+def _untold(found: superposition.Superposition) -> dict[str, str]:
+    """Return a sentence about the steps that the curves do not tell, if there are any."""
+    if not found.undetermined:
+        return {"undetermined": ""}
+    runs = ", ".join(f"between {low:.6g} and {high:.6g}" for low, high in found.undetermined)
+    mean, scatter = found.usual
+    return {
+        "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are "
+        f"taken to be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
+    }
 
 
 def _find(frame: pd.DataFrame, wanted: str) -> str | None:
@@ -187,7 +215,7 @@ def _of_two_groups(
 ) -> xr.Dataset:
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
-    rows = frame[[over, values, *by]].dropna()
+    rows = frame[[over, values, *by]]
     first, second = (_clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
     centres = [
         {label: float(rows[name].to_numpy()[labels == label].mean()) for label in np.unique(labels)}
@@ -196,6 +224,9 @@ def _of_two_groups(
     for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
         part = rows[(first == one) & (second == other)]
         (_,), (curve,) = _curves(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
+        if np.ptp(curve[0]) == 0:
+            where = f"{by[0]} = {centres[0][one]:g}, {by[1]} = {centres[1][other]:g}"
+            raise DataError(f"the curve at {where} needs two or more distinct points")
         keys.append((centres[0][one], centres[1][other]))
         curves.append(curve)
     a, b = np.array(keys).T
@@ -226,7 +257,6 @@ def _curves(
     frame: pd.DataFrame, over: str, values: str, by: str
 ) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
     rows = frame[[over, values, by]].to_numpy(dtype=np.float64)
-    rows = rows[np.all(np.isfinite(rows), axis=1)]
     if rows.size == 0 or np.any(rows[:, :2] <= 0):
         raise DataError(f"{over!r} and {values!r} must be positive: curves are shifted along logarithmic axes")
     labels = _clusters(rows[:, 2])
@@ -238,13 +268,16 @@ def _curves(
 def _clusters(values: FloatArray) -> NDArray[np.intp]:
     """Return the number of the group of each value.
 
-    Measured values that scatter about a few set ones are split at the largest jump among their gaps.
+    Measured values that scatter about a few set ones are split at the largest jump among their gaps. Values that occur
+    again, or whose gaps are much alike, are set ones themselves.
     """
-    distinct, place = np.unique(values, return_inverse=True)
-    if distinct.size <= values.size / 3 or distinct.size < 3:
+    distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
+    if distinct.size <= values.size / 3 or distinct.size < 3 or times.min() > 1:
         return place
     gaps = np.sort(np.diff(distinct))
     jump = int(np.argmax(gaps[1:] / gaps[:-1]))
+    if gaps[jump + 1] < LEAST_JUMP * gaps[jump]:
+        return place
     threshold = np.sqrt(gaps[jump] * gaps[jump + 1])
     return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
 
@@ -274,48 +307,45 @@ def _dataset(
     result: superposition.Superposition, over: str, values: str, by: str, units: Mapping[str, str]
 ) -> xr.Dataset:
     size = result.groups.size
-    dataset = xr.Dataset(
-        coords={by: (by, result.groups, {"units": units.get(by, "")})},
-        attrs={
-            "abscissa": over,
-            "ordinate": values,
-            "group": by,
-            "reference": result.reference,
-            "noise": result.noise,
-            "freedom": result.freedom,
-            "sampled": result.sampled,
-        },
-    )
-    narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
+    attrs = {
+        "abscissa": over,
+        "ordinate": values,
+        "group": by,
+        "reference": result.reference,
+        "noise": result.noise,
+        "freedom": result.freedom,
+    }
+    found: dict[str, tuple[Any, ...]] = {}
+    narrow, wide = (float(stdtrit(result.freedom, 0.5 + share / 2)) for share in (SHARE_OF_BARS, CONFIDENCE))
     factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
     factors["vertical_factor"] = (result.vertical, result.vertical_error)
     for name, (factor, error) in factors.items():
         meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
-        dataset[name] = (by, factor, {"units": "1", "long_name": meaning})
-        dataset[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
-        dataset[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
-        dataset[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
-    dataset["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
-    dataset["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
-    dataset["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
-    dataset["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
-    dataset["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
+        found[name] = (by, factor, {"units": "1", "long_name": meaning})
+        found[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
+        found[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
+        found[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
+    found["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
+    found["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
+    found["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
+    found["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
+    found["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
     measured = {"measured_low": 10 ** result.measured[0], "measured_high": 10 ** result.measured[1]}
-    dataset["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
-    dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
-    dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
-    dataset["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
+    found["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
+    found["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
+    found["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
+    found["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
     if result.draws.size:
         for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
             low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
             about = {"units": "1", "long_name": "half width of 68 % of the bootstrap samples"}
-            dataset[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
-        dataset["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
-        dataset["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
-    return dataset
+            found[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
+        found["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+        found["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
+    return xr.Dataset(found, {by: (by, result.groups, {"units": units.get(by, "")})}, attrs)
 
 
-def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.DataArray]:
+def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.Variable]:
     """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
     size = result.groups.size
     covariance = result.covariance[:size, :size]
@@ -333,14 +363,14 @@ def _laws(result: superposition.Superposition, over: str, by: str, unit: str) ->
     return {name: value for law in fits for name, value in _constants(law).items()}
 
 
-def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.DataArray]:
+def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
     units = {"activation_energy": "J/mol", "c2": "K"}
     found = {}
     for key, (value, low, high) in law.constants.items():
         for suffix, number in (("", value), ("_low", low), ("_high", high)):
-            found[f"{law.name}_{key}{suffix}"] = xr.DataArray(number, attrs={"units": units.get(key, "1")})
+            found[f"{law.name}_{key}{suffix}"] = xr.Variable((), number, {"units": units.get(key, "1")})
     meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
-    found[f"{law.name}_residual"] = xr.DataArray(law.residual, attrs=meaning)
+    found[f"{law.name}_residual"] = xr.Variable((), law.residual, meaning)
     return found
 
 
@@ -375,7 +405,6 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         curve_cross=curve["curve_covariance"].to_numpy(),
         measured=(0.0, 0.0),
         draws=_drawn(curve),
-        sampled=float(curve.attrs["sampled"]),
     )
     units = {
         by: curve[by].attrs.get("units", ""),

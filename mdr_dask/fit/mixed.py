@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -15,21 +12,24 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.base import Fit
+from mdr_dask.fit.base import DOUBTFUL, Fit
 from mdr_dask.models.base import DataFile
-from mdr_dask.units import to_si
+from mdr_dask.tables import Column, read_table
 
 PROBABILITY = "breakthrough_probability"
 ERROR = "standard_error"
 #: What can be fitted; of layer strength and thickness only the ratio is in the data, so one at a time.
 UNKNOWNS = ("layer_shear_strength", "layer_thickness", "pressure_viscosity", "rms_roughness")
-#: Increase of chi squared at the ends of a 95 % interval of one unknown.
+#: Increase of chi squared at the ends of a 95 % interval of one unknown, where all errors are known.
 _REACH = 3.841459
 _GRID = 4001
 
 
 class Estimate(NamedTuple):
-    """Best value of the unknown, its 95 % interval (NaN where it leaves the range simulated), and goodness of fit."""
+    """Best value of the unknown, its 95 % interval (NaN where it leaves the range simulated), and goodness of fit.
+
+    `law_holds` says in words whether the simulation explains the measurements.
+    """
 
     value: float
     low: float
@@ -37,6 +37,7 @@ class Estimate(NamedTuple):
     chi_squared: float
     degrees_of_freedom: int
     rms_residual: float
+    law_holds: str
 
 
 def estimate(
@@ -49,7 +50,7 @@ def estimate(
     unknown : array, shape (k,)
         Values simulated, positive and ascending.
     simulated, simulated_error : array, shape (n, k)
-        Probability and its standard error of every measured case at each value.
+        Probability of every measured case at each value, and its error, of statistics and grid together.
     measured, error : array, shape (n,)
         Measured probabilities and their standard errors; NaN errors mean that the scatter about the fit is the error.
 
@@ -57,8 +58,8 @@ def estimate(
     -------
     Estimate
         Of weighted least squares over a monotone cubic interpolation in the logarithm of the unknown. The interval is
-        where chi squared rises by 3.84, times chi squared per degree of freedom where that is above one or errors are
-        unknown.
+        where chi squared rises by 3.84. Where the errors are unknown or do not explain the residuals, it rises by
+        Student's t squared times chi squared per degree of freedom.
 
     Raises
     ------
@@ -67,6 +68,7 @@ def estimate(
         the range simulated.
     """
     from scipy.interpolate import PchipInterpolator
+    from scipy.stats import chi2, t
 
     if unknown.size < 4 or measured.size < 2:
         raise FitError(
@@ -88,12 +90,28 @@ def estimate(
             f"the best value lies at the end of the range simulated, {np.exp(fine[best]):.4g}; widen the range"
         )
     freedom = measured.size - 1
-    spread = chi[best] / freedom
-    inside = chi <= chi[best] + _REACH * (max(1.0, spread) if known else spread)
+    chance = float(chi2.sf(chi[best], freedom)) if known else np.nan
+    # scatter that is estimated from the residuals is itself known from so many only
+    reach = _REACH if chance >= DOUBTFUL else t.ppf(0.975, freedom) ** 2 * chi[best] / freedom
+    inside = chi <= chi[best] + reach
     low = np.nan if inside[0] else float(np.exp(fine[int(np.argmax(inside))]))
     high = np.nan if inside[-1] else float(np.exp(fine[_GRID - 1 - int(np.argmax(inside[::-1]))]))
     rms = float(np.sqrt(np.mean(residual[:, best] ** 2)))
-    return Estimate(float(np.exp(fine[best])), low, high, float(chi[best]) if known else np.nan, freedom, rms)
+    chi_squared = float(chi[best]) if known else np.nan
+    return Estimate(
+        float(np.exp(fine[best])), low, high, chi_squared, freedom, rms, _law_holds(rms, chi_squared, freedom, chance)
+    )
+
+
+def _law_holds(rms: float, chi_squared: float, freedom: int, chance: float) -> str:
+    """Say in words whether the simulation explains the measurements."""
+    residuals = f"residuals of {rms:.2g} rms"
+    if np.isnan(chance):
+        return f"not tested: the table gives no standard errors; {residuals}"
+    compared = f"{residuals}, chi squared {chi_squared:.3g} of {freedom} (probability {chance:.2g})"
+    if chance >= DOUBTFUL:
+        return f"yes: the errors explain {compared}"
+    return f"no: the errors do not explain {compared}"
 
 
 def read_measured(file: DataFile, units: Mapping[str, str]) -> dict[str, FloatArray]:
@@ -102,8 +120,8 @@ def read_measured(file: DataFile, units: Mapping[str, str]) -> dict[str, FloatAr
     Parameters
     ----------
     file : DataFile
-        CSV with a header; a column is a parameter of the model, ``breakthrough_probability`` or ``standard_error``,
-        each with its unit behind in brackets unless SI: ``temperature [degC]``, ``breakthrough_probability [%]``.
+        A table with a heading; a column is a parameter of the model, ``breakthrough_probability`` or
+        ``standard_error``, each with its unit in brackets: ``temperature [degC]``, ``breakthrough_probability [%]``.
     units : mapping of str to str
         SI units of the columns allowed.
 
@@ -112,22 +130,12 @@ def read_measured(file: DataFile, units: Mapping[str, str]) -> dict[str, FloatAr
     DataError
         If a column is unknown, missing or holds something else than numbers.
     """
-    rows = [row for row in csv.reader(io.StringIO(file.read_text())) if row and not row[0].startswith("#")]
-    if len(rows) < 2:
-        raise DataError(f"{file.name}: expected a header and at least one row")
-    columns: dict[str, FloatArray] = {}
-    for number, title in enumerate(rows[0]):
-        match = re.fullmatch(r"\s*(\w+)\s*(?:\[(.*)\])?\s*", title)
-        if match is None or match[1] not in units:
-            raise DataError(f"{file.name}: expected columns of {', '.join(units)}, got {title.strip()!r}")
-        name, unit = match[1], match[2] or ""
-        try:
-            columns[name] = np.array([to_si(f"{row[number].strip()} {unit}", units[name]) for row in rows[1:]])
-        except (ValueError, IndexError) as error:
-            raise DataError(f"{file.name}: column {name}: {error}") from None
-    if PROBABILITY not in columns:
-        raise DataError(f"{file.name}: expected a column {PROBABILITY}")
-    return columns
+    least, above = {PROBABILITY: 0.0}, {ERROR: 0.0}
+    columns = [
+        Column(name, unit, needed=name == PROBABILITY, least=least.get(name), above=above.get(name))
+        for name, unit in units.items()
+    ]
+    return read_table(file.read_text(), file.name, columns)
 
 
 def fit_breakthrough(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -168,7 +176,11 @@ def _add(found: xr.Dataset, dataset: xr.Dataset, unknown: str, measured: Mapping
     if np.any(count < 2):
         raise FitError("expected at least two realisations of every case that was measured")
     mean = np.nansum(values, axis=-1) / count
-    error = np.sqrt(np.nansum((values - mean[..., None]) ** 2, axis=-1) / (count - 1) / count)
+    variance = np.nansum((values - mean[..., None]) ** 2, axis=-1) / (count - 1) / count
+    if f"{PROBABILITY}_error" in dataset:
+        grid = dataset[f"{PROBABILITY}_error"].transpose(*array.dims).values[places]
+        variance = variance + (np.nansum(grid, axis=-1) / count) ** 2
+    error = np.sqrt(variance)
     probability = measured[PROBABILITY]
     result = estimate(
         dataset[unknown].values.astype(np.float64),
@@ -184,6 +196,7 @@ def _add(found: xr.Dataset, dataset: xr.Dataset, unknown: str, measured: Mapping
     found[f"{unknown}_chi_squared"] = ((), result.chi_squared, one | {"long_name": "chi squared of the fit"})
     found[f"{unknown}_degrees_of_freedom"] = ((), result.degrees_of_freedom, one)
     found[f"{unknown}_rms_residual"] = ((), result.rms_residual, one | {"long_name": "rms of measured less simulated"})
+    found["law_holds"] = ((), result.law_holds)
 
 
 def _places(dataset: xr.Dataset, axis: str, measured: Mapping[str, FloatArray]) -> NDArray[np.intp]:
@@ -205,5 +218,6 @@ FITS: tuple[Fit, ...] = (
         ("mixed_lubrication",),
         "one of tau0, h_c, alpha, rms from a table of measured contact probabilities",
         fit_breakthrough,
+        apart=True,
     ),
 )

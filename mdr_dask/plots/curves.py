@@ -6,7 +6,7 @@ Axes that a figure cannot show are held at one value. Which one stands in its ti
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -444,6 +444,16 @@ def results(
     if not found:
         raise FitError("; ".join(dict.fromkeys(reasons)))
     return found
+
+
+def verdict(found: Iterable[xr.Dataset]) -> str:
+    """Return in how many fits the law holds, for the title; the sentence of a fit that stands alone."""
+    said = [str(text) for each in found if "law_holds" in each for text in np.ravel(each["law_holds"].values)]
+    if len(said) == 1:
+        return f"law holds: {said[0]}"
+    held = sum(text.startswith("yes") for text in said)
+    tested = sum(not text.startswith("not tested") for text in said)
+    return f"the law holds in {held} of {tested} fits" if tested else ""
 
 
 def with_coordinates(found: xr.Dataset, data: xr.Dataset) -> xr.Dataset:

@@ -258,7 +258,8 @@ def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, ro
         axes.set(xlabel=style.label("hurst"), ylabel=row.label, ylim=(0, None))
         curves.finish(figure, axes, next(iter(families.values())) if len(families) == 1 else curves.NO_FAMILY)
     fixed = curves.fixed_by_all(held)
-    style.title(figure, subject, curves.fixed_text(fixed, CASE), "bars: 95 % intervals")
+    bars = "; ".join(part for part in ("bars: 95 % intervals", curves.verdict(found.values())) if part)
+    style.title(figure, subject, curves.fixed_text(fixed, CASE), bars)
     style.leave_out(figure, told)
     return figure
 

@@ -33,10 +33,29 @@ def _constants(found: xr.Dataset, name: str) -> curves.Mean:
     return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
 
 
+def jumps(groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return the series whose velocity jumps at once: the laws of a jump say nothing of other histories.
+
+    Raises
+    ------
+    DataError
+        If there is none.
+    """
+    found = {name: data for name, data in groups.items() if _is_jump(data)}
+    if not found:
+        raise DataError("expected a series with a jump of the velocity, got other histories: see the figure protocols")
+    return found
+
+
+def _is_jump(data: xr.Dataset) -> bool:
+    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
+    history = curves.parameters_of(data).get("protocol") or {}
+    return not varied and history.get("shape", "jump") == "jump"
+
+
 def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, xr.Dataset], list[str]]:
     """Return the series that varies along most of some parameters, those with most values, and which are left out."""
-    if not groups:
-        raise DataError("expected a store with at least one series, got none")
+    groups = jumps(groups)
 
     def rank(data: xr.Dataset) -> list[int]:
         sizes = [data[name].size if name in data.coords else 1 for name in varied]
@@ -47,9 +66,10 @@ def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, x
     return {best: groups[best]}, [f"series {', '.join(rest)}"] if rest else []
 
 
-def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str) -> None:
+def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name: str, *fits: xr.Dataset) -> None:
     text = subject + (f", series {name}" if name else "")
-    style.title(figure, text, curves.fixed_text(held, HELD), INTERVALS)
+    bars = "; ".join(part for part in (INTERVALS, curves.verdict(fits)) if part)
+    style.title(figure, text, curves.fixed_text(held, HELD), bars)
 
 
 def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -144,7 +164,7 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set_ylim(jumps[jumps > 0].min() / 2, 3 * np.nanmax(jumps))
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "the jump against friction before it", curves.scalars(found), name)
+    _title(figure, "the jump against friction before it", curves.scalars(found), name, law)
     style.leave_out(figure, told)
     return figure
 
@@ -156,6 +176,10 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     series, told = _choose(groups, "velocity", "hurst")
     ((name, found),) = _fitted(series, "relaxation").items()
     powers = _powers(series)
+    if not well_known(np.ravel(found["rate_low"].values), np.ravel(found["rate_high"].values)).any():
+        raise DataError(
+            "expected a rate of relaxation known to a factor of 1.6, got none: more realisations are needed"
+        )
     figure, (axes,) = style.panels(1)
     left = 0
     for cases in by_hurst(found):
@@ -174,7 +198,7 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.set(xlabel=r"$v_1 \tau q_{max}$", ylabel="rate of relaxation $b$")
     style.logarithmic(axes, "xy")
     _name_hursts(figure, axes, found)
-    _title(figure, "rate of relaxation", curves.scalars(found), name)
+    _title(figure, "rate of relaxation, one exponential", curves.scalars(found), name, found)
     unknown = f"{left} rates not known to a factor of 1.6" if left else ""
     style.leave_out(figure, [unknown, *told])
     return figure
@@ -229,6 +253,6 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     axes.plot(line, [1, 1], "k:", lw=1, label="1")
     axes.set(xlabel=style.label("hurst"), ylabel="power of $b$")
     style.legend(axes)
-    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name)
+    _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name, found)
     style.leave_out(figure, told)
     return figure

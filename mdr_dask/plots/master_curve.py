@@ -1,5 +1,6 @@
-"""Figures of a master curve: the curves as measured, the merged curve, the shift factors (thesis figures 3.17 to
-3.19).
+"""Figures of a master curve: the curves as measured, the merged curve, the shift factors.
+
+Thesis figures 3.17 to 3.19 are such figures of measurements, which are not public.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from mdr_dask.arrays import FloatArray
+from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -18,41 +20,68 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BAR = 1.0  # standard errors shown
+#: Rms deviation from the merged curve up to which curves count as one: laws of friction are not meant to hold better.
+COLLAPSED = 0.05
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
     """Draw what :func:`mdr_dask.fit.master_curve.master_curve` returns: curves, merged curve and factors side by side.
 
-    Bars and the band are one standard error; the merged curve is dashed beyond the range measured at the reference.
+    Bars and the band are 68 %; the merged curve is dashed beyond the range measured at the reference. The title says
+    how far the points are from the merged curve, and whether they collapse at all.
     """
-    from matplotlib.figure import Figure
-
     shown = [(str(curve.attrs["group"]), "shift_factor", "vertical_factor", curve.attrs["reference"])]
     if "second" in curve.attrs:
         second = str(curve.attrs["second"]), "second_factor", "second_vertical_factor", curve.attrs["second_reference"]
         shown.append(second)
     rising = bool(curve["vertical_factor"].any())
-    panels = 2 + len(shown) * (1 + rising)
-    figure = Figure(figsize=(4.4 * panels, 4.2), layout="constrained")
-    axes = list(figure.subplots(1, panels))
-    _measured(axes.pop(0), curve)
-    _merged(axes.pop(0), curve)
+    count = 2 + len(shown) * (1 + rising)
+    figure, panels = style.panels(count, columns=count, size=(4.6, 4.0))
+    axes = iter(panels)
+    _measured(figure, next(axes), curve)
+    _merged(next(axes), curve)
     for by, across, along, reference in shown:
-        _factors(axes.pop(0), curve, by, across, reference)
+        _factors(next(axes), curve, by, across, reference)
         if rising:
-            _factors(axes.pop(0), curve, by, along, reference)
+            _factors(next(axes), curve, by, along, reference)
+    references = ", ".join(f"{by} = {reference:.4g} {_unit(curve, by)}".strip() for by, _, _, reference in shown)
+    style.title(figure, "master curve", f"reference: {references}", _collapse(curve))
     return figure
 
 
+def _collapse(curve: xr.Dataset) -> str:
+    """Return how far the points are from the merged curve, and whether that is a collapse."""
+    away = deviations(curve)
+    rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(np.abs(away)))
+    said = "" if rms < COLLAPSED else "the curves do NOT collapse: "
+    return f"{said}points deviate from the merged curve by {rms:.1%} (rms), at most by {largest:.1%}"
+
+
+def deviations(curve: xr.Dataset) -> FloatArray:
+    """Return the natural logarithms of the points over the merged curve, straight between its points on both scales."""
+    x, y = (np.log(curve[f"curve_{name}"].to_numpy()) for name in ("abscissa", "ordinate"))
+    order = np.argsort(x)
+    at = np.log(curve["point_abscissa"].to_numpy())
+    away: FloatArray = np.log(curve["point_ordinate"].to_numpy()) - np.interp(at, x[order], y[order])
+    return away
+
+
+def _unit(curve: xr.Dataset, name: str) -> str:
+    unit = str(curve[name].attrs.get("units", "")) if name in curve.coords else ""
+    return "" if unit == "1" else unit
+
+
 def _label(name: str, values: xr.DataArray) -> str:
-    unit = values.attrs.get("units", "")
-    return f"{name.replace('_', ' ')} ({unit})" if unit and unit != "1" else name.replace("_", " ")
+    return style.with_unit(name.replace("_", " "), str(values.attrs.get("units", "")))
 
 
-def _colours(curve: xr.Dataset) -> Any:
-    from matplotlib import colormaps
-
-    return colormaps["viridis"](np.linspace(0, 0.95, curve.sizes[str(curve.attrs["group"])]))
+def _colours(curve: xr.Dataset) -> list[Any]:
+    """Return a colour for every group: named in a legend, or read off a colour bar."""
+    groups = curve[str(curve.attrs["group"])].to_numpy()
+    if groups.size <= len(style.COLOURS):
+        return list(style.scale(groups.size))
+    how, norm = style.shades(groups)
+    return [how(norm(float(value))) for value in groups]
 
 
 def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]:
@@ -71,82 +100,87 @@ def _by_group(curve: xr.Dataset) -> list[tuple[float, xr.Dataset, float, float]]
     ]
 
 
-def _measured(axes: Axes, curve: xr.Dataset) -> None:
+def _measured(figure: Figure, axes: Axes, curve: xr.Dataset) -> None:
     groups = _by_group(curve)
     for (value, points, shift, rise), colour in zip(groups, _colours(curve), strict=True):
         shifts = points.get("point_shift", shift)
         x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10 ** points.get("point_rise", rise)
         if "point_second" not in points:
-            axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}")
+            axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}", gid=style.DATA)
             continue
         for number, other in enumerate(np.unique(points["point_second"])):
             one = np.flatnonzero(points["point_second"] == other)
-            axes.loglog(x[one], y[one], ".-", color=colour, label=None if number else f"{value:.3g}")
+            label = None if number else f"{value:.3g}"
+            axes.loglog(x[one], y[one], ".-", color=colour, label=label, gid=style.DATA)
     axes.set_xlabel(_label(curve.attrs["abscissa"], curve["curve_abscissa"]))
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
-    if len(groups) <= 12:
-        axes.legend(title=_label(curve.attrs["group"], curve[curve.attrs["group"]]), fontsize="small")
-    axes.set_title("as measured")
+    heading = _label(curve.attrs["group"], curve[curve.attrs["group"]])
+    style.logarithmic(axes, "xy")
+    if len(groups) <= len(style.COLOURS):
+        style.legend(axes, heading)
+    else:
+        from matplotlib.cm import ScalarMappable
+
+        how, norm = style.shades([value for value, *_ in groups])
+        figure.colorbar(ScalarMappable(norm, how), ax=axes, label=heading)
+    axes.set_title("as measured", fontsize="small")
 
 
 def _merged(axes: Axes, curve: xr.Dataset) -> None:
     for (_, points, _, _), colour in zip(_by_group(curve), _colours(curve), strict=True):
-        axes.loglog(points["point_abscissa"], points["point_ordinate"], ".", color=colour)
+        axes.loglog(points["point_abscissa"], points["point_ordinate"], ".", color=colour, gid=style.DATA)
     x, y = curve["curve_abscissa"].to_numpy(), curve["curve_ordinate"].to_numpy()
     error = 10 ** (BAR * curve["curve_error"].to_numpy())
     low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
     inside = (x >= low) & (x <= high)
     axes.loglog(x, y, "k--", linewidth=1, label="reached by shifting")
-    axes.loglog(np.where(inside, x, np.nan), np.where(inside, y, np.nan), "k-", label="measured at the reference")
+    axes.loglog(
+        np.where(inside, x, np.nan), np.where(inside, y, np.nan), "k-", label="measured at the reference", gid="merged"
+    )
     axes.fill_between(x, y / error, y * error, color="k", alpha=0.2, label="standard error")
     axes.set_xlabel("shifted " + _label(curve.attrs["abscissa"], curve["curve_abscissa"]))
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
-    axes.set_title(f"reference {curve.attrs['reference']:.3g}")
-    axes.legend(fontsize="small")
+    style.logarithmic(axes, "xy")
+    axes.set_title("merged", fontsize="small")
+    style.legend(axes)
 
 
 def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: float) -> None:
     groups = curve[by].to_numpy()
     error = BAR * curve[f"{factor}_error"]
-    axes.errorbar(groups, curve[factor], error, fmt="o", color="k", label="factors, 68 %")
+    axes.errorbar(groups, curve[factor], error, fmt="o", ms=4, color="k", label="factors, 68 %")
     across = "vertical" not in factor
     if "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp"):
         exponent = float(curve["power_exponent"])
         if across:
             axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
-        axes.set_xscale("log")
-        _plain_ticks(axes, groups)
+        style.logarithmic(axes, "x")
     axes.set_xlabel(_label(by, curve[by]))
     moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")
-    axes.set_ylabel(f"shift of log10 {moved} (decades)")
-    axes.set_title("shift factors" if across else "vertical factors")
-    axes.legend(fontsize="small")
+    axes.set_ylabel(style.with_unit(f"shift of log10 {moved}", "decades"))
+    axes.set_title("shift factors" if across else "vertical factors", fontsize="small")
+    style.legend(axes)
 
 
-def _plain_ticks(axes: Axes, groups: NDArray[np.float64]) -> None:
-    """Name three or four of the groups on a logarithmic axis: within a decade its own labels run into each other."""
-    from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
-
-    if np.ptp(np.log10(groups)) >= 2:
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        return
-    named = np.unique(np.linspace(0, groups.size - 1, min(groups.size, 4)).round().astype(int))
-    axes.xaxis.set_major_locator(FixedLocator(groups[named]))
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
-    axes.xaxis.set_minor_locator(NullLocator())
-
-
-def _of_store(series: Mapping[str, xr.Dataset]) -> Figure:
+def _of_store(groups: Mapping[str, xr.Dataset]) -> Figure:
     from mdr_dask.fit.master_curve import friction_of_roughness, master_curve
 
-    return draw_master_curve(master_curve(friction_of_roughness(series)))
+    found, told = {}, []
+    for name, data in groups.items():
+        if "friction_coefficient" in data:
+            others = [d for d in curves.axes_of(data, "friction_coefficient") if d not in ("normal_force", "velocity")]
+            found[name], more = curves.hold(data, others)
+            told += [f"{name}: {each}" if name else each for each in more]
+    figure = draw_master_curve(master_curve(friction_of_roughness(found)))
+    style.leave_out(figure, told)
+    return figure
 
 
 PLOTS = (
     Plot(
         "master_curve",
         ("sliding_friction",),
-        "coefficient of friction over force at each velocity, merged, and shift factors (figures 3.17 to 3.19)",
+        "coefficient of friction over force at each velocity, merged, and shift factors (as figures 3.17 to 3.19)",
         _of_store,
     ),
 )

@@ -28,6 +28,20 @@ def test_power_law_is_recovered() -> None:
     for name, value in (("load", -0.166), ("speed", 0.692), ("material", 0.47), ("factor", 2.922)):
         assert float(fit[f"central_{name}"]) == pytest.approx(value, rel=1e-9)
     assert float(fit["central_worst"]) < 1e-12
+    assert str(fit["law_holds"].item()).startswith("yes: ")
+
+
+def test_a_bent_law_is_named_and_its_interval_is_wide() -> None:
+    """The speed exponent goes from 0.4 to 1 over the map, as from an elastic to a rigid contact."""
+    speeds = np.geomspace(1e-13, 1e-9, 9)
+    data = power_law(GRID[0], speeds, GRID[2])
+    logarithm = np.log(speeds / 1e-11)
+    bend = np.exp(0.3 / 9.2 / 2 * logarithm**2)[None, :, None, None]
+    fit = film_exponents({"": data.assign(central_film=data["central_film"] * bend)})
+    assert str(fit["law_holds"][0].item()).startswith("no: departs by")
+    straight = film_exponents({"": data})
+    assert str(straight["law_holds"][0].item()).startswith("yes")
+    assert fit["central_speed_high"][0] - fit["central_speed_low"][0] > 0.08  # 0.02 by scatter alone
 
 
 def test_interval_holds_the_exponent_at_its_rate() -> None:

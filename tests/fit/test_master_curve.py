@@ -153,7 +153,7 @@ def test_comments_semicolons_and_spaces_are_understood(tmp_path):
 
 def test_tables_that_are_ambiguous_or_incomplete_are_refused():
     frame = pd.DataFrame({"force": [1.0, 2, 1, 2], "mu": [1.0, 2, 3, 4], "velocity": [1.0, 1, 2, 2]})
-    with pytest.raises(DataError, match="two shifts need two or more values of each group"):
+    with pytest.raises(DataError, match="the curve at velocity = 1, temperature = 1 needs two or more distinct points"):
         master_curve(frame.assign(temperature=[1.0, 2, 3, 4]))
     with pytest.raises(DataError, match="varies in 'force' too"):
         master_curve(frame.rename(columns={"velocity": "frequency"}).assign(T=[1.0, 1, 2, 2]), "frequency", "mu", "T")
@@ -204,3 +204,46 @@ def test_vertical_factors_of_two_groups_are_sums_too():
     for curve in (result, rereferenced(result, 1.0)):
         mu = curve["point_ordinate"] / 10 ** curve["point_rise"]
         np.testing.assert_allclose(np.sort(mu), np.sort(table["mu"]), rtol=1e-9)
+
+
+def plateau(temperatures, points, noise=0.005):
+    """Modulus over frequency that runs into a plateau; neighbours of ten kelvin lie 1.4 decades apart."""
+    random, rows = np.random.default_rng(0), []
+    for kelvin in temperatures:
+        frequency = np.geomspace(0.1, 10, points)
+        modulus = 1 / (1 + frequency * 10 ** (0.14 * (kelvin - 300.0)))
+        rows.extend((f, m, kelvin) for f, m in zip(frequency, modulus, strict=True))
+    table = pd.DataFrame(rows, columns=["frequency", "modulus", "temperature"])
+    return table.assign(modulus=table["modulus"] * (1 + noise * random.standard_normal(len(table))))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_rows_without_a_finite_number_are_counted(bad):
+    table = plateau(np.arange(290.0, 340.0, 10), 12)
+    table.loc[[3, 20], "modulus"] = bad
+    table.loc[40, "frequency"] = np.nan
+    whole = master_curve(table)
+    assert whole.sizes["point"] == len(table) - 3
+    assert whole.attrs["left_out"] == (
+        "3 of 60 rows are left out, which have no finite number: 'frequency' in 1, 'modulus' in 2"
+    )
+    assert master_curve(plateau(np.arange(290.0, 340.0, 10), 12)).attrs["left_out"] == ""
+
+
+@pytest.mark.parametrize(
+    "temperatures", [[300.0, 310.0, 320.0, 330.0], [300.0, 310.0, 350.0], [300.0, 304.0, 330.0, 331.0]]
+)
+def test_two_points_a_curve_are_groups_of_their_own(temperatures):
+    """Set temperatures that occur twice each are no scatter about one, however they are spaced."""
+    table = plateau(temperatures, 2)
+    assert master_curve(table, reference=temperatures[1])["temperature"].to_numpy().tolist() == temperatures
+
+
+def test_what_a_plateau_does_not_tell_is_said():
+    table = plateau(np.arange(230.0, 351.0, 10), 15)
+    curve = master_curve(table, reference=300.0)
+    assert curve.attrs["undetermined"].startswith("not determined between 230 and ")
+    truth = 0.14 * (curve["temperature"] - 300)
+    assert np.all((curve["shift_factor_low"] <= truth) & (truth <= curve["shift_factor_high"]))
+    told = master_curve(plateau(np.arange(300.0, 351.0, 10), 15))
+    assert told.attrs["undetermined"] == ""

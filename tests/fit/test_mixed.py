@@ -45,6 +45,44 @@ def test_intervals_cover_the_truth_at_their_level():
     assert covered > 0.95 - 4 * 0.0154
 
 
+def test_errors_of_the_simulation_count_as_much_as_those_of_the_measurement():
+    """200 tables of exact measurements against scattered simulations: chi squared is about its degrees of freedom."""
+    generator = np.random.default_rng(5)
+    found = []
+    for _ in range(200):
+        unknown, simulated, error, measured, noise = planted(7e-9, 0.002, generator)
+        scattered = simulated + 0.02 * generator.normal(size=simulated.shape)
+        found.append(estimate(unknown, scattered, error + 0.02, measured, noise))
+    covered = np.mean([not (each.low > 7e-9 or each.high < 7e-9) for each in found])
+    assert covered > 0.95 - 4 * 0.0154
+    assert 2.0 < np.mean([each.chi_squared for each in found]) < 5.0  # of 4 degrees, less by the interpolation
+
+
+@pytest.mark.parametrize("cases", [5, 20])
+def test_intervals_without_errors_cover_the_truth_at_their_level(cases):
+    """300 tables without standard errors, of few cases and of many."""
+    generator = np.random.default_rng(6)
+    steepness = np.linspace(0.5, 2.5, cases)
+    simulated = truth(UNKNOWN[None, :], steepness[:, None])
+    held = 0
+    for _ in range(300):
+        measured = truth(7e-9, steepness) + 0.02 * generator.normal(size=cases)
+        found = estimate(UNKNOWN, simulated, np.zeros_like(simulated), measured, np.full(cases, np.nan))
+        assert found.law_holds.startswith("not tested")
+        held += found.low <= 7e-9 <= found.high
+    assert held / 300 > 0.95 - 4 * 0.0126
+
+
+def test_a_law_that_does_not_hold_is_named_and_its_interval_is_wide():
+    *data, errors = planted(7e-9, 0.01, np.random.default_rng(7))
+    holds = estimate(*data, errors)
+    assert holds.law_holds.startswith("yes: the errors explain residuals of")
+    data[3] = data[3] + 0.15 * np.array([1, -1, 1, -1, 1])
+    broken = estimate(*data, errors)
+    assert broken.law_holds.startswith("no: the errors do not explain residuals of")
+    assert np.nan_to_num(broken.high, nan=1.0) - np.nan_to_num(broken.low) > 5 * (holds.high - holds.low)
+
+
 def test_unknown_errors_are_taken_from_the_scatter():
     generator = np.random.default_rng(2)
     *data, _ = planted(7e-9, 0.02, generator)
@@ -105,6 +143,7 @@ def test_a_store_and_a_table_give_the_planted_value(tmp_path):
     assert float(found["layer_thickness"]) == pytest.approx(7e-9, rel=0.05)
     assert found["layer_thickness"].attrs["units"] == "m"
     assert int(found["layer_thickness_degrees_of_freedom"]) == 4
+    assert str(found["law_holds"].item()).startswith("yes")
     again = FIT.compute(store(tmp_path, table("K", 0.0)))
     assert float(again["layer_thickness"]) == float(found["layer_thickness"])
 
@@ -112,15 +151,17 @@ def test_a_store_and_a_table_give_the_planted_value(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("speed, breakthrough_probability\n1, 0.5", "expected columns of temperature, .*got 'speed'"),
-        ("temperature [degC]\n40", "expected a column breakthrough_probability"),
+        ("speed, breakthrough_probability\n1, 0.5", r"measured.csv:1:1: unknown column 'speed' \(known: temperature"),
+        ("temperature [degC]\n40\n", "breakthrough_probability"),
+        ("temperature, breakthrough_probability\n40, 0.5", r"measured\.csv:1:1: .*temperature"),
+        ("temperature [degC], breakthrough_probability\n40, -0.5", r"measured\.csv:2:5: "),
         (
             "temperature [degC], breakthrough_probability\n40, much",
-            "column breakthrough_probability: expected a number",
+            r"measured\.csv:2:5: ",
         ),
         ("temperature [degC], breakthrough_probability\n41, 0.5\n50, 0.6", "the store has no temperature of 314.15"),
         ("breakthrough_probability\n0.5\n0.6", "expected a column temperature in the measured table"),
-        ("temperature", "expected a header and at least one row"),
+        ("", r"measured\.csv:1:1: "),
     ],
 )
 def test_bad_tables_are_named(tmp_path, text, message):

@@ -73,7 +73,7 @@ def test_oscillation_returns_every_period() -> None:
 
 def test_table_is_the_ramp(tmp_path: Path) -> None:
     file = tmp_path / "protocol.csv"
-    file.write_text("time,velocity,force\n0,0.05,0.1\n0.002,0.1,0.2\n")
+    file.write_text("force [N],time [ms],velocity [m/s]\n0.1,0,0.05\n0.2,2,0.1\n")
     table = compute(block(protocol={"shape": "table", "file": str(file)}))
     ramp = compute(block(protocol={"shape": "ramp", "duration": 2e-3, "velocity": 0.1, "force": 0.2}))
     for name in EVERY:

@@ -131,7 +131,7 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {"temperature", "stribeck", "sensitivity"},
     ),
     "rollers: surfaces": (
-        planted.ROLLERS.replace("load_share", "upper_profile, lower_profile, contact_length_trace")
+        planted.ROLLERS.replace("asperity_load_share", "upper_profile, lower_profile, contact_length_trace")
         + OPERATION
         + "  trace_points: 40\n",
         {},
@@ -319,7 +319,10 @@ def volume(data):
     return curves.Mean(ends[1], ends[0], ends[2])
 
 
-ROLLING = [output("friction_coefficient"), share, output("breakthrough_probability", 100.0), output("film_ratio")]
+ROLLING = [
+    *(output("friction_coefficient"), share, output("film_ratio")),
+    *(output(name, 100.0) for name in ("breakthrough_probability", "asperity_load_share")),
+]
 #: What a figure draws of every case: means and ends of intervals, by the name of the figure and its model.
 EXPECTED = {
     ("regions", "sliding_friction"): [friction(1.0)],

@@ -9,6 +9,7 @@ import xarray as xr
 from mdr_dask.errors import DataError
 from mdr_dask.plots import available
 from mdr_dask.plots.protocols import draw_protocols
+from mdr_dask.plots.style import left_out
 
 TIMES = np.array([0.0, 1.0, 2.0, 4.0])
 BASE = {
@@ -60,7 +61,8 @@ def test_one_column_a_series_with_friction_velocity_and_load() -> None:
 def test_an_axis_stands_at_its_first_value() -> None:
     axis = {"path": "protocol.velocity", "name": "v", "dim": "v", "values": [0.2, 0.3], "labels": None}
     ramp = {"shape": "ramp", "duration": 4e-3, "velocity": None}
-    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], "v")
+    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], xr.Variable("v", [0.2, 0.3]))
+    assert "1 of 2 values of v" in left_out(draw_protocols({"": data}))
     _, velocity, _ = curves(draw_protocols({"": data}), 0, 1)
     assert velocity[-1, 1] == pytest.approx(0.2)
 
@@ -73,3 +75,11 @@ def test_missing_outputs_are_named() -> None:
 
 def test_it_is_registered() -> None:
     assert "protocols" in available("velocity_jump")
+
+
+def test_laws_of_a_jump_are_not_drawn_for_other_histories() -> None:
+    steps = {"shape": "steps", "times": [0.0, 2e-3], "velocities": [0.1, 0.05], "forces": [0.2, 0.3]}
+    figures = available("velocity_jump")
+    for name in sorted(set(figures) - {"protocols"}):
+        with pytest.raises(DataError, match="expected a series with a jump of the velocity, got other histories"):
+            figures[name].figure({"": dataset(steps)})

@@ -7,11 +7,11 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
-from mdr_dask.models.parts.tables import parse_table
+from mdr_dask.tables import Column, read_table
 
 if TYPE_CHECKING:
     from mdr_dask.physics.transients.elements.loading_history import Piece
@@ -69,7 +69,17 @@ class TableFile(_Course):
     """Velocity and load from a table, linear between its rows; two rows of the same time are a jump."""
 
     shape: Literal["table"]
-    file: NamedFile = Field(description="columns time (s), velocity (m/s) and perhaps normal force (N)")
+    file: NamedFile = Field(description="table with columns time, velocity and perhaps force")
+
+    @model_validator(mode="after")
+    def _holds_a_history(self, info: ValidationInfo) -> TableFile:
+        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        if info.context is not None:
+            try:
+                _table_rows(self.file, 1.0)
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
 
 
 Protocol = Annotated[Jump | Steps | Ramp | Oscillation | TableFile, Field(discriminator="shape")]
@@ -121,10 +131,14 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
 
 @lru_cache(maxsize=16)
 def _table_rows(file: NamedFile, force: float) -> list[tuple[float, float, float]]:
-    values = parse_table(file.read_text(), file.name).values
-    if values.shape[1] < 2:
-        raise DataError(f"{file.name}: expected columns time, velocity and perhaps force, got one")
-    load = values[:, 2] if values.shape[1] > 2 else np.full(len(values), force)
-    if not np.all(np.isfinite(values)) or np.any(np.diff(values[:, 0]) < 0) or values[0, 0] != 0 or load.min() <= 0:
-        raise DataError(f"{file.name}: expected times that start at 0 and do not fall, and positive forces")
-    return [(float(t), float(v), float(f)) for t, v, f in zip(values[:, 0], values[:, 1], load, strict=True)]
+    columns = (
+        Column("time", "s", ("t",), least=0),
+        Column("velocity", "m/s", ("v", "speed")),
+        Column("force", "N", ("normal force", "load", "F"), needed=False, above=0),
+    )
+    table = read_table(file.read_text(), file.name, columns)
+    time, velocity = table["time"], table["velocity"]
+    load = table.get("force", np.full(time.size, force))
+    if time[0] != 0 or np.any(np.diff(time) < 0):
+        raise DataError(f"{file.name}: expected times that start at 0 and do not fall")
+    return [(float(t), float(v), float(f)) for t, v, f in zip(time, velocity, load, strict=True)]

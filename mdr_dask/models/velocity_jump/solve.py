@@ -17,7 +17,7 @@ from mdr_dask.models.parts.rough_line import Measured, Roughness
 from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
 from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
@@ -157,14 +157,15 @@ class _Marched(_Group):
         transient = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         course = Course(times, wavenumber, self.steps, self.block.accuracy or 0.0) if transient else None
+        with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
         aim = Aim(
             {LEVELS[name] for name in self.outputs},
-            self.block.accuracy or ACCURACY,
+            self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
             course,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
-        jumps = solve_jumps(Problem(Line(waves, None), loads, deborah), aim)
+        jumps = solve_jumps(Problem(RoughLine(waves), loads, deborah), aim)
         return self._of(jumps, loads, which), loads.size
 
     def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:

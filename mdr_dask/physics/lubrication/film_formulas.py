@@ -217,7 +217,7 @@ class FilmFormula:
         return f"film formula {self.name}: {', '.join(parts)}" if parts else ""
 
 
-# Ranges as remembered from the papers; no open copy was at hand to compare them with (docs/mixed-lubrication.md).
+# Ranges as remembered from the papers; no open copy was at hand (docs/evidence/mixed-lubrication.md).
 _PAN_HAMROCK_RANGE = ((2.045e-5, 5.0e-4), (1.0e-12, 5.0e-10), (2504.0, 10014.0))
 _DOWSON_HIGGINSON_RANGE = ((3.0e-5, 3.0e-4), (1.0e-13, 1.0e-11), (2500.0, 5000.0))
 

@@ -21,7 +21,7 @@ SPECIFIC_GRAVITY_TEMPERATURE = 288.705555
 _LUBRICANT_EXPANSION = 0.6278
 
 #: Gold's correlation ``alpha = s nu^t 1e-9`` with nu in mm^2/s: (s, t) of each kind of oil (Gold et al. 2001,
-#: from memory; see docs/mixed-lubrication.md).
+#: from memory; see docs/evidence/mixed-lubrication.md).
 GOLD: dict[str, tuple[float, float]] = {
     "gold_mineral": (9.904, 0.1390),
     "gold_polyalphaolefin": (7.382, 0.1335),

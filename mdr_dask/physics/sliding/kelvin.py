@@ -340,11 +340,16 @@ def sweep(
 
 @njit(nogil=True, cache=True)
 def patches_at(
-    cells: Cells, every: Blocks, deborah: float, depth: float, sums: FloatArray
+    cells: Cells,
+    every: Blocks,
+    barriers: FloatArray,
+    block_barriers: FloatArray,
+    deborah: float,
+    depth: float,
+    sums: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Return where each patch of the stationary state at a depth begins and ends, and write its sums; see `sweep`."""
     n = cells.mean.size - 1
-    barriers, block_barriers = np.empty(n), np.full(n // BLOCK + 1, np.nan)
     touches, leaves = np.empty(n // 8 + 2), np.empty(n // 8 + 2)
     count = sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
     if count > touches.size:

@@ -249,8 +249,22 @@ def steady_sliding(
         With ``mu = drag / (load L)``, height and length L in the same unit; `Outcome.OUTSIDE_LINE` where an end of a
         line that is not periodic is in contact.
     """
+    cells = cut(line)
+    return steady_on_cells(cells, blocks_of(cells), deborah, loads, guesses, close)
+
+
+def steady_on_cells(
+    cells: Cells,
+    blocks: Blocks,
+    deborah: FloatArray,
+    loads: FloatArray,
+    guesses: FloatArray | None = None,
+    close: float = 0.0,
+) -> Steady:
+    """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already."""
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    return _solved(line, deborah, loads, lambda good, de, load: _swept(line, de, load, start[good], close))
+    cases = deborah, loads
+    return _solved(cells, *cases, lambda good, de, load: _swept(cells, blocks, de, load, start[good], close))
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
@@ -267,13 +281,13 @@ def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, con
 
 
 def _solved(
-    line: CubicLine,
+    line: CubicLine | Cells,
     deborah: FloatArray,
     loads: FloatArray,
     solve: Callable[..., tuple[FloatArray, NDArray[np.int8]]],
 ) -> Steady:
     """Solve the cases that are numbers, measured in cells."""
-    n = line.enter.size
+    n = line.enter.size if isinstance(line, CubicLine) else line.mean.size - 1
     with np.errstate(over="ignore"):
         good = valid(deborah * n, loads * n)
     good &= bool(np.all(np.isfinite(line.height)) and np.all(np.isfinite(line.enter)))
@@ -286,15 +300,14 @@ def _solved(
 
 
 def _swept(
-    line: CubicLine, deborah: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
+    cells: Cells, blocks: Blocks, deborah: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
-    cells = cut(line)
     order = np.lexsort((loads, deborah))
     ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
     _states(
         cells,
-        blocks_of(cells),
+        blocks,
         deborah[order],
         loads[order],
         guesses[order] + cells.top,

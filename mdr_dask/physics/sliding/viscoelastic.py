@@ -10,6 +10,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.viscoelastic_newton import solve_sliding, static_depth
+from mdr_dask.physics.sliding.viscoelastic_sweep import Travelling
 from mdr_dask.physics.solids import LinearSolid, recovery
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
@@ -25,9 +26,9 @@ class Settings(NamedTuple):
     cells_of_a_peak: int = 16  # cells in contact for every peak of the line whose errors are independent
     safety: float = 2.4
     # of the last change of drag, depth, contact fraction and slope, which their errors are never below
-    by_chance: tuple[float, ...] = (0.04, 0.04, 0.15, 0.15)
+    by_chance: tuple[float, ...] = (0.03, 0.03, 0.15, 0.15)
     of_before: float = 0.15  # of the change before, which the last one is never taken for less than
-    of_others: tuple[float, ...] = (0.04, 0.0, 0.04, 0.04)  # of the largest relative change of the four
+    of_others: tuple[float, ...] = (0.02, 0.0, 0.04, 0.04)  # of the largest relative change of the four
     of_a_cell: tuple[float, ...] = (0.0, 0.0, 0.2, 0.1)  # over cells in contact: edges move within their cells
     near_a_node: int = 16  # cells in contact below which the height of the highest peak between nodes counts in full
 
@@ -113,25 +114,22 @@ class _Load:
 
     cell: float
     strain_area: float
-    moduli: FloatArray
-    reach: FloatArray
-    times: FloatArray
-    stretch_of: FloatArray
-    amplitude_of: FloatArray
+    solid: Travelling
 
     @classmethod
     def of(cls, solid: LinearSolid, load: float, cell: float) -> _Load:
         """Measure a solid in cells and static moduli; arms much shorter than a cell and the dashpot are one arm."""
         static = solid.static_modulus
         fast = solid.times < SETTINGS.shortest * cell
-        moduli, reach = solid.moduli[~fast] / static, solid.times[~fast] / cell
+        moduli, deborah = solid.moduli[~fast] / static, solid.times[~fast] / cell
         viscosity = (solid.viscosity + solid.moduli[fast] @ solid.times[fast]) / static
         if viscosity > 0:
             shortest = SETTINGS.shortest / 10
             moduli = np.append(viscosity / cell / shortest, moduli)
-            reach = np.append(shortest, reach)
-        modes = recovery(moduli, reach)
-        return cls(cell, load / cell, moduli, reach, modes.times, modes.stretch.T.copy(), modes.amplitude.T.copy())
+            deborah = np.append(shortest, deborah)
+        modes = recovery(moduli, deborah)
+        columns = modes.stretch.T.copy(), modes.amplitude.T.copy()
+        return cls(cell, load / cell, Travelling(moduli, deborah, modes.times, *columns))
 
 
 @dataclass(frozen=True)
@@ -150,11 +148,11 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
     if start is None or not np.all(np.isfinite(start)):
         inner = profile[:-1] if periodic else profile
         depth = static_depth(inner, strain_area)
-        start = np.append(np.full(load.moduli.size, depth - strain_area / inner.size), depth)
+        start = np.append(np.full(load.solid.moduli.size, depth - strain_area / inner.size), depth)
     unknown, totals = start.copy(), np.empty(6)
-    arms = load.moduli, load.reach / step, load.times / step, load.stretch_of, load.amplitude_of
+    solid = load.solid._replace(deborah=load.solid.deborah / step, times=load.solid.times / step)
     converged, sweeps, inside = solve_sliding(
-        profile, strain_area, periodic, *arms, SETTINGS.tolerance, unknown, totals
+        profile, strain_area, periodic, solid, SETTINGS.tolerance, unknown, totals
     )
     imbalance = abs(float(totals[1]) / strain_area - 1)
     good = converged and imbalance < SETTINGS.balance

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, multiply, sweep
+from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Travelling, multiply, sweep
 
 DEEPEST_STEP = 0.7
 """Largest step back of the depth on a line that elements enter undeformed, relative to it."""
@@ -22,24 +22,22 @@ class Swept(NamedTuple):
 
     Parameters
     ----------
-    lost : array, shape (pieces, arms)
+    decayed : array, shape (pieces, arms)
         1 - exp(-length / time) of every mode in flight and of every arm in contact.
-    lengths, moduli, reach, times, stretch_of, amplitude_of
+    lengths : array, shape (pieces,)
         See `sweep`.
+    solid : Travelling
+        The solid.
     """
 
-    lost: FloatArray
+    decayed: FloatArray
     lengths: FloatArray
-    moduli: FloatArray
-    reach: FloatArray
-    times: FloatArray
-    stretch_of: FloatArray
-    amplitude_of: FloatArray
+    solid: Travelling
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def follow(
-    direction: FloatArray, swept: Swept, periodic: bool, turned: FloatArray, scratch: FloatArray
+    direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
     """Differentiate a sweep along one direction: how the integrals of e_m and of u over the line change.
 
@@ -54,35 +52,36 @@ def follow(
         The pieces.
     periodic : bool
         Whether the line closes; otherwise the recovery beyond the line counts.
-    turned : array, shape (arms + 1,), output
+    product : array, shape (arms + 1,), output
         Change of the integral of e_m, and of that of u.
-    scratch : array, shape (3, arms)
+    workspace : array, shape (3, arms)
     """
-    lost, lengths, moduli, reach, times, stretch_of, amplitude_of = swept
-    arms, pieces = moduli.size, lost.shape[0]
+    decayed, lengths, solid = swept
+    moduli, deborah, times, stretch_of, amplitude_of = solid
+    arms, pieces = moduli.size, decayed.shape[0]
     depth, glass = direction[arms], 1.0 + moduli.sum()
-    stretch, modes, integral = scratch[0], scratch[1], scratch[2]
-    turned[:] = 0.0
+    stretch, modes, integral = workspace[0], workspace[1], workspace[2]
+    product[:] = 0.0
     stretch[:] = direction[:arms]
     for piece in range(pieces):
         if piece % 2 == 1:
-            turned[arms] += depth * lengths[piece]
+            product[arms] += depth * lengths[piece]
             for m in range(arms):
-                turned[m] += reach[m] * lost[piece, m] * stretch[m]
-                stretch[m] *= 1 - lost[piece, m]
+                product[m] += deborah[m] * decayed[piece, m] * stretch[m]
+                stretch[m] *= 1 - decayed[piece, m]
         elif lengths[piece] > 0:
             _take_stress(stretch, depth, moduli, glass)
             multiply(amplitude_of, stretch, modes)
             strain = 0.0
             for k in range(arms):
-                integral[k] = modes[k] * times[k] * lost[piece, k]
-                turned[arms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
-                modes[k] *= 1 - lost[piece, k]
+                integral[k] = modes[k] * times[k] * decayed[piece, k]
+                product[arms] += integral[k] if periodic or piece < pieces - 1 else modes[k] * times[k]
+                modes[k] *= 1 - decayed[piece, k]
                 strain += modes[k]
             multiply(stretch_of, modes, stretch)
             multiply(stretch_of, integral, modes)
             for m in range(arms):
-                turned[m] += modes[m]
+                product[m] += modes[m]
                 stretch[m] += depth - strain
 
 
@@ -102,14 +101,30 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _losses(lengths: FloatArray, reach: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
+def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
     """Return what modes lose in every flight and arms in every contact, shape (pieces, arms)."""
-    lost = np.empty((lengths.size, reach.size))
+    decayed = np.empty((lengths.size, deborah.size))
     for piece in range(lengths.size):
-        scales = reach if piece % 2 == 1 else times
-        for m in range(reach.size):
-            lost[piece, m] = -np.expm1(-lengths[piece] / scales[m])
-    return lost
+        scales = deborah if piece % 2 == 1 else times
+        for m in range(deborah.size):
+            decayed[piece, m] = -np.expm1(-lengths[piece] / scales[m])
+    return decayed
+
+
+class Krylov(NamedTuple):
+    """Workspace of a Newton step: directions, the triangle they lead to, its rotations, and that of `follow`.
+
+    Parameters
+    ----------
+    basis, triangle : array, shape (n + 1, n)
+    rotations : array, shape (3, n + 1)
+    workspace : array, shape (3, n - 1)
+    """
+
+    basis: FloatArray
+    triangle: FloatArray
+    rotations: FloatArray
+    workspace: FloatArray
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -117,10 +132,7 @@ def newton_step(
     residual: FloatArray,
     scale: FloatArray,
     swept: Swept,
-    basis: FloatArray,
-    triangle: FloatArray,
-    rotations: FloatArray,
-    scratch: FloatArray,
+    krylov: Krylov,
     step: FloatArray,
 ) -> None:  # pragma: no cover
     """Solve the linear system of a step by minimal residuals over a Krylov space (GMRES with Givens rotations).
@@ -134,10 +146,11 @@ def newton_step(
         What the integrals of e_m and u are to change by, n = arms + 1, and the size of the change for a unit of each.
     swept : Swept
         The pieces.
-    basis, triangle, rotations, scratch : arrays, shape (n + 1, n), (n + 1, n), (3, n + 1) and (3, arms)
-        Room to work in.
+    krylov : Krylov
+        The workspace.
     step : array, shape (n,), output
     """
+    basis, triangle, rotations, workspace = krylov
     size = residual.size
     right = rotations[2]
     step[:] = 0.0
@@ -150,7 +163,7 @@ def newton_step(
     used = 0
     for j in range(size):
         column = basis[j + 1]
-        follow(basis[j], swept, True, column, scratch)
+        follow(basis[j], swept, True, column, workspace)
         column /= scale
         used = j + 1
         _orthogonalise(basis, triangle, j)
@@ -223,11 +236,7 @@ def solve_sliding(
     profile: FloatArray,
     strain_area: float,
     periodic: bool,
-    moduli: FloatArray,
-    reach: FloatArray,
-    times: FloatArray,
-    stretch_of: FloatArray,
-    amplitude_of: FloatArray,
+    solid: Travelling,
     tolerance: float,
     unknown: FloatArray,
     totals: FloatArray,
@@ -246,8 +255,8 @@ def solve_sliding(
         F_N / (4 G_inf cell), the integral of u wanted, in cells times height.
     periodic : bool
         Whether the line closes; otherwise elements enter undeformed and recover beyond its end.
-    moduli, reach, times, stretch_of, amplitude_of
-        The solid, see `sweep`.
+    solid : Travelling
+        The solid.
     tolerance : float
         Largest last step, relative to the depth.
     unknown : array, shape (arms + 1,), input and output
@@ -260,13 +269,15 @@ def solve_sliding(
     converged, sweeps, inside : bool, int, bool
         `inside` is False if an element is in contact at the end of a line that is not periodic.
     """
+    moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     arms, nodes = moduli.size, profile.size
     size = arms + 1
     lengths, penetration = np.empty(2 * nodes + 4), np.empty(nodes)
-    imbalance, work, scratch = np.empty(arms), np.empty((10, max(arms, 1))), np.empty((3, arms))
-    residual, scale, step, turned = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
-    basis, triangle, rotations = np.empty((size + 1, size)), np.empty((size + 1, size)), np.empty((3, size + 1))
-    scale[:arms] = -reach * np.expm1(-(nodes - 1) / reach)
+    imbalance, room, workspace = np.empty(arms), np.empty((10, max(arms, 1))), np.empty((3, arms))
+    residual, scale, step, product = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
+    triangle, rotations = np.empty((size + 1, size)), np.empty((3, size + 1))
+    krylov = Krylov(np.empty((size + 1, size)), triangle, rotations, workspace)
+    scale[:arms] = -deborah * np.expm1(-(nodes - 1) / deborah)
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
@@ -274,31 +285,19 @@ def solve_sliding(
     for sweeps in range(1, 81):
         for i in range(nodes):
             penetration[i] = unknown[arms] + profile[i]
-        pieces, end = sweep(
-            penetration,
-            unknown[:arms],
-            moduli,
-            reach,
-            times,
-            stretch_of,
-            amplitude_of,
-            not periodic,
-            lengths,
-            imbalance,
-            totals,
-            work,
-        )
+        start = unknown[:arms]
+        pieces, end = sweep(penetration, start, solid, not periodic, lengths, imbalance, totals, room)
         found = lengths[:pieces]
-        swept = Swept(_losses(found, reach, times), found, moduli, reach, times, stretch_of, amplitude_of)
+        swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
             residual[:arms], residual[arms] = -imbalance, strain_area - totals[0]
             scale[arms] = totals[3]
-            newton_step(residual, scale, swept, basis, triangle, rotations, scratch, step)
+            newton_step(residual, scale, swept, krylov, step)
         else:
             residual[:] = 1.0  # a unit of depth while the memory stays: elements enter at rest
-            follow(residual, swept, False, turned, scratch)
+            follow(residual, swept, False, product, workspace)
             # a contact that reaches the end of the line is larger than the sweep sees
-            step[arms] = max((strain_area - totals[1]) / turned[arms], -DEEPEST_STEP * unknown[arms])
+            step[arms] = max((strain_area - totals[1]) / product[arms], -DEEPEST_STEP * unknown[arms])
         largest = 0.0
         for j in range(size):
             weight = min(1.0, moduli[j]) if j < arms else 1.0  # a soft arm cannot matter

@@ -1,11 +1,13 @@
 """Compiled sweep of a linear viscoelastic foundation along a profile of straight cells, exact inside every cell.
 
 Lengths are in cells, stresses in units of the static modulus. `penetration` w is how deep the profile would press each
-node; arm m stretches by e = u - a, with de/ds = du/ds - e / reach, reach = tau v / cell. Contact moves the
+node; arm m stretches by e = u - a, with de/ds = du/ds - e / deborah, deborah = tau v / cell. Contact moves the
 stretches by closed forms; free flight is the sum of recovery modes. Contact begins and ends inside cells.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,6 +15,28 @@ from numba import njit
 from mdr_dask.arrays import FloatArray
 
 CLOSED, OPEN_END = 0, 1
+
+
+class Travelling(NamedTuple):
+    """A solid as a line passes, in static moduli and cells, and how it recovers.
+
+    Parameters
+    ----------
+    moduli, deborah : array, shape (arms,)
+        Arms, ascending in Deborah number tau v / cell.
+    times : array, shape (arms,)
+        Of the recovery modes, in cells.
+    stretch_of, amplitude_of : array, shape (arms, arms)
+        Stretches of every mode (a row each), and what the stretch of every arm (a row each) adds to the modes.
+    """
+
+    moduli: FloatArray
+    deborah: FloatArray
+    times: FloatArray
+    stretch_of: FloatArray
+    amplitude_of: FloatArray
+
+
 SURFACE_LAYER = 1e-7
 """Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
 
@@ -29,44 +53,44 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def step_factors(
-    length: float, reach: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
+    length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
     """Fill the factors of a straight piece: e -> decay e + gain slope; its integral is gain e + area slope."""
-    for m in range(reach.size):
-        x = length / reach[m]
+    for m in range(deborah.size):
+        x = length / deborah[m]
         if x < 0.02:
             loss = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6)))))
             decay[m] = 1 - loss
-            gain[m] = reach[m] * loss
+            gain[m] = deborah[m] * loss
             area[m] = length * length * (0.5 - x / 6 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7)))))
         else:
             decay[m] = np.exp(-x)
-            gain[m] = reach[m] * (1 - decay[m])
-            area[m] = reach[m] * (length - gain[m])
+            gain[m] = deborah[m] * (1 - decay[m])
+            area[m] = deborah[m] * (length - gain[m])
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _pressure_inside(
-    length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+    length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
     """Return the stress and its derivative a `length` into a straight piece."""
     pressure, rate = start + slope * length, slope
     for m in range(moduli.size):
-        lost = -np.expm1(-length / reach[m])
-        pressure += moduli[m] * ((1 - lost) * stretch[m] + slope * reach[m] * lost)
-        rate += moduli[m] * (1 - lost) * (slope - stretch[m] / reach[m])
+        decayed = -np.expm1(-length / deborah[m])
+        pressure += moduli[m] * ((1 - decayed) * stretch[m] + slope * deborah[m] * decayed)
+        rate += moduli[m] * (1 - decayed) * (slope - stretch[m] / deborah[m])
     return pressure, rate
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def leaving_point(
-    end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, reach: FloatArray
+    end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
     """Return where the stress falls to zero in (0, end], by Newton kept inside a bracket."""
     low, high = 0.0, end
-    point = SURFACE_LAYER if reach.size and reach[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
+    point = SURFACE_LAYER if deborah.size and deborah[0] < SURFACE_LAYER and end > SURFACE_LAYER else 0.5 * end
     for _ in range(200):
-        pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, reach)
+        pressure, rate = _pressure_inside(point, start, slope, stretch, moduli, deborah)
         if pressure > 0:
             low = point
         else:
@@ -147,16 +171,12 @@ def _fly(
 def sweep(
     penetration: FloatArray,
     start: FloatArray,
-    moduli: FloatArray,
-    reach: FloatArray,
-    times: FloatArray,
-    stretch_of: FloatArray,
-    amplitude_of: FloatArray,
+    solid: Travelling,
     undeformed: bool,
     lengths: FloatArray,
     imbalance: FloatArray,
     totals: FloatArray,
-    work: FloatArray,
+    workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
     """Carry the arms once along the line and note what each contact and each flight contributes.
 
@@ -166,12 +186,8 @@ def sweep(
         w at each node; the last node of a periodic line repeats the first.
     start : array, shape (arms,)
         e_m at the first node under the penetration there; ignored if `undeformed`.
-    moduli, reach : array, shape (arms,)
-        Arms, ascending in reach.
-    times : array, shape (arms,)
-        Of the recovery modes, in cells.
-    stretch_of, amplitude_of : array, shape (arms, arms)
-        Stretches of every mode (a row each), and what the stretch of every arm (a row each) adds to the modes.
+    solid : Travelling
+        The solid.
     undeformed : bool
         Whether the elements enter free and at rest.
     lengths : array, shape (>= 2 nodes + 2,), output
@@ -181,16 +197,18 @@ def sweep(
     totals : array, shape (6,), output
         Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
         beyond the line.
-    work : array, shape (10, max(arms, 1)), scratch
+    workspace : array, shape (10, max(arms, 1))
 
     Returns
     -------
     pieces, end : int
         Number of lengths; CLOSED if the last node is free, OPEN_END if it is in contact.
     """
+    # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
+    moduli, deborah, times, stretch_of, amplitude_of = solid
     arms, last = moduli.size, penetration.size - 1
-    e, modes = work[0], work[1]
-    step_factors(1.0, reach, work[3], work[4], work[5])
+    e, modes = workspace[0], workspace[1]
+    step_factors(1.0, deborah, workspace[3], workspace[4], workspace[5])
     imbalance[:] = 0.0
     totals[:] = 0.0
     glass, push = 1.0, penetration[0]
@@ -209,19 +227,19 @@ def sweep(
         lengths[pieces] = goal - place
         pieces += 1
         if flying:
-            _add_flight(goal - place, modes, times, stretch_of, reach, e, imbalance, totals)
+            _add_flight(goal - place, modes, times, stretch_of, deborah, e, imbalance, totals)
         if landing < 0:
             for k in range(arms):
                 totals[5] += modes[k] * times[k]
             return pieces, CLOSED
         if int(goal) >= last:
             return pieces, OPEN_END
-        place, strain, pressure, left = _contact(goal, penetration, moduli, reach, imbalance, totals, work)
+        place, strain, pressure, left = _contact(goal, penetration, moduli, deborah, imbalance, totals, workspace)
         lengths[pieces] = place - goal
         pieces += 1
         if not left:
             return pieces, OPEN_END
-        node = int(work[2, 0])
+        node = int(workspace[2, 0])
         _into_flight(strain, pressure / glass, e, moduli, modes, amplitude_of)
         flying = True
 
@@ -231,10 +249,10 @@ def _contact(
     begin: float,
     penetration: FloatArray,
     moduli: FloatArray,
-    reach: FloatArray,
+    deborah: FloatArray,
     imbalance: FloatArray,
     totals: FloatArray,
-    work: FloatArray,
+    workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
     """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep` for the arrays.
 
@@ -242,10 +260,10 @@ def _contact(
     -------
     place, strain, pressure, left
         Where it ends, with what strain and rest of stress, and whether it left the profile there; the stretches stay in
-        ``work[0]``, and ``work[2, 0]`` is the next node that a flight may meet.
+        ``workspace[0]``, and ``workspace[2, 0]`` is the next node that a flight may meet.
     """
     arms, last = moduli.size, penetration.size - 1
-    e, following = work[0], work[9]
+    e, following = workspace[0], workspace[9]
     place, node = begin, int(begin) + 1
     rise = penetration[node] - penetration[node - 1]
     first = strain = penetration[node] - rise * (node - place)
@@ -253,16 +271,16 @@ def _contact(
     while node <= last and not left:
         slope = penetration[node] - penetration[node - 1]
         length = node - place
-        factors = work[3:6]
+        factors = workspace[3:6]
         if length != 1.0:
-            factors = work[6:9]
-            step_factors(length, reach, factors[0], factors[1], factors[2])
+            factors = workspace[6:9]
+            step_factors(length, deborah, factors[0], factors[1], factors[2])
         pressure = _stretch(penetration[node], slope, e, following, moduli, factors)
         if pressure < 0:
             left = True
-            length = leaving_point(length, strain, slope, e, moduli, reach)
-            factors = work[6:9]
-            step_factors(length, reach, factors[0], factors[1], factors[2])
+            length = leaving_point(length, strain, slope, e, moduli, deborah)
+            factors = workspace[6:9]
+            step_factors(length, deborah, factors[0], factors[1], factors[2])
             pressure = _stretch(strain + slope * length, slope, e, following, moduli, factors)
         viscous = 0.0
         for m in range(arms):
@@ -280,7 +298,7 @@ def _contact(
         node += 1
     totals[2] += 0.5 * (strain - first) * (strain + first)
     totals[3] += place - begin
-    work[2, 0] = node
+    workspace[2, 0] = node
     return place, strain, pressure, left
 
 
@@ -318,7 +336,7 @@ def _add_flight(
     modes: FloatArray,
     times: FloatArray,
     stretch_of: FloatArray,
-    reach: FloatArray,
+    deborah: FloatArray,
     e: FloatArray,
     imbalance: FloatArray,
     totals: FloatArray,
@@ -327,10 +345,10 @@ def _add_flight(
     for m in range(e.size):
         e[m] = 0.0
     for k in range(times.size):
-        lost = -np.expm1(-length / times[k])
-        integral = modes[k] * times[k] * lost
+        decayed = -np.expm1(-length / times[k])
+        integral = modes[k] * times[k] * decayed
         totals[0] += integral
-        modes[k] *= 1 - lost
+        modes[k] *= 1 - decayed
         after = modes[k]
         for m in range(e.size):
             imbalance[m] += stretch_of[k, m] * integral

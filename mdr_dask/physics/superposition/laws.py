@@ -4,17 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import t as student
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.physics.solids import GAS_CONSTANT
 
 CONFIDENCE = 0.95
-BISECTIONS = 24
+ITERATIONS, CONVERGED = 40, 1e-12
+"""Gauss-Newton steps at most, and the change of the sum of squares, relative to itself, at which they end."""
+
+RIDGE = 1e-12
+"""Added to the precision of the constants, relative to it, so that a step is finite where they cannot be told apart."""
+
+STRAIGHTEST = 1e-5
+"""Span of the temperatures over c2, below which factors are as good as linear in temperature."""
+
+Law = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+"""From constants to factors and their derivatives, shape (groups, constants)."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +72,8 @@ def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, r
     if np.any(groups <= 0) or reference <= 0:
         raise FitError("a power law needs positive groups, such as velocities")
     distance = np.log10(groups / reference)
-    return _fit("power", ("exponent",), lambda c: c[0] * distance, [_slope(distance, factors)], factors, covariance)
+    fitted = _fit("power", _proportional(distance), np.array([_slope(distance, factors)]), factors, covariance)
+    return ShiftLaw("power", {"exponent": fitted.interval(0)}, fitted.residual, fitted.scatter)
 
 
 def fit_arrhenius(
@@ -70,8 +83,9 @@ def fit_arrhenius(
     if np.any(temperature <= 0) or reference <= 0:
         raise FitError("the law of Arrhenius needs absolute temperatures")
     distance = (1 / temperature - 1 / reference) / (GAS_CONSTANT * np.log(10))
-    guess = [_slope(distance, log_factors)]
-    return _fit("arrhenius", ("activation_energy",), lambda c: c[0] * distance, guess, log_factors, covariance)
+    guess = np.array([_slope(distance, log_factors)])
+    fitted = _fit("arrhenius", _proportional(distance), guess, log_factors, covariance)
+    return ShiftLaw("arrhenius", {"activation_energy": fitted.interval(0)}, fitted.residual, fitted.scatter)
 
 
 def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, reference: float) -> ShiftLaw:
@@ -80,17 +94,27 @@ def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatA
     """
     distance = temperature - reference
     lowest = float(max(0.0, -distance.min()))
+    bounds = STRAIGHTEST / float(np.ptp(distance)), (1 - 1e-9) / lowest if lowest > 0 else np.inf
 
-    def law(constants: FloatArray) -> FloatArray:
-        c2 = lowest + np.exp(constants[1])
-        return np.asarray(-constants[0] * distance / (c2 + distance), dtype=np.float64)
+    def law(constants: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """With the slope c1 / c2 and the bend 1 / c2, which both stay finite where the factors are linear."""
+        slope, bend = constants[0], float(np.clip(constants[1], *bounds))
+        share = distance / (1 + bend * distance)
+        return -slope * share, np.column_stack([-share, slope * share**2])
 
-    span = float(np.ptp(distance))
-    slope = -_slope(distance, log_factors)
-    guess = [slope * (lowest + span), np.log(span)]
-    fitted = _fit("wlf", ("c1", "log_excess"), law, guess, log_factors, covariance)
-    low_high = tuple(lowest + float(np.exp(value)) for value in fitted.constants["log_excess"])
-    constants = {"c1": fitted.constants["c1"], "c2": (low_high[0], low_high[1], low_high[2])}
+    guess = np.array([-_slope(distance, log_factors), 1 / (lowest + float(np.ptp(distance)))])
+    fitted = _fit("wlf", law, guess, log_factors, covariance)
+    slope, bend = float(fitted.constants[0]), float(np.clip(fitted.constants[1], *bounds))
+    c1, c2 = slope / bend, 1 / bend
+    if bend == bounds[0]:  # as good as linear: neither constant has an end above
+        least = 1 / min(bend + fitted.quantile * float(np.sqrt(fitted.covariance[1, 1])), bounds[1])
+        first, last = sorted([slope * least, float(np.copysign(np.inf, slope))])
+        constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
+        return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
+    change = np.array([[1 / bend, -slope / bend**2], [0.0, -1 / (bend**2 * (c2 - lowest))]])
+    half = fitted.quantile * np.sqrt(np.diag(change @ fitted.covariance @ change.T))
+    ends = lowest + (c2 - lowest) * np.exp(np.clip([-half[1], half[1]], -700, 700))
+    constants = {"c1": (c1, c1 - float(half[0]), c1 + float(half[0])), "c2": (c2, float(ends[0]), float(ends[1]))}
     return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
 
 
@@ -98,52 +122,80 @@ def _slope(distance: FloatArray, factors: FloatArray) -> float:
     return float(distance @ factors / (distance @ distance))
 
 
-def _fit(
-    name: str,
-    names: tuple[str, ...],
-    law: Callable[[FloatArray], FloatArray],
-    guess: list[float],
-    factors: FloatArray,
-    covariance: FloatArray,
-) -> ShiftLaw:
+def _proportional(distance: FloatArray) -> Law:
+    return lambda constants: (constants[0] * distance, distance[:, None])
+
+
+class _Fitted(NamedTuple):
+    constants: FloatArray
+    covariance: FloatArray
+    quantile: float
+    residual: float
+    scatter: float
+
+    def interval(self, place: int) -> tuple[float, float, float]:
+        """Return a constant and the ends of its interval."""
+        value, half = float(self.constants[place]), self.quantile * float(np.sqrt(self.covariance[place, place]))
+        return value, value - half, value + half
+
+
+def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance: FloatArray) -> _Fitted:
     """Fit by generalised least squares; a law that misses by more than the errors gets a scatter of its own."""
     known = np.diag(covariance) > 0
-    freedom = int(known.sum()) - len(names)
+    freedom = int(known.sum()) - guess.size
     if freedom < 1:
         raise FitError(
-            f"the law {name} needs more than {len(names)} shift factors beside the reference, got {known.sum()}"
+            f"the law {name} needs more than {guess.size} shift factors beside the reference, got {known.sum()}"
         )
     values, vectors = np.linalg.eigh(covariance[np.ix_(known, known)])
-    scale = np.maximum(np.abs(np.array(guess)), 1e-12)
+    values, target = np.maximum(values, 1e-12 * values.max()), vectors.T @ factors[known]
+    best = guess
 
-    def solve(scatter: float) -> tuple[FloatArray, FloatArray, float]:
-        whiten = vectors.T / np.sqrt(np.maximum(values, 1e-12 * values.max()) + scatter**2)[:, None]
+    def excess(scatter: float) -> float:
+        """Say by how much chi-squared exceeds its freedom; begin at the last solution."""
+        nonlocal best
+        best, squares, _ = _solved(law, best, known, vectors, values + scatter**2, target)
+        return squares / freedom - 1
 
-        def misfit(relative: FloatArray) -> FloatArray:
-            return np.asarray(whiten @ (law(relative * scale) - factors)[known], dtype=np.float64)
-
-        found = least_squares(misfit, np.array(guess) / scale, x_scale="jac", method="lm")
-        jacobian = np.asarray(found.jac, dtype=np.float64)
-        spread = np.linalg.pinv(jacobian.T @ jacobian)
-        return found.x * scale, np.sqrt(np.diag(spread)) * scale, float(2 * found.cost / freedom)
-
-    scatter = _scatter(lambda width: solve(width)[2], float(np.std(factors)))
-    best, error, _ = solve(scatter)
-    half = student.ppf(0.5 + CONFIDENCE / 2, freedom) * error
-    constants = {
-        key: (float(value), float(value - width), float(value + width))
-        for key, value, width in zip(names, best, half, strict=True)
-    }
-    residual = float(np.sqrt(np.mean((law(best) - factors) ** 2)))
-    return ShiftLaw(name, constants, residual, scatter)
+    scatter, largest = 0.0, float(np.std(factors))
+    ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
+    if excess(0.0) > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
+        scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-3)))
+    best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
+    residual = float(np.sqrt(np.mean((law(best)[0] - factors) ** 2)))
+    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
+    return _Fitted(best, np.asarray(np.linalg.pinv(precision), dtype=np.float64), quantile, residual, scatter)
 
 
-def _scatter(chi2: Callable[[float], float], largest: float) -> float:
-    """Return the scatter about the law at which the reduced chi-squared is one, or zero if it is less without."""
-    if chi2(0.0) <= 1:
-        return 0.0
-    low, high = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        low, high = (middle, high) if chi2(float(np.exp(middle))) > 1 else (low, middle)
-    return float(np.exp(high))
+def _solved(
+    law: Law,
+    constants: FloatArray,
+    known: NDArray[np.bool_],
+    vectors: FloatArray,
+    variances: FloatArray,
+    target: FloatArray,
+) -> tuple[FloatArray, float, FloatArray]:
+    """Return constants by damped Gauss-Newton steps, the sum of squares, and the precision of the constants."""
+
+    def at(place: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        value, slopes = law(place)
+        miss, rows = vectors.T @ value[known] - target, vectors.T @ slopes[known]
+        return rows, miss, float(np.sum(miss**2 / variances))
+
+    rows, miss, squares = at(constants)
+    for _ in range(ITERATIONS):
+        weighed = rows / variances[:, None]
+        precision = rows.T @ weighed
+        scale = np.sqrt(np.diag(precision)) + 1e-300
+        relative = precision / np.outer(scale, scale) + RIDGE * np.eye(scale.size)
+        step = -np.linalg.solve(relative, weighed.T @ miss / scale) / scale
+        share, before = 1.0, squares
+        while share > 1e-4:
+            proposal = at(constants + share * step)
+            if proposal[2] <= squares:
+                constants, (rows, miss, squares) = constants + share * step, proposal
+                break
+            share /= 4
+        if before - squares <= CONVERGED * before:
+            break
+    return constants, squares, rows.T @ weighed

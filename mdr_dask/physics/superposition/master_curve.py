@@ -12,23 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.superposition.least_squares import Settled, System
-from mdr_dask.physics.superposition.posterior import sample
+from mdr_dask.physics.superposition.factors import Found, find_both, find_horizontal
+from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows, slopes
 from mdr_dask.physics.superposition.problem import Problem
 
-FIRST_WEIGHT = 1e-3
-"""Smoothing of the curve whose slope linearises the problem."""
-
 CURVE_POINTS = 201
-ITERATIONS = 40
 DRAW_ITERATIONS = 3
 """A bootstrap sample starts from the solution, where Gauss-Newton steps converge at once."""
 
-WEIGHED = (0, 1, 2, 4, 8)
-"""Iterations that choose the smoothing anew."""
 
-CONVERGED = 1e-5
-"""Last step of the shifts, in decades."""
+HARDLY_TOLD = 0.5
+"""Part of the scatter of all steps that curves take away from a step that they tell, at least."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +56,10 @@ class Superposition:
         superposition.
     draws : array, shape (draws, 2 groups)
         Bootstrap samples of the factors; none unless asked for.
-    sampled : float
-        Number of points of even weight on which vertical fits rest: below some 200 their bars are rough. 0 where
-        nothing was sampled.
+    undetermined : tuple of (float, float)
+        First and last group of each run of neighbours whose steps the curves hardly tell, as on a plateau.
+    usual : tuple of float
+        Mean and scatter of the steps between neighbours, decades: what is expected of steps that are not told.
     """
 
     groups: FloatArray
@@ -83,7 +78,8 @@ class Superposition:
     curve_cross: FloatArray
     measured: tuple[float, float]
     draws: FloatArray
-    sampled: float = 0.0
+    undetermined: tuple[tuple[float, float], ...] = ()
+    usual: tuple[float, float] = (0.0, 0.0)
 
     @property
     def horizontal_error(self) -> FloatArray:
@@ -131,17 +127,12 @@ def superpose(
         If there are fewer than two curves, too few or not finite points, or the shifted curves leave a gap.
     """
     values, sorted_curves = _sorted(groups, curves)
-    problem = Problem.of(values, sorted_curves)
-    guess = problem.first_guess(sorted_curves)
-    problem = replace(problem, usual=float(np.median(np.diff(guess, prepend=0.0))))
-    shifts, settled = _fit(problem, guess, None)
-    if vertical:
-        problem = replace(problem, vertical=True)
-        shifts, settled = _fit(problem, np.append(shifts, np.zeros(values.size - 1)), None)
-    result = _result(problem, shifts, settled, values, seed)
+    problem = Problem.of(sorted_curves)
+    found = find_both(problem) if vertical else find_horizontal(problem)
+    result = _result(problem, found, values)
     _require_overlap(result)
     if draws:
-        result = replace(result, draws=_bootstrap(problem, shifts, settled, draws, seed))
+        result = replace(result, draws=_bootstrap(problem, found, draws, seed))
     return rereference(result, values[values.size // 2] if reference is None else reference)
 
 
@@ -163,101 +154,117 @@ def _sorted(
     return np.sort(values), arrays
 
 
-def _fit(
-    problem: Problem, shifts: FloatArray, settled: Settled | None, iterations: int = ITERATIONS
-) -> tuple[FloatArray, Settled]:
-    """Return shifts by damped Gauss-Newton steps, and smoothing and scatter, found unless given."""
-    choice, longest = settled or Settled(FIRST_WEIGHT, 0.0), 0.3 * problem.width
-    system = System.at(problem, shifts, choice)
-    for iteration in range(iterations):
-        if settled is None and iteration in WEIGHED:
-            choice = system.likeliest()
-            system = System.at(problem, shifts, choice)
-        step = system.solve(choice.weight)[system.splines :]
-        largest = float(np.abs(step).max())
-        if largest < CONVERGED or longest < CONVERGED:
-            break
-        proposal = System.at(problem, shifts + step * min(1.0, longest / largest), choice)
-        if proposal.misfit(choice.weight) <= system.misfit(choice.weight) * (1 + 1e-6):
-            shifts, system = shifts + step * min(1.0, longest / largest), proposal
-        else:
-            longest = 0.3 * min(longest, largest)
-    return shifts, choice
-
-
-def _result(problem: Problem, shifts: FloatArray, settled: Settled, values: FloatArray, seed: int) -> Superposition:
-    system = System.at(problem, shifts, settled)
-    solution, covariance, noise, freedom = system.posterior(settled.weight)
-    spread, sampled = covariance[system.splines :, system.splines :], 0.0
-    if problem.vertical:
-        shifts, spread, sampled = _sampled(problem, shifts, settled, freedom, seed)
-        system = System.at(problem, shifts, settled)
-        solution = system.best_curve(settled.weight)
-        covariance = _widened(system.posterior(settled.weight)[1], system.splines, spread)
-    horizontal, vertical = problem.split(shifts)
-    full = np.zeros((2 * problem.curves, 2 * problem.curves))
-    places = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][: problem.free]
-    full[np.ix_(places, places)] = spread
-    x, y = problem.x + horizontal[problem.member], problem.y + vertical[problem.member]
-    order = np.argsort(x, kind="stable")
-    grid = np.linspace(x.min(), x.max(), CURVE_POINTS)
-    rows = system.curve(grid)
-    along = rows @ covariance[: system.splines]
-    error = np.sqrt(np.maximum(np.sum(along[:, : system.splines] * rows, axis=1), 0))
-    cross = np.zeros((grid.size, 2 * problem.curves))
-    cross[:, places] = along[:, system.splines :]
-    own = x[problem.member == 0]
+def _result(problem: Problem, found: Found, values: FloatArray) -> Superposition:
+    points, shifts, curves = problem.points, found.shifts, values.size
+    linear = _Merged.at(problem, found)
+    across, along = shifts.across[points.member], shifts.along[points.member]
+    order = np.argsort(points.x + across, kind="stable")
+    x = (points.x + across)[order]
+    grid = np.linspace(x[0], x[-1], CURVE_POINTS)
+    curve, error, covariance = linear.curve(grid, found.covariance)
+    places = np.r_[1:curves, curves + 1 : 2 * curves][: found.covariance.shape[0]]
+    full, cross = np.zeros((2 * curves, 2 * curves)), np.zeros((grid.size, 2 * curves))
+    full[np.ix_(places, places)], cross[:, places] = found.covariance, covariance
+    own = (points.x + across)[points.member == 0]
     return Superposition(
-        values,
-        horizontal,
-        vertical,
-        full,
-        float(values[0]),
-        noise,
-        freedom,
-        x[order],
-        y[order],
-        problem.member[order],
-        grid,
-        rows @ solution[: system.splines],
-        error,
-        cross,
-        (float(own.min()), float(own.max())),
-        np.empty((0, 2 * problem.curves)),
-        sampled,
+        groups=values,
+        horizontal=shifts.across,
+        vertical=shifts.along,
+        covariance=full,
+        reference=float(values[0]),
+        noise=linear.noise,
+        freedom=linear.freedom,
+        x=x,
+        y=(points.y + along)[order],
+        member=points.member[order],
+        curve_x=grid,
+        curve_y=curve,
+        curve_error=error,
+        curve_cross=cross,
+        measured=(float(own.min()), float(own.max())),
+        draws=np.empty((0, 2 * curves)),
+        undetermined=_runs(values, found.told < HARDLY_TOLD),
+        usual=(found.common.mean, found.common.scatter),
     )
 
 
-def _widened(covariance: FloatArray, splines: int, spread: FloatArray) -> FloatArray:
-    """Return the covariance of curve and shifts with another one of the shifts; the curve depends on them as before."""
-    inner, outer = slice(splines), slice(splines, None)
-    gain = covariance[inner, outer] @ np.linalg.pinv(covariance[outer, outer], hermitian=True)
-    change = spread - covariance[outer, outer]
-    both = np.vstack([gain, np.eye(spread.shape[0])])
-    return np.asarray(covariance + both @ change @ both.T, dtype=np.float64)
+def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, float], ...]:
+    """Return first and last group of each run of marked steps."""
+    edges = np.diff(np.concatenate([[0], steps.astype(int), [0]]))
+    ends = zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
-def _sampled(
-    problem: Problem, shifts: FloatArray, settled: Settled, freedom: float, seed: int
-) -> tuple[FloatArray, FloatArray, float]:
-    """Return mean and covariance of the posterior, as the square of a scale for Student's t, and the points drawn."""
-    mean, covariance, points = sample(problem, shifts, settled, seed)
-    return mean, covariance * ((freedom - 2) / freedom if freedom > 4 else 0.5), points
-
-
-def _bootstrap(problem: Problem, shifts: FloatArray, settled: Settled, draws: int, seed: int) -> FloatArray:
+def _bootstrap(problem: Problem, found: Found, draws: int, seed: int) -> FloatArray:
     """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves)."""
     generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
-    system = System.at(problem, shifts, settled)
-    fitted, scatter = system.residuals(settled.weight)
-    vertical = problem.split(shifts)[1][problem.member]
-    places = [np.flatnonzero(problem.member == curve) for curve in range(problem.curves)]
+    linear, points = _Merged.at(problem, found), problem.points
+    fitted, scatter = linear.residuals()
+    along = found.shifts.along[points.member]
+    places = [np.flatnonzero(points.member == curve) for curve in range(problem.curves)]
     samples = np.empty((draws, 2 * problem.curves))
     for row in samples:
         drawn = np.concatenate([generator.choice(scatter[place], place.size) for place in places])
-        again = replace(problem, y=fitted + drawn - vertical)
-        row[:] = np.concatenate(problem.split(_fit(again, shifts, settled, DRAW_ITERATIONS)[0]))
+        again = points._replace(y=fitted + drawn - along)
+        smoothing = found.weight, found.variance
+        row[:] = np.concatenate(fit(again, found.shifts, problem.grid, found.prior, smoothing, DRAW_ITERATIONS)[0])
     return samples
+
+
+@dataclass(frozen=True)
+class _Merged:
+    """The problem about shifts that were found, as a dense matrix: for the curve, its band and the residuals."""
+
+    design: FloatArray
+    inverse: FloatArray
+    target: FloatArray
+    splines: int
+    low: float
+    step: float
+    noise: float
+    freedom: float
+    coefficients: FloatArray
+
+    @classmethod
+    def at(cls, problem: Problem, found: Found) -> _Merged:
+        """Return the problem about the shifts found, with the best curve through them."""
+        points, shifts, step = problem.points, found.shifts, problem.grid.step
+        low, splines = extent(points, shifts.across, step)
+        basis = rows(points, shifts.across, low, step, splines)
+        second = np.diff(np.eye(splines), 2, axis=0)
+        smooth = basis.T @ basis + found.weight * second.T @ second
+        target = points.y + shifts.along[points.member]
+        coefficients = np.asarray(np.linalg.solve(smooth, basis.T @ target), dtype=np.float64)
+        slope = slopes(points, shifts.across, low, step, coefficients)
+        moved = np.eye(problem.curves)[points.member][:, 1:]
+        border = [moved * slope[:, None]]
+        if found.prior.mean.size >= problem.curves:
+            border.append(-moved)
+        design = np.hstack([basis, *border])
+        known = np.zeros((design.shape[1], design.shape[1]))
+        known[:splines, :splines] = found.weight * second.T @ second
+        known[splines:, splines:] = found.variance * found.prior.precision
+        inverse = np.linalg.inv(design.T @ design + known)
+        freedom = max(target.size - float(np.sum(inverse * (design.T @ design))), 1.0)
+        noise = float(np.sqrt(np.sum((target - basis @ coefficients) ** 2) / freedom))
+        return cls(design, inverse, target, splines, low, step, noise, freedom, coefficients)
+
+    def curve(self, x: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the curve, its error, and its covariance with the shifts."""
+        inner, outer = slice(self.splines), slice(self.splines, None)
+        gain = self.inverse[inner, outer] @ np.linalg.inv(self.inverse[outer, outer])
+        alone = self.noise**2 * (self.inverse[inner, inner] - gain @ self.inverse[outer, inner])
+        nothing = Points(x, x, np.zeros(x.size, np.intp))
+        along = rows(nothing, np.zeros(1), self.low, self.step, self.splines)
+        cross = along @ gain @ covariance
+        variance = np.sum((along @ alone) * along, axis=1) + np.sum(cross * (along @ gain), axis=1)
+        return along @ self.coefficients, np.sqrt(np.maximum(variance, 0)), cross
+
+    def residuals(self) -> tuple[FloatArray, FloatArray]:
+        """Return fitted values, and residuals enlarged by their leverage."""
+        fitted = self.design[:, : self.splines] @ self.coefficients
+        leverage = np.sum((self.design @ self.inverse) * self.design, axis=1)
+        return fitted, (self.target - fitted) / np.sqrt(np.maximum(1 - leverage, 0.05))
 
 
 def _require_overlap(result: Superposition) -> None:

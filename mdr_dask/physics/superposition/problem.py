@@ -1,76 +1,100 @@
-"""Curves in one row, what shifts act on them, and what is expected of the shifts before any fit."""
+"""Curves that are to be one: their points, the cells of the spline, and what is known of shifts without them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.superposition.least_squares import SETTINGS, Grid, Points, Prior
 
-DEGREE = 3
-CELLS_PER_CURVE = 8
-"""Spline cells along a curve of median width; smoothing decides how many of them count."""
+RATIOS = np.geomspace(0.03, 2.0, 12)
+"""Scatters considered of steps about their mean with vertical factors, in widths and in heights of a curve."""
 
-MOST_CELLS = 120
-EXPECTED_SHIFT = 1.0
-"""Standard deviation, in widths of a curve, that shifts between neighbours are expected to have about the usual one.
 
-It decides only where the curves do not: on a plateau, or along a straight line with vertical factors.
-"""
+class Common(NamedTuple):
+    """Mean and scatter of the steps between neighbours."""
+
+    mean: float
+    scatter: float
 
 
 @dataclass(frozen=True)
 class Problem:
-    """All points in one row, and which shifts act on which; the first curve is held in place."""
+    """Points of all curves, ascending in x within each.
 
-    x: FloatArray
-    y: FloatArray
-    member: NDArray[np.intp]
+    Parameters
+    ----------
+    points : Points
+    curves : int
+    width, height : float
+        Of a curve, the median.
+    grid : Grid
+    windows : array, shape (curves - 1, 2)
+        Least and largest step with which a curve overlaps the one before it.
+    """
+
+    points: Points
     curves: int
-    vertical: bool
     width: float
-    usual: float = 0.0
+    height: float
+    grid: Grid
+    windows: FloatArray
 
     @classmethod
-    def of(cls, values: FloatArray, curves: list[tuple[FloatArray, FloatArray]]) -> Problem:
+    def of(cls, curves: list[tuple[FloatArray, FloatArray]]) -> Problem:
         """Put curves, ascending in x and in their groups, in one row."""
-        member = np.repeat(np.arange(values.size), [x.size for x, _ in curves])
-        x, y = np.concatenate([x for x, _ in curves]), np.concatenate([y for _, y in curves])
-        return cls(x, y, member, values.size, False, float(np.median([np.ptp(x) for x, _ in curves])))
+        member = np.repeat(np.arange(len(curves)), [x.size for x, _ in curves])
+        points = Points(np.concatenate([x for x, _ in curves]), np.concatenate([y for _, y in curves]), member)
+        width = float(np.median([np.ptp(x) for x, _ in curves]))
+        height = float(np.median([np.ptp(y) for _, y in curves])) or 1.0
+        density = points.x.size / (len(curves) * SETTINGS.cells)
+        grid = Grid(width / SETTINGS.cells, density * np.logspace(*SETTINGS.smoothing))
+        windows = np.array([[one[0] - other[-1], one[-1] - other[0]] for (one, _), (other, _) in pairwise(curves)])
+        return cls(points, len(curves), width, height, grid, windows)
 
-    @property
-    def free(self) -> int:
-        """Number of shifts to be found."""
-        return (self.curves - 1) * (2 if self.vertical else 1)
+    def lifted(self, along: FloatArray) -> Problem:
+        """Return the same problem with curves moved along the ordinate."""
+        return replace(self, points=self.points._replace(y=self.points.y + along[self.points.member]))
 
-    def split(self, shifts: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return horizontal and vertical shifts of all curves."""
-        horizontal, vertical = np.zeros(self.curves), np.zeros(self.curves)
-        horizontal[1:] = shifts[: self.curves - 1]
-        if self.vertical:
-            vertical[1:] = shifts[self.curves - 1 :]
-        return horizontal, vertical
+    def between(self, first: int, last: int) -> Points:
+        """Return the points of some neighbours, the first of which is number zero."""
+        low, high = np.searchsorted(self.points.member, [first, last + 1])
+        x, y, member = self.points
+        return Points(x[low:high], y[low:high], np.asarray(member[low:high] - first, dtype=np.intp))
 
-    def first_guess(self, curves: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
-        """Shift each curve onto the one before it."""
-        pairs = [_pair_shift(*one, *other) for one, other in pairwise(curves)]
-        return np.cumsum(np.array(pairs))
+    def first_guess(self) -> FloatArray:
+        """Return the step that brings each curve onto the one before it."""
+        pairs = (self.between(k, k + 1) for k in range(self.curves - 1))
+        parts = ((pair, int(np.searchsorted(pair.member, 1))) for pair in pairs)
+        return np.array([_pair_shift(p.x[:end], p.y[:end], p.x[end:], p.y[end:]) for p, end in parts])
 
-    def cells(self, x: FloatArray) -> tuple[float, float, int]:
-        """Return where the spline begins, the width of its cells and their number."""
-        cells = int(np.clip(np.ceil(CELLS_PER_CURVE * np.ptp(x) / self.width), 2 * DEGREE, MOST_CELLS))
-        return float(x.min()), float(np.ptp(x)) / cells, cells
+    def prior(self, common: Common) -> Prior:
+        """Return what is known of horizontal shifts whose steps scatter about a mean."""
+        rows = differences(self.curves - 1)
+        return Prior(common.mean * np.arange(1.0, self.curves), rows.T @ rows / common.scatter**2)
 
-    def expected(self) -> tuple[FloatArray, FloatArray]:
-        """Return rows and targets of what is expected of the shifts: neighbours lie `usual` apart, within a width."""
-        rows = np.zeros((self.curves - 1, self.free))
-        rows[:, : self.curves - 1] = np.eye(self.curves - 1) - np.eye(self.curves - 1, k=-1)
-        scale = EXPECTED_SHIFT * self.width
-        return rows / scale, np.full(self.curves - 1, self.usual / scale)
+    def priors(self, mean: float) -> list[Prior]:
+        """Return priors of both kinds of shifts, one for each ratio.
+
+        Steps scatter about a common mean by an unknown part of width and height; the mean is known as well as if each
+        were within a width of the usual one, and within a height of none.
+        """
+        size = self.curves - 1
+        rows, usual = differences(size), np.append(mean * np.arange(1.0, self.curves), np.zeros(size))
+        scales = np.diag([1 / self.width**2, 1 / self.height**2])
+        about = np.eye(size) - 1 / size
+        steps = [about / ratio**2 + np.eye(size) for ratio in RATIOS]
+        return [Prior(usual, np.kron(scales, rows.T @ inner @ rows)) for inner in steps]
+
+
+def differences(size: int) -> FloatArray:
+    """Return the matrix that makes steps of shifts."""
+    return np.eye(size) - np.eye(size, k=-1)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")

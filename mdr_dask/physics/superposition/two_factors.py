@@ -161,6 +161,7 @@ def _one(
         reference=float(groups[zero]),
         member=place[summed.member],
         draws=drawn[:, kept],
+        undetermined=(),
     )
 
 

@@ -171,20 +171,6 @@ def running(integrals: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(integrals)])
 
 
-def halved(line: CubicLine) -> CubicLine:
-    """Return the same line with a node more in the middle of every cell."""
-    n = line.enter.size
-    height, enter, leave = np.empty(2 * n + 1), np.empty(2 * n), np.empty(2 * n)
-    middle = 0.75 * np.diff(line.height) - 0.125 * (line.enter + line.leave)
-    height[::2], height[1::2] = (
-        line.height,
-        0.5 * (line.height[:-1] + line.height[1:]) + 0.125 * (line.enter - line.leave),
-    )
-    enter[::2], enter[1::2] = 0.5 * line.enter, middle
-    leave[::2], leave[1::2] = middle, 0.5 * line.leave
-    return line._replace(height=height, enter=enter, leave=leave)
-
-
 @njit(nogil=True, cache=True)
 def _closed(array: FloatArray, first: int) -> FloatArray:
     """Return an array turned to begin at a place, with that place once more at the end."""

@@ -79,16 +79,16 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
 
 
 @njit(nogil=True, cache=True)
-def _trailing(drop: float, reach: float, exponent: float) -> float:
-    """Return b >= 0 with b^n + n reach b^(n-1) = drop, or 0 where there is none (n = 1)."""
+def _trailing(drop: float, deborah: float, exponent: float) -> float:
+    """Return b >= 0 with b^n + n deborah b^(n-1) = drop, or 0 where there is none (n = 1)."""
     if exponent == 1:
-        return max(drop - reach, 0.0)
+        return max(drop - deborah, 0.0)
     # in y = log b the logarithm of the left side is convex and rising: Newton from the right
     y = math.log(drop) / exponent
     for _ in range(ITERATIONS):
         b = math.exp(y)
-        step = ((exponent - 1) * y + math.log(b + exponent * reach) - math.log(drop)) / (
-            exponent - 1 + b / (b + exponent * reach)
+        step = ((exponent - 1) * y + math.log(b + exponent * deborah) - math.log(drop)) / (
+            exponent - 1 + b / (b + exponent * deborah)
         )
         y -= step
         if abs(step) < 1e-15 * max(1.0, abs(y)):
@@ -97,18 +97,18 @@ def _trailing(drop: float, reach: float, exponent: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _carried(depth: float, reach: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
+def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
     """Return F_N / (4 G) at a depth, and the leading and trailing edges."""
     drop = depth / coefficient
     a = drop ** (1 / exponent)
-    b = _trailing(drop, reach, exponent)
+    b = _trailing(drop, deborah, exponent)
     load = depth * (a + b) - coefficient * (a ** (exponent + 1) + b ** (exponent + 1)) / (exponent + 1)
-    return load + reach * (depth - coefficient * b**exponent), a, b
+    return load + deborah * (depth - coefficient * b**exponent), a, b
 
 
 @njit(nogil=True, cache=True)
 def smooth(
-    loads: FloatArray, reaches: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
+    loads: FloatArray, deborah: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
 ) -> None:
     """Slide smooth lines c |x|^n towards -x at prescribed loads.
 
@@ -117,7 +117,7 @@ def smooth(
 
     Parameters
     ----------
-    loads, reaches : array, shape (cases,)
+    loads, deborah : array, shape (cases,)
         F_N / (4 G) and v tau, positive and finite.
     coefficients, exponents : array, shape (cases,)
         c_n > 0 and n >= 1 of the lines, already mapped.
@@ -127,16 +127,16 @@ def smooth(
     """
     results[:] = np.nan
     for k in range(loads.size):
-        load, reach, c, n = loads[k], reaches[k], coefficients[k], exponents[k]
+        load, de, c, n = loads[k], deborah[k], coefficients[k], exponents[k]
         depth = c * ((n + 1) * load / (2 * n * c)) ** (n / (n + 1))
         for _ in range(ITERATIONS):
-            carried, a, b = _carried(depth, reach, c, n)
-            step = (load - carried) / (a + b + reach)
+            carried, a, b = _carried(depth, de, c, n)
+            step = (load - carried) / (a + b + de)
             depth = max(depth + step, 0.25 * depth)
             if abs(step) <= 1e-14 * depth:
-                carried, a, b = _carried(depth, reach, c, n)
+                carried, a, b = _carried(depth, de, c, n)
                 stretch = (c * n) ** 2 * (a ** (2 * n - 1) + b ** (2 * n - 1)) / (2 * n - 1)
                 results[k, DEPTH] = depth
-                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + reach * stretch
+                results[k, DRAG] = 0.5 * (depth - c * b**n) ** 2 + de * stretch
                 results[k, LEADING], results[k, TRAILING], results[k, STRETCH] = a, b, stretch
                 break

@@ -8,15 +8,15 @@ friction itself.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces.cubic_line import CubicLine, periodic_line
-from mdr_dask.physics.transients.ends import Ends, ends_on
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.transients.ends import Ends, Line, ends_on
 from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jumps
 
 
@@ -57,33 +57,19 @@ class Settings(NamedTuple):
 SETTINGS = Settings()
 
 
-class Line(Protocol):
-    """A rough line that can be put on any grid, in units of its length and rms height."""
-
-    @property
-    def points(self) -> int:
-        """Number of Nyquist points."""
-
-    def heights(self, nodes: int) -> FloatArray:
-        """Return the roughness at equidistant nodes of one period."""
-
-    def slopes(self, nodes: int) -> FloatArray:
-        """Return its derivative by position, over the length of the line."""
-
-
 class Problem(NamedTuple):
     """Jumps on one line without dimensions.
 
     Parameters
     ----------
-    line : Line
+    line : RoughLine
     loads : array, shape (cases,)
         F_N / (4 G L h).
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     """
 
-    line: Line
+    line: RoughLine
     loads: FloatArray
     deborah: FloatArray
 
@@ -91,10 +77,9 @@ class Problem(NamedTuple):
         """Return some of the cases."""
         return self._replace(loads=self.loads[cases], deborah=self.deborah[cases])
 
-    def on(self, oversampling: int) -> CubicLine:
+    def on(self, oversampling: int) -> Line:
         """Return the line with so many nodes for every Nyquist point."""
-        nodes = self.line.points * oversampling
-        return periodic_line(self.line.heights(nodes), self.line.slopes(nodes))
+        return Line.of(self.line.cubic(self.line.points * oversampling))
 
 
 class Aim(NamedTuple):
@@ -104,18 +89,19 @@ class Aim(NamedTuple):
     ----------
     levels : collection of str
         Fields of `Levels` that an accuracy is asked of.
-    accuracy : float
-        Relative error allowed for each of them.
+    accuracy : float or None
+        Relative error allowed for each of them; None where neither that nor errors are wanted: the grid of the march
+        must do.
     oversampling : int
         Even number of nodes for every Nyquist point that the march takes, and the ends at least.
     course : Course or None
         Of the transient, with the error allowed for it; None if it is not wanted.
     with_errors : bool
-        Whether the error of the transient is wanted.
+        Whether the error of the transient is wanted, which takes an accuracy.
     """
 
     levels: Collection[str]
-    accuracy: float
+    accuracy: float | None
     oversampling: int
     course: Course | None
     with_errors: bool
@@ -160,10 +146,14 @@ class Jumps(NamedTuple):
 
 def solve_jumps(problem: Problem, aim: Aim) -> Jumps:
     """Return the jumps of a line: their levels to an accuracy, the transient on the grid given."""
-    half, whole = problem.on(aim.oversampling // 2), problem.on(aim.oversampling)
-    coarse = ends_on(half, problem.loads, problem.deborah)
-    fine = ends_on(whole, problem.loads, problem.deborah, coarse)
-    levels, errors = _refined(problem, aim, coarse, fine)
+    whole, near = problem.on(aim.oversampling), None
+    if aim.accuracy is not None:
+        half = problem.on(aim.oversampling // 2)
+        near = ends_on(half, problem.loads, problem.deborah)
+    fine = ends_on(whole, problem.loads, problem.deborah, near)
+    levels, errors = Levels.of(fine), Levels(*np.full((4, problem.loads.size), np.nan))
+    if near is not None:
+        levels, errors = _refined(problem, aim, near, fine)
     shape = problem.loads.size, aim.course.times.size if aim.course else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, fine.outcome.copy())
@@ -174,13 +164,13 @@ def solve_jumps(problem: Problem, aim: Aim) -> Jumps:
         jumps.outcome[k] = jump.outcome
         jumps.trace[k] = levels.after[k] + (jump.trace - jump.after)
         jumps.depth[k] = levels.depth[k] + (jump.depth - fine.depth[k, 1])
-    if aim.with_errors:
+    if aim.with_errors and near is not None:
         # what is left out on one grid is left out on the other
         skipped = np.array([jump.left_out > 0 for jump in marched])
         course = aim.course._replace(per_decade=aim.course.per_decade / 2, accuracy=0.0)
-        rough = velocity_jumps(half, problem.loads, problem.deborah, coarse, course, skipped)
+        rough = velocity_jumps(half, problem.loads, problem.deborah, near, course, skipped)
         for k, (one, other) in enumerate(zip(marched, rough, strict=True)):
-            change, sinking = _changes(one, other, fine.depth[k], coarse.depth[k])
+            change, sinking = _changes(one, other, fine.depth[k], near.depth[k])
             jumps.trace_error[k] = SETTINGS.of_transient * change + errors.after[k]
             jumps.depth_error[k] = SETTINGS.of_transient * sinking + errors.depth[k]
     return jumps
@@ -200,12 +190,12 @@ def _changes(fine: Jump, coarse: Jump, depth: FloatArray, coarse_depth: FloatArr
 
 def _refined(problem: Problem, aim: Aim, coarse: Ends, fine: Ends) -> tuple[Levels, Levels]:
     """Return the levels on the coarsest grid on which all that are wanted meet the accuracy, and their errors."""
-    points, oversampling = problem.line.points, aim.oversampling
+    points, oversampling, allowed = problem.line.points, aim.oversampling, aim.accuracy or 0.0
     levels, change = np.stack(Levels.of(fine)), _change(coarse, fine)
     errors = np.maximum(SETTINGS.of_first_change * change, _least(fine, points, oversampling)) * np.abs(levels)
     wanted = np.array([name in aim.levels for name in Levels._fields])
     while oversampling < SETTINGS.finest:
-        late = ~(errors <= aim.accuracy * np.abs(levels)) & wanted[:, None]
+        late = ~(errors <= allowed * np.abs(levels)) & wanted[:, None]
         missing = np.flatnonzero(late.any(axis=0) & (fine.outcome == Outcome.CONVERGED))
         if not missing.size:
             break

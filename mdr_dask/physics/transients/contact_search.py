@@ -29,9 +29,7 @@ from mdr_dask.physics.transients.patches import (
     SUMS,
     TILT,
     Barriers,
-    Track,
     add_patch,
-    barriers_for,
     force_at,
     height_at,
     keeps_pressed,
@@ -72,11 +70,11 @@ class Workspace(NamedTuple):
     barriers: Barriers
 
 
-def workspace_for(track: Track, patches: int) -> Workspace:
-    """Return room for a number of patches of a line, and for some more."""
+def workspace_for(patches: int, barriers: Barriers) -> Workspace:
+    """Return room for a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    return Workspace(start, end, np.zeros(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS), barriers_for(track))
+    return Workspace(start, end, np.zeros(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS), barriers)
 
 
 @inlined

@@ -12,7 +12,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Blocks, blocks_of, patches_at
-from mdr_dask.physics.sliding.steady import steady_sliding
+from mdr_dask.physics.sliding.steady import steady_on_cells
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -29,22 +29,38 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
+KNOWN = 4  # Deborah numbers whose barriers are kept
 NEWTON_STEPS = 60
 EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, and what it may miss
 
 
 class Line(NamedTuple):
-    """One line as the sweep takes it, and as the march does."""
+    """One periodic line as the sweep takes it and as the march does, with the barriers of some Deborah numbers."""
 
     cells: Cells
     blocks: Blocks
     track: Track
+    known: dict[float, Barriers]
 
+    @classmethod
+    def of(cls, line: CubicLine) -> Line:
+        """Prepare a line."""
+        cells = cut(line)
+        return cls(cells, blocks_of(cells), track_of(cells), {})
 
-def line_of(line: CubicLine) -> Line:
-    """Return a periodic line prepared for both."""
-    cells = cut(line)
-    return Line(cells, blocks_of(cells), track_of(cells))
+    def barriers(self, deborah: float) -> Barriers:
+        """Return what is known of the barriers at a Deborah number in cells; cases in a row often share it."""
+        if deborah not in self.known:
+            if len(self.known) >= KNOWN:
+                self.known.clear()
+            self.known[deborah] = barriers_for(self.track)
+        return self.known[deborah]
+
+    def patches(self, depth: float, deborah: float, sums: FloatArray) -> Patches:
+        """Return what touches in steady sliding at a depth of the highest point; write the sums of the sweep."""
+        barriers = self.barriers(deborah)
+        start, end = patches_at(self.cells, self.blocks, *barriers, deborah, depth, sums)
+        return Patches(start, end, _pressed(self.track, end, depth), start.size, depth, deborah, np.zeros(1, np.int64))
 
 
 class Ends(NamedTuple):
@@ -62,6 +78,8 @@ class Ends(NamedTuple):
         Depth before and long after.
     contact : array, shape (cases, 2)
         Fraction in contact there.
+    first : array of Patches, shape (cases,)
+        What touches before.
     outcome : array, shape (cases,)
     """
 
@@ -72,6 +90,7 @@ class Ends(NamedTuple):
     tilt: FloatArray
     depth: FloatArray
     contact: FloatArray
+    first: NDArray[np.object_]
     outcome: NDArray[np.int8]
 
     def only(self, cases: NDArray[np.int64]) -> Ends:
@@ -87,7 +106,7 @@ class Ends(NamedTuple):
         return Ends(*columns)
 
 
-def ends_on(line: CubicLine, loads: FloatArray, deborah: FloatArray, near: Ends | None = None) -> Ends:
+def ends_on(line: Line, loads: FloatArray, deborah: FloatArray, near: Ends | None = None) -> Ends:
     """Solve the ends of jumps on one line.
 
     At the instant of a jump displacements and depth do not change, but the rate of the depth does, and elements whose
@@ -95,8 +114,8 @@ def ends_on(line: CubicLine, loads: FloatArray, deborah: FloatArray, near: Ends 
 
     Parameters
     ----------
-    line : CubicLine
-        Periodic.
+    line : Line
+        From :meth:`Line.of`.
     loads : array, shape (cases,)
         F_N / (4 G L), in the unit of height.
     deborah : array, shape (cases, 2)
@@ -105,28 +124,20 @@ def ends_on(line: CubicLine, loads: FloatArray, deborah: FloatArray, near: Ends 
         On another grid, where the searches for the depth begin; the answer does not depend on it.
     """
     guesses = None if near is None else near.depth.ravel()
-    steady = steady_sliding(line, deborah.ravel(), np.repeat(loads, 2), guesses)
+    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses)
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
+    touching = np.full(loads.size, None, dtype=object)
     good = np.flatnonzero(outcome == Outcome.CONVERGED)
     if good.size:
-        prepared = line_of(line)
-        n = prepared.track.cells
-        barriers = barriers_for(prepared.track)
+        n = line.track.cells
         for k in good:
-            first = contact_before(prepared, depth[k, 0], deborah[k, 0] * n)
-            barriers.block[:] = np.nan
-            found = _release(prepared.track, first, barriers, deborah[k, 1] * n, loads[k] * n)
+            before, after = deborah[k] * n
+            first = touching[k] = line.patches(depth[k, 0] + line.cells.top, before, np.empty(SWEEP_SUMS))
+            found = _release(line.track, first, line.barriers(after), after, loads[k] * n)
             at[k], rate[k], tilt[k], outcome[k] = found
-    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, outcome)
-
-
-def contact_before(line: Line, depth: float, deborah: float) -> Patches:
-    """Return the patches of steady sliding at a depth of the line and a Deborah number in cells."""
-    depth += line.cells.top
-    start, end = patches_at(line.cells, line.blocks, deborah, depth, np.empty(SWEEP_SUMS))
-    return Patches(start, end, _pressed(line.track, end, depth), start.size, depth, deborah, np.zeros(1, np.int64))
+    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, outcome)
 
 
 @njit(nogil=True, cache=True)
@@ -143,11 +154,13 @@ def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
     """Return the drag right after a jump, the rate of the depth that carries the load, their slope, and the outcome."""
-    rate, sums = 0.0, np.empty(SUMS)
+    rate, sums, missed = 0.0, np.empty(SUMS), np.inf
     for _ in range(NEWTON_STEPS):
         released(track, first, barriers, deborah, rate, sums)
-        if abs(sums[LOAD] - load) <= EXACT * load or sums[LENGTH] <= 0:
+        miss = abs(sums[LOAD] - load)
+        # Newton's steps on a convex sum come nearer until rounding is all that is left
+        if miss <= EXACT * load or sums[LENGTH] <= 0 or (miss <= NEARLY * load and miss >= missed):
             break
-        rate += (load - sums[LOAD]) / sums[LENGTH]
+        rate, missed = rate + (load - sums[LOAD]) / sums[LENGTH], miss
     found = abs(sums[LOAD] - load) <= NEARLY * load
     return sums[DRAG], rate, sums[TILT], Outcome.CONVERGED if found else Outcome.DEPTH_NOT_FOUND

@@ -10,11 +10,11 @@ from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.kelvin import DRAG_RATE, patches_at
+from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, workspace_for
-from mdr_dask.physics.transients.ends import Ends, Line, contact_before, ends_on, line_of
+from mdr_dask.physics.transients.ends import Ends, Line, ends_on
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Aim, Marching, Pace, Trajectory, march
 from mdr_dask.physics.transients.patches import Patches, Track
 
@@ -60,6 +60,7 @@ class Settings(NamedTuple):
 
 
 SETTINGS = Settings()
+WHOLE = 1 - 1e-12  # of a line in contact, but for rounding
 SHALLOW = 0.01  # of the least depth of the ends: no march goes below
 FINE_STEPS = 24.0  # steps per decade of which the settings speak
 
@@ -147,12 +148,12 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], co
         v_1 tau / L and v_2 tau / L.
     course : Course
     """
-    loads, numbers = np.array([load]), np.array([deborah])
-    return velocity_jumps(line, loads, numbers, ends_on(line, loads, numbers), course)[0]
+    prepared, loads, numbers = Line.of(line), np.array([load]), np.array([deborah])
+    return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), course)[0]
 
 
 def velocity_jumps(
-    line: CubicLine,
+    line: Line,
     loads: FloatArray,
     deborah: FloatArray,
     ends: Ends,
@@ -172,14 +173,13 @@ def velocity_jumps(
     left_out : array, shape (cases,), optional
         Cases whose transient is left out, however large.
     """
-    prepared = line_of(line) if np.any(ends.outcome == Outcome.CONVERGED) else None
     jumps = []
     for k in range(loads.size):
-        if prepared is None or ends.outcome[k] != Outcome.CONVERGED:
+        if ends.outcome[k] != Outcome.CONVERGED:
             jumps.append(_failed(course.times, Outcome(ends.outcome[k])))
         else:
             one = course if left_out is None or not left_out[k] else course._replace(accuracy=np.inf)
-            jumps.append(_Relaxation.of(prepared, loads[k], deborah[k], ends, k, one).solve())
+            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, one).solve())
     return jumps
 
 
@@ -200,6 +200,7 @@ class _Relaxation(NamedTuple):
     rate: float
     tilt: float
     depth: FloatArray
+    first: Patches
     is_full: bool
     course: Course
     pace: Pace
@@ -218,7 +219,8 @@ class _Relaxation(NamedTuple):
             float(ends.rate[k]),
             float(ends.tilt[k]),
             depth + line.cells.top,
-            bool(np.all(ends.contact[k] >= 1)),
+            ends.first[k],
+            bool(np.all(ends.contact[k] >= WHOLE)),
             course,
             pace_after(course, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
         )
@@ -245,9 +247,8 @@ class _Relaxation(NamedTuple):
             return jump._replace(trace=trace, depth=sinking, left_out=transient)
         low, high = float(self.depth.min()), float(self.depth.max())
         margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
-        first = contact_before(self.line, self.depth[0] - self.line.cells.top, self.deborah[0])
         for _ in range(SETTINGS.widenings):
-            found = self.march(jump, first, (max(low - margin, SHALLOW * low), high + margin), transient)
+            found = self.march(jump, (max(low - margin, SHALLOW * low), high + margin), transient)
             if found is not None:
                 return found
             margin *= 4
@@ -259,11 +260,11 @@ class _Relaxation(NamedTuple):
         To it come the friction of the depth's rate, and that of its change.
         """
         sums = np.empty(SWEEP_SUMS)
-        patches_at(self.line.cells, self.line.blocks, self.deborah[1], self.depth[1], sums)
+        self.line.patches(self.depth[1], self.deborah[1], sums)
         by_depth = abs(sums[DRAG_RATE] * (self.depth[1] - self.depth[0]))
         return float(abs(self.at - self.after) + abs(self.rate * self.tilt) + by_depth)
 
-    def march(self, jump: Jump, first: Patches, limits: tuple[float, float], transient: float) -> Jump | None:
+    def march(self, jump: Jump, limits: tuple[float, float], transient: float) -> Jump | None:
         """Return the jump with what a march between two depths finds, or None if it leaves them."""
         accuracy, course = self.course.accuracy, self.course
         equilibrium = SETTINGS.equilibrium * (FINE_STEPS / course.per_decade) ** 3
@@ -272,8 +273,8 @@ class _Relaxation(NamedTuple):
         found = Trajectory(*np.empty((4, SETTINGS.moments)))
         for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
             column[0] = value
-        marching = Marching(self.line.track, first, self.reachable(*limits), self.deborah[1], self.load, *limits)
-        work = workspace_for(self.line.track, first.count)
+        marching = Marching(self.line.track, self.first, self.reachable(*limits), self.deborah[1], self.load, *limits)
+        work = workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
         count, outcome = march(marching, self.pace, Aim(self.depth[1], self.after, close, settled), found, work)
         if outcome == LEFT_LIMITS:
             return None
@@ -281,15 +282,13 @@ class _Relaxation(NamedTuple):
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > SETTINGS.stray * np.ptp(drag)
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
-        return jump._replace(
-            trace=_at_times(time, drag, course.times, self.after),
-            depth=_at_times(time, depth, course.times, self.depth[1]) - self.line.cells.top,
-            moments=count,
-        )
+        ends = np.array([self.after, self.depth[1]])
+        trace, sinking = _at_times(time, np.stack([drag, depth]), course.times, ends)
+        return jump._replace(trace=trace, depth=sinking - self.line.cells.top, moments=count)
 
     def reachable(self, low: float, high: float) -> Reachable:
         """Return where elements can be in contact between two depths."""
-        slowest = contact_before(self.line, low - self.line.cells.top, float(self.deborah.min()))
+        slowest = self.line.patches(low, float(self.deborah.min()), np.empty(SWEEP_SUMS))
         floor = np.empty(self.line.track.height.size)
         _fill(self.line.track, slowest, floor)
         active = high + self.line.track.peak > np.minimum(floor[:-1], floor[1:])
@@ -303,22 +302,24 @@ class _Relaxation(NamedTuple):
 @njit(nogil=True, cache=True)
 def _fill(track: Track, state: Patches, floor: FloatArray) -> None:
     """Write the displacement of a steady state at the nodes."""
-    k = -1
+    k, decay, flying = -1, np.exp(-1 / state.deborah), False
     for i in range(floor.size):
         while k + 1 < state.count and state.start[k + 1] <= i:
             k += 1
         if k < 0:
             floor[i] = -np.inf
         elif i <= state.end[k]:
-            floor[i] = state.depth + track.height[i]
+            floor[i], flying = state.depth + track.height[i], False
+        elif flying and state.start[k] <= i - 1:
+            floor[i] = floor[i - 1] * decay
         else:
-            floor[i] = state.pressed[k] * np.exp(-(i - state.end[k]) / state.deborah)
+            floor[i], flying = state.pressed[k] * np.exp(-(i - state.end[k]) / state.deborah), True
 
 
-def _at_times(moments: FloatArray, values: FloatArray, times: FloatArray, after: float) -> FloatArray:
-    """Interpolate over log time by a modified Akima curve, which no kink makes overshoot; linear in the first step."""
+def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray) -> FloatArray:
+    """Interpolate over log time by modified Akima curves, which no kink makes overshoot; linear in the first step."""
     scale = moments[1]
-    curve = Akima1DInterpolator(np.log1p(moments / scale), values, method="makima")
-    trace: FloatArray = curve(np.log1p(times / scale))
-    trace[times > moments[-1]] = after
-    return trace
+    curves = Akima1DInterpolator(np.log1p(moments / scale), rows, axis=1, method="makima")
+    traces: FloatArray = curves(np.log1p(times / scale))
+    traces[:, times > moments[-1]] = after[:, None]
+    return traces

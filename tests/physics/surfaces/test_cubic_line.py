@@ -3,7 +3,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces.cubic_line import cut, halved, indented_line, periodic_line, running
+from mdr_dask.physics.surfaces.cubic_line import cut, indented_line, periodic_line, running
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 
@@ -48,15 +48,3 @@ def test_the_slope_squared_of_a_resolved_line_is_exact():
     cells = cut(lines()["periodic"])
     n = cells.mean.size - 1
     assert n * np.sum(cells.stretch[:n]) == pytest.approx(roughness.spectral_slope(amplitude) ** 2, rel=1e-13)
-
-
-@pytest.mark.parametrize("name", ["periodic", "straight", "cone", "parabola"])
-def test_a_halved_line_is_the_same_line(name):
-    line = lines()[name]
-    for k, (whole, first, second) in enumerate(
-        zip(cubics(line), list(cubics(halved(line)))[::2], list(cubics(halved(line)))[1::2], strict=True)
-    ):
-        x = np.linspace(0, 1, 5)
-        np.testing.assert_allclose(first(x), whole(x / 2), atol=1e-13, err_msg=str(k))
-        np.testing.assert_allclose(second(x), whole((1 + x) / 2), atol=1e-13, err_msg=str(k))
-    assert halved(line).periodic == line.periodic

@@ -8,9 +8,9 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
-from mdr_dask.physics.transients.ends import contact_before, line_of
+from mdr_dask.physics.transients.ends import Line
 from mdr_dask.physics.transients.free_flight import Moment
-from mdr_dask.physics.transients.patches import History
+from mdr_dask.physics.transients.patches import History, barriers_for
 
 POINTS = 200
 LONG = 100.0  # relaxation times after which nothing is left of the state before
@@ -23,15 +23,15 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
     """On coarse grids contact comes and goes inside of single cells, which both must see."""
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(7, 1, POINTS // 2)
     nodes = POINTS * oversampling
-    line = line_of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
+    line = Line.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
     for depth in (0.01, 0.1, 0.5, 2.0, 6.0):
-        first = contact_before(line, 0.5 * depth - line.cells.top, 2 * deborah)
+        first, barriers = line.patches(0.5 * depth, 2 * deborah, np.empty(SUMS)), line.barriers(deborah)
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
         everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf))
-        work = workspace_for(line.track, nodes)
+        work = workspace_for(nodes, barriers)
         found = touch(Moment(line.track, first, history, LONG, deborah), everywhere, work)
         sums = np.empty(SUMS)
-        start, end = patches_at(line.cells, line.blocks, deborah, depth, sums)
+        start, end = patches_at(line.cells, line.blocks, *barriers_for(line.track), deborah, depth, sums)
         assert found == start.size
         assert np.allclose(work.start[:found], start, rtol=0, atol=1e-6)
         assert np.allclose(work.end[:found], end, rtol=0, atol=1e-6)

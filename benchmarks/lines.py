@@ -1,4 +1,4 @@
-"""Adversarial measured lines: families of samples that are hard for a solver of Fourier lines."""
+"""Adversarial measured lines: families of samples that are hard for a solver of Fourier lines; tests use them too."""
 
 import numpy as np
 

@@ -1,0 +1,71 @@
+"""Families that run into a plateau: intervals hold, are long where the curves do not tell, and nothing is refused."""
+
+import numpy as np
+import pytest
+from scipy.stats import t as student
+
+from benchmarks.superposition import PLATEAUS, plateau_family
+from mdr_dask.physics.superposition.master_curve import superpose
+
+
+def errors_and_widths(setting, seeds):
+    """Return errors of the factors and half widths of their intervals of 95 %, shape (families, factors)."""
+    errors, widths = [], []
+    for seed in seeds:
+        groups, curves, truth = plateau_family(*setting, seed)
+        found = superpose(groups, curves)
+        others = np.arange(truth.size) != truth.size // 2
+        errors.append((found.horizontal - truth)[others])
+        widths.append((student.ppf(0.975, found.freedom) * found.horizontal_error)[others])
+    return np.abs(errors), np.array(widths)
+
+
+@pytest.mark.parametrize("setting", PLATEAUS)
+def test_intervals_of_95_percent_hold_and_no_factor_lies_beyond_three_half_widths(setting):
+    """20 families, whose factors are wrong together: the share is known to 0.03."""
+    errors, widths = errors_and_widths(setting, range(5000, 5020))
+    assert np.mean(errors <= widths) >= 0.88
+    assert np.all(errors <= 3 * widths)
+
+
+def test_intervals_grow_along_a_plateau_and_the_order_of_the_curves_is_kept():
+    groups, curves, _ = plateau_family("decay", 15, 10, 0.02, 0.3, 1)
+    found = superpose(groups, curves)
+    assert np.all(np.diff(found.horizontal) > 0)
+    assert np.all(np.diff(found.horizontal_error[:6]) < 0)
+    assert found.horizontal_error[0] > 3 * found.horizontal_error[-1]
+
+
+def test_steps_that_the_curves_do_not_tell_are_named():
+    groups, curves, _ = plateau_family("decay", 15, 20, 0.005, 0.3, 1)
+    found = superpose(10 * groups, curves)
+    ((first, last),) = found.undetermined
+    assert first == 0
+    assert 40 <= last <= 60
+    assert found.usual[0] == pytest.approx(1.4, abs=0.1)
+    assert superpose(*plateau_family("sigmoid", 8, 20, 0.005, 0.5, 1)[:2]).undetermined == ()
+
+
+def test_flat_noisy_curves_are_answered_with_intervals_as_long_as_their_overlap():
+    """Nothing tells how far such curves lie apart, but that they overlap."""
+    random = np.random.default_rng(1)
+    x = np.linspace(-1, 1, 12)
+    found = superpose(np.arange(4.0), [(x, 1 + 0.01 * random.standard_normal(12)) for _ in range(4)], reference=0.0)
+    assert found.undetermined == ((0.0, 3.0),)
+    assert found.horizontal_error[-1] > 0.6
+
+
+def test_five_percent_of_scatter_is_no_reason_to_refuse():
+    for seed in range(10):
+        groups, curves, truth = plateau_family("steep", 15, 10, 0.05, 0.3, seed)
+        found = superpose(groups, curves)
+        assert np.all(np.abs(found.horizontal - truth) <= 6 * found.horizontal_error + 1e-12)
+
+
+def test_mirrored_curves_have_mirrored_factors():
+    groups, curves, _ = plateau_family("decay", 8, 20, 0.02, 0.3, 3)
+    found = superpose(groups, curves)
+    mirrored = superpose(groups, [(-x, y) for x, y in curves])
+    # the cells of the spline begin elsewhere
+    np.testing.assert_allclose(mirrored.horizontal, -found.horizontal, atol=0.15)
+    np.testing.assert_allclose(mirrored.horizontal_error, found.horizontal_error, rtol=0.3, atol=0.01)
