@@ -11,7 +11,7 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate
+from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate, jumps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def _early(data: xr.Dataset) -> xr.Dataset:
 
 def pick(groups: Mapping[str, xr.Dataset], outputs: Sequence[str], *varied: str) -> tuple[str, xr.Dataset, list[str]]:
     """Return the series that varies along most of some parameters, and which others there are."""
-    found = curves.with_outputs(groups, outputs)
+    found = curves.with_outputs(jumps(groups), outputs)
     rank = {
         name: [sum(data[key].size > 1 for key in varied if key in data.coords), data[outputs[0]].size]
         for name, data in found.items()
@@ -162,7 +162,7 @@ def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
     from mdr_dask.fit.kinetics import relaxation_curves
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"))
-    if "example" in groups:
+    if "example" in jumps(groups):
         name, data, told = pick({"example": groups["example"]}, (*OUTPUTS, "rms_slope"))
         told = ["series " + ", ".join(key for key in groups if key != "example")] if len(groups) > 1 else []
     data, more = _one_case(data)
