@@ -1,6 +1,6 @@
 """What grid and steps cost a velocity jump of the campaign in accuracy: ``python -m benchmarks.grid_kinetics``.
 
-Nine lines of 5000 points in a case, dv = 0.2 v_1, against oversampling 16 and 40 steps a decade.
+Nine lines of 5000 points in a case, dv = 0.2 v_1, against oversampling 16 and 40 steps per decade.
 """
 
 import numpy as np

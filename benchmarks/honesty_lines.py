@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.lines import FAMILIES, rough, samples
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Aim, Arms, Line, solve
+from mdr_dask.physics.sliding.problem import Aim, Arms, solve
 from mdr_dask.physics.sliding.steady import steady_sliding
-from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import waves_of
 
@@ -34,12 +34,12 @@ def kelvin_cases(family, cases, seed):
         waves = waves_of(height)
         fast = 10 ** random.uniform(-4, 1.5) / waves.rms_slope()
         deborah = fast if random.uniform() < 0.7 else 10 ** random.uniform(-8, 1)
-        yield height, Line(waves, None), np.array([deborah]), np.array([10 ** random.uniform(-6, 0.5)])
+        yield height, RoughLine(waves), np.array([deborah]), np.array([10 ** random.uniform(-6, 0.5)])
 
 
 def truth_of(line, deborah, load):
     nodes = FINEST * line.points
-    state = steady_sliding(periodic_line(line.heights(nodes), line.slopes(nodes)), deborah, load)
+    state = steady_sliding(line.cubic(nodes), deborah, load)
     assert state.status[0] == Outcome.CONVERGED
     return state
 
@@ -62,7 +62,7 @@ def general_cases(family, cases, seed):
         times = np.sort(10 ** random.uniform(-6, 3, number))
         arms = Arms(tuple(10 ** random.uniform(-2, 2, number)), tuple(times))
         dashpot = 10 ** random.uniform(-6, 0) if random.uniform() < 0.3 else 0.0
-        yield Line(waves, body), arms, np.array([dashpot]), np.array([load])
+        yield RoughLine(waves, body), arms, np.array([dashpot]), np.array([load])
 
 
 def ratios(found, exact):

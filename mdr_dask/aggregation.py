@@ -85,7 +85,7 @@ def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     for start in range(0, len(flat), step):
         rows = flat[start : start + step].T
         stack = bootstrap.means(rows[:count])
-        error = np.nan_to_num(rows[count:])
+        error = np.where(np.isnan(rows[count:]), 0.0, rows[count:])
         stack = np.concatenate([stack, stack[0] + error, stack[0] - error])
         number = np.isfinite(rows[:count]).sum(axis=0)
         bounds[start : start + step] = np.transpose(bootstrap.interval(stack, number))

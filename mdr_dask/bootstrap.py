@@ -55,8 +55,12 @@ def complete(values: FloatArray) -> FloatArray:
 
 
 def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
-    """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...)."""
-    flat = np.abs(np.where(np.isfinite(errors), errors, 0.0)).ravel()
+    """Return values moved up and down by errors, one group of neighbours after the other, shape (2 groups, ...).
+
+    An infinite error, which knows nothing of its value, moves it by its own size.
+    """
+    size = np.where(np.isinf(errors), values, errors)
+    flat = np.abs(np.where(np.isfinite(size), size, 0.0)).ravel()
     groups = np.array_split(np.arange(flat.size), max(1, min(GROUPS, flat.size)))
     shifts = np.zeros((2 * len(groups), flat.size))
     for k, group in enumerate(groups):
@@ -67,7 +71,7 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
 
 def _reach(shifts: FloatArray) -> FloatArray:
     """Return how far errors reach up together, from the shifts of every group up and down; NaN is none."""
-    known = np.where(np.isfinite(shifts), shifts, 0.0)
+    known = np.where(np.isnan(shifts), 0.0, shifts)
     reach: FloatArray = np.maximum(np.maximum(known[0::2], known[1::2]), 0.0).sum(axis=0)
     return reach
 

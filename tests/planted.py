@@ -12,7 +12,6 @@ import zarr
 
 from mdr_dask import campaign, plan, store
 from mdr_dask.models.base import Status
-from mdr_dask.models.fretting_wear import FrettingWear
 from mdr_dask.physics.sliding import laws
 
 LINE = """
@@ -37,7 +36,7 @@ model: ehl_line
 outputs: [central_film, minimum_film, film, pressure, traction_coefficient]
 parameters:
 """
-RULE = "wear_rule" if "wear_rule" in FrettingWear.model_fields else "method"
+RULE = "wear_rule"
 FRETTING = """
 model: fretting_wear
 outputs: [wear_volume, contact_radius, worn_profile, worn_image]

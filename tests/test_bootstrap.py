@@ -72,3 +72,11 @@ def test_a_law_that_holds_is_doubted_as_often_as_it_says(count: int) -> None:
     assert np.mean(np.array(found) < 0.05) < 0.07
     bent = bootstrap.means(values + 2 * x**2) @ left
     assert bootstrap.chance(bent, count) < 0.05
+
+
+def test_an_error_that_knows_nothing_is_not_left_out() -> None:
+    stack = bootstrap.means(np.random.default_rng(2).normal(2.0, 0.01, (9, 3)))
+    rows = bootstrap.moved(stack[0], np.array([0.0, np.inf, np.nan]))
+    low, high = bootstrap.interval(np.concatenate([stack, rows]), 9)
+    assert np.allclose((low[1], high[1]), (0.0, 4.0), atol=0.05)
+    assert np.all(high[[0, 2]] - low[[0, 2]] < 0.1)

@@ -71,7 +71,7 @@ CLAIMS = (
         "A Stribeck curve: boundary friction, a minimum, a rise",
         RUN.format("stribeck"),
         _stribeck,
-        "The load is shared between asperities and film.",
+        "Asperities and film share the load; at 800 N friction comes within 5 % below 1e-4 rpm only.",
     ),
     Claim("(5.1)", "Resistance of the contact", RUN.format("rolling2013_trace"), told(Verdict.HOLDS, "an output"), ""),
     Claim(

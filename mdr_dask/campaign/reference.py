@@ -32,7 +32,7 @@ model: sliding_friction
 seed: 2013
 realisations: 200                  # or {at_least: 20, at_most: 2000, until: {friction_coefficient: 1 %}}
 parameters:
-  length: 20 mm                    # a bare number is SI; a text carries its unit
+  length: 20 mm                    # a bare number is SI; or a string with a unit
   hurst: 0.7
   normal_force: {geometric: [1 mN, 100 N, 20]}
   velocity: {geometric: [1e-4, 1e2, 36]}

@@ -27,7 +27,7 @@ def cli() -> None:
 
     \b
     mdr-dask check campaigns/quickstart.yaml     is the file right, and what will it cost?
-    mdr-dask run campaigns/quickstart.yaml       run it, or whatever of it is not there yet
+    mdr-dask run campaigns/quickstart.yaml       run it, or what is missing of it
     mdr-dask show results/quickstart.zarr        look at results, while it runs too
     mdr-dask plot results/quickstart.zarr        draw the figures
 

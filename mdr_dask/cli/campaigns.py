@@ -110,7 +110,7 @@ def _costs(estimate: Estimate) -> dict[str, Any]:
 @click.argument("campaign", type=CAMPAIGN)
 @click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
 @click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one a core).")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one per core).")
 @click.option("--workers", type=click.IntRange(min=1), help="Start a local Dask cluster of so many processes.")
 @click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
 @click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
@@ -118,7 +118,7 @@ def _costs(estimate: Estimate) -> dict[str, Any]:
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
 def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options: Any) -> int:
-    """Run a campaign into its store, or whatever of it is not there yet.
+    """Run a campaign into its store: everything, or what is missing.
 
     Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
 

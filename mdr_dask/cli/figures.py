@@ -18,7 +18,7 @@ from mdr_dask.cli.writing import format_option
 @click.option("--quiet", is_flag=True, help="No progress on stderr.")
 @click.pass_context
 def figures(context: click.Context, /, campaigns: tuple[Path, ...], output: str, suffix: str, quiet: bool) -> int:
-    """Run campaigns, or what of them is not there yet, and draw every figure that their stores have the data for.
+    """Run campaigns, or what is missing of them, and draw every figure that their stores hold data for.
 
     \b
     mdr-dask figures campaigns/friction_force.yaml campaigns/friction_hurst.yaml -o figures

@@ -47,7 +47,7 @@ limit_option = click.option(
 @click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
 @json_option
 def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
-    """Say how far a store is, while it is being filled too.
+    """Show the progress of a store, during a run too.
 
     \b
     mdr-dask status results/quickstart.zarr

@@ -36,7 +36,7 @@ class Resources:
     Parameters
     ----------
     threads : int or None
-        Threads of this process; None for one a core.
+        Threads of this process; None for one per core.
     workers : int or None
         Processes of a local cluster instead.
     scheduler : str or None

@@ -1,4 +1,4 @@
-"""A run: round after round, whatever of a campaign is not in its store yet."""
+"""A run: round after round, until nothing of a campaign is missing in its store."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run(
     report: Callable[[Progress], None],
     retry_failed: bool = False,
 ) -> Progress:
-    """Run a campaign into a store, or whatever of it is not there yet.
+    """Run a campaign into a store: everything, or what is missing.
 
     Parameters
     ----------

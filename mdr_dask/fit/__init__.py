@@ -8,7 +8,16 @@ from importlib.metadata import entry_points
 from mdr_dask.fit.base import Fit
 
 #: Modules of this room that hold ``FITS``.
-SUBJECTS: tuple[str, ...] = ("ehl", "friction", "kinetics", "master_curve", "mixed", "wear")
+SUBJECTS: tuple[str, ...] = (
+    "ehl",
+    "friction",
+    "kinetic_courses",
+    "kinetics",
+    "master_curve",
+    "mixed",
+    "scaling",
+    "wear",
+)
 
 #: Entry point group in which other packages offer tuples of `Fit`.
 GROUP = "mdr_dask.fits"

@@ -50,27 +50,34 @@ def _require_kelvin(data: xr.Dataset) -> None:
         raise FitError(f"the laws hold for a Kelvin body on a generated line: the store has no {', '.join(missing)}")
 
 
-def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
-    """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return F_N / (G h L) and v tau slope / (sqrt 2 h)."""
     _require_kelvin(data)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
-    return data["friction_coefficient"] / slope, xr.DataArray(force), xr.DataArray(velocity)
+    return xr.DataArray(force), xr.DataArray(velocity)
 
 
-def _interval(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
+def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+    """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+    return data["friction_coefficient"] / spectral_slope(data), *loads_and_velocities(data)
+
+
+def constant(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
     """Return a constant and the ends of its interval."""
     low, high = bootstrap.interval(stack, count, positive)
     names = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
     return {key: xr.Variable((), value, {"units": "1", "long_name": long_name}) for key, value in names.items()}
 
 
-def _holds(sentence: str) -> Variables:
+def holds(sentence: str) -> Variables:
+    """Return the sentence that says whether a law holds."""
     return {"law_holds": xr.Variable((), sentence, LAW_HOLDS)}
 
 
-def _measure(name: str, value: float, long_name: str) -> Variables:
+def measure(name: str, value: float, long_name: str) -> Variables:
+    """Return a number without an interval."""
     return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
 
 
@@ -81,13 +88,32 @@ def _groups(value: xr.DataArray, inner: list[str]) -> Iterator[dict[str, Any]]:
         yield dict(zip(outer, index, strict=True))
 
 
-def _each(
-    series: Series, inner: Callable[[xr.Dataset], list[str]], fit: Callable[[xr.Dataset], Variables]
+def each(
+    series: Series,
+    inner: Callable[[xr.Dataset], list[str]],
+    fit: Callable[[xr.Dataset], Variables],
+    *outputs: str,
 ) -> xr.Dataset:
-    """Fit every point of the dimensions of a series that the fit does not use up."""
-    data = next(iter(series.values())).load()
-    parts = []
-    for where in _groups(data["friction_coefficient"], ["realisation", *inner(data)]):
+    """Fit every point of the dimensions of a series that the fit does not use up.
+
+    Parameters
+    ----------
+    series : mapping of str to Dataset
+        One series.
+    inner : callable
+        Returns the dimensions that the fit uses up.
+    fit : callable
+        Returns the variables of one point.
+    *outputs : str
+        Outputs that the fit needs; the coefficient of friction if none is named.
+    """
+    data = next(iter(series.values()))
+    needed = outputs or ("friction_coefficient",)
+    missing = [name for name in needed if name not in data]
+    if missing:
+        raise FitError(f"expected the outputs {', '.join(needed)} in the store, got none of {', '.join(missing)}")
+    data, parts = data.load(), []
+    for where in _groups(data[needed[0]], ["realisation", *inner(data)]):
         part = data.isel(where)
         point = {key: part.coords.get(key, index) for key, index in where.items()}
         parts.append(xr.Dataset(fit(part), coords=point).expand_dims(list(where)))
@@ -103,23 +129,24 @@ def _load_axes(data: xr.Dataset) -> list[str]:
     return _varying(data, "normal_force", "shear_modulus", "rms_roughness")
 
 
-def _zone_one_axes(data: xr.Dataset) -> list[str]:
+def zone_one_axes(data: xr.Dataset) -> list[str]:
+    """Return the dimensions along which loads and velocities vary."""
     return [*_load_axes(data), *_varying(data, "velocity", "relaxation_time")]
 
 
 class Table(NamedTuple):
-    """Friction over its scale and its error, shape (cases, realisations), and columns of numbers beside them."""
+    """An output over its scale and its error, shape (cases, realisations), and columns of numbers beside them."""
 
     friction: FloatArray
     error: FloatArray
     columns: tuple[FloatArray, ...]
 
     def stack(self, used: Any = slice(None)) -> FloatArray:
-        """Return the stack of the mean friction of some cases, with their errors."""
+        """Return the stack of the means of some cases, with their errors."""
         means = bootstrap.means(self.friction[used].T)
         if not np.any(self.error[used] > 0):
             return means
-        known = np.isfinite(self.error[used])
+        known = ~np.isnan(self.error[used])
         error = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
         return np.concatenate([means, bootstrap.moved(means[0], error)])
 
@@ -128,16 +155,18 @@ class Table(NamedTuple):
         return int(np.isfinite(self.friction[used]).sum(axis=1).min())
 
     def mean(self) -> FloatArray:
-        """Return the mean friction of every case; NaN where no realisation has any."""
+        """Return the mean of every case; NaN where no realisation has any."""
         mean: FloatArray = bootstrap.means(self.friction.T)[0]
         return mean
 
 
-def _table(data: xr.Dataset, scale: xr.DataArray, *columns: xr.DataArray) -> Table:
-    """Flatten the cases, realisations last."""
-    mu = data["friction_coefficient"]
-    error = companion(data, "friction_coefficient")
-    friction, errors, *others = xr.broadcast(mu / scale, (0 * mu if error is None else error) / scale, *columns)
+def table_of(
+    data: xr.Dataset, scale: xr.DataArray, *columns: xr.DataArray, output: str = "friction_coefficient"
+) -> Table:
+    """Flatten the cases of an output over a scale, realisations last."""
+    values = data[output]
+    error = companion(data, output)
+    friction, errors, *others = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
     cases = [dim for dim in friction.dims if dim != "realisation"]
     count = friction.sizes["realisation"]
     flat = [
@@ -157,8 +186,8 @@ def _region_one(rate: FloatArray) -> int | None:
 
 def _zone_one(data: xr.Dataset) -> Variables:
     """Fit log (mu / v) over log force in zone 1, at the low end of the velocities."""
-    _, forces, velocities = numbers(data)
-    table = _table(data, spectral_slope(data), forces, velocities)
+    forces, velocities = loads_and_velocities(data)
+    table = table_of(data, spectral_slope(data), forces, velocities)
     force, velocity = table.columns
     rate = table.mean() / (np.sqrt(2) * velocity)
     used = []
@@ -184,19 +213,19 @@ def _zone_one(data: xr.Dataset) -> Variables:
     alpha, offset = found.constants.T
     worst = f"F_N / (G h L) = {np.exp(x[np.argmax(np.abs(found.departures))]):.2g}"
     return {
-        **_interval("alpha", alpha, count, "exponent of the force in zone 1"),
-        **_measure("alpha_stated", laws.alpha(float(data["hurst"])), "H / (1 + H)"),
-        **_interval("beta", np.exp(offset), count, "factor of the law of zone 1", positive=True),
-        **_measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
-        **_measure("loads", len(used), "number of loads in zone 1"),
-        **_holds(law_holds(found.departures, found.chance, 2, worst)),
+        **constant("alpha", alpha, count, "exponent of the force in zone 1"),
+        **measure("alpha_stated", laws.alpha(float(data["hurst"])), "H / (1 + H)"),
+        **constant("beta", np.exp(offset), count, "factor of the law of zone 1", positive=True),
+        **measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
+        **measure("loads", len(used), "number of loads in zone 1"),
+        **holds(law_holds(found.departures, found.chance, 2, worst)),
     }
 
 
 def _plateau(data: xr.Dataset) -> Variables:
     """Return the top of a parabola through the points about the largest friction, over the logarithm of velocity."""
-    _, _, velocities = numbers(data)
-    table = _table(data, spectral_slope(data), velocities)
+    _, velocities = loads_and_velocities(data)
+    table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
     if velocity.size < 3:
@@ -210,21 +239,24 @@ def _plateau(data: xr.Dataset) -> Variables:
         if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
             continue
         break
-    smooth = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
-    errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    top = np.concatenate([top, errors]) + (smooth - top[0])
+    unbiased = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
+    if left.shape[1] > 3:
+        errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
+    else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest
+        errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
+    top = np.concatenate([top, errors]) + (unbiased - top[0])
     ends = bootstrap.interval(rise, count)
     verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])))
-    flat = x[stack[0] > (1 - FLAT) * smooth]
-    found = _interval("plateau", top, count, "largest friction coefficient over rms slope")
+    flat = x[stack[0] > (1 - FLAT) * stack[0].max()]
+    found = constant("plateau", top, count, "largest friction coefficient over rms slope")
     if verdict.startswith("no:"):
         found |= {f"plateau_{end}": xr.Variable((), np.nan, found["plateau"].attrs) for end in ("low", "high")}
     return {
         **found,
-        **_measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
-        **_measure("plateau_velocity", float(np.exp(at[0])), "v tau slope / (sqrt 2 h) of the largest friction"),
-        **_measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
-        **_holds(verdict),
+        **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
+        **measure("plateau_velocity", float(np.exp(at[0])), "v tau slope / (sqrt 2 h) of the largest friction"),
+        **measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
+        **holds(verdict),
     }
 
 
@@ -277,17 +309,26 @@ def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -
 
 
 def _least_squares(
-    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 30
+    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 40
 ) -> FloatArray:
-    """Fit the data of every row, shape (rows, points), by damped Gauss-Newton; return (rows, constants)."""
+    """Fit the data of every row, shape (rows, points), by Levenberg and Marquardt's steps; return (rows, constants)."""
+    size = np.eye(len(start))
     constants = np.tile(np.array(start), (data.shape[0], 1))
+    damping = np.full(data.shape[0], 1e-6)
+    value = model(constants)
+    cost = np.sum((data - value) ** 2, axis=1)
     for _ in range(steps):
-        value = model(constants)
-        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * np.eye(len(start))], axis=-1)
-        normal = np.swapaxes(jacobian, 1, 2) @ jacobian + 1e-12 * np.eye(len(start))
+        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
         gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
         step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
-        constants = constants + step
+        trial = model(constants + step)
+        cost_there = np.sum((data - trial) ** 2, axis=1)
+        better = cost_there <= cost
+        constants = np.where(better[:, None], constants + step, constants)
+        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
+        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
         if np.abs(step).max() < 1e-9:
             break
     return constants
@@ -298,12 +339,12 @@ def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
     away = np.abs(departures)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     return {
-        **_measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
-        **_measure(f"largest_error{suffix}", largest, f"largest error of the law over its plateau, {which}"),
+        **measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
+        **measure(f"largest_error{suffix}", largest, f"largest error of the law over its plateau, {which}"),
     }
 
 
-def _peak(velocity: FloatArray, mean: FloatArray) -> float:
+def peak_velocity(velocity: FloatArray, mean: FloatArray) -> float:
     """Return the velocity of the largest friction, where region IV begins."""
     order = np.argsort(velocity)
     return float(velocity[order][np.argmax(_smoothed(mean[order]))])
@@ -311,11 +352,11 @@ def _peak(velocity: FloatArray, mean: FloatArray) -> float:
 
 def _interpolation(data: xr.Dataset) -> Variables:
     """Fit alpha and beta of eq. 3.18 to regions I to III."""
-    _, forces, velocities = numbers(data)
-    table = _table(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
+    forces, velocities = loads_and_velocities(data)
+    table = table_of(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
     force, velocity = table.columns
     mean = np.nan_to_num(table.mean())
-    peak = {load: _peak(velocity[force == load], mean[force == load]) for load in np.unique(force)}
+    peak = {load: peak_velocity(velocity[force == load], mean[force == load]) for load in np.unique(force)}
     used = (force >= LAW_FROM) & (velocity <= np.array([peak[load] for load in force])) & (mean > 0)
     if np.count_nonzero(used) < 5:
         raise FitError(
@@ -336,13 +377,13 @@ def _interpolation(data: xr.Dataset) -> Variables:
     at = int(np.argmax(np.abs(found.departures)))
     worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
     return {
-        **_interval("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
-        **_measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
-        **_interval("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
+        **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
+        **measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
+        **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
         **_law_error(found.departures, "", "constants fitted"),
         **_law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
-        **_measure("cases", int(used.sum()), "number of cases fitted"),
-        **_holds(law_holds(found.departures, found.chance, 2, worst)),
+        **measure("cases", int(used.sum()), "number of cases fitted"),
+        **holds(law_holds(found.departures, found.chance, 2, worst)),
     }
 
 
@@ -399,11 +440,11 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 def _indenter(data: xr.Dataset) -> Variables:
     """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
     slope = spectral_slope(data)
-    table = _table(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
+    table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
     xi, within = table.columns
     known = (table.mean() > 0) & np.isfinite(xi) & (xi > 0)
     used = (within > 0) & known
-    measured = _measure("cases", int(used.sum()), "number of cases within the law")
+    measured = measure("cases", int(used.sum()), "number of cases within the law")
     if np.count_nonzero(used) < 3:
         errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
         names = ["exponent", "exponent_low", "exponent_high", *errors]
@@ -411,7 +452,7 @@ def _indenter(data: xr.Dataset) -> Variables:
             f"not tested: {used.sum()} of {known.sum()} cases within the law, three are needed; in the others the body"
             f" is steep against the roughness or barely pressed in, or the velocity lies beyond the largest friction"
         )
-        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | _holds(reason)
+        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason)
     xi, count = xi[used], table.count(used)
     logs = np.log(table.stack(used))
 
@@ -426,11 +467,11 @@ def _indenter(data: xr.Dataset) -> Variables:
     of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
     worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
     return {
-        **_interval("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
+        **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
         **_law_error(of_plateau, "", "exponent fitted"),
         **_law_error(np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "exponent 1.5"),
         **measured,
-        **_holds(law_holds(found.departures, found.chance, 1, worst)),
+        **holds(law_holds(found.departures, found.chance, 1, worst)),
     }
 
 
@@ -443,28 +484,28 @@ FITS: tuple[Fit, ...] = (
         "zone_one",
         MODELS,
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
-        lambda series: _each(series, _zone_one_axes, _zone_one),
+        lambda series: each(series, zone_one_axes, _zone_one),
         apart=True,
     ),
     Fit(
         "plateau",
         MODELS,
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
-        lambda series: _each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
+        lambda series: each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
         apart=True,
     ),
     Fit(
         "interpolation",
         MODELS,
         "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
-        lambda series: _each(series, _zone_one_axes, _interpolation),
+        lambda series: each(series, zone_one_axes, _interpolation),
         apart=True,
     ),
     Fit(
         "indenter",
         MODELS,
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
-        lambda series: _each(series, _indenter_axes, _indenter),
+        lambda series: each(series, _indenter_axes, _indenter),
         apart=True,
     ),
 )

@@ -75,7 +75,7 @@ class Cases:
         if error is None:
             return np.zeros_like(self.output(name)[:, 0])
         array = np.abs(self.output(str(error.name)))
-        known = np.isfinite(array)
+        known = ~np.isnan(array)
         mean: FloatArray = np.where(known, array, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
         return mean
 
@@ -127,8 +127,8 @@ class Cases:
 
         The trace stands on mu_2 and shares its error, which is therefore taken off.
         """
-        after = self.error(LEVELS[2])[:, None]
-        trace = np.maximum(self.error("friction_coefficient") - after, 0.0)
+        whole, after = self.error("friction_coefficient"), self.error(LEVELS[2])[:, None]
+        trace = np.where(np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(after), 0.0, after), 0.0))
         return np.concatenate([self.error(LEVELS[1])[:, None], trace], axis=1)
 
     def _like(self, value: xr.DataArray) -> xr.DataArray:

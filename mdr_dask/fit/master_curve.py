@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
-from mdr_dask.models.parts.tables import parse_table
 from mdr_dask.physics.superposition import laws as shift_laws
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
+from mdr_dask.tables import numbers, read_sheet
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
@@ -48,11 +49,12 @@ def read_table(path: str | Path) -> pd.DataFrame:
     DataError
         If there is no row of names, or an entry is not a number.
     """
-    parsed = parse_table(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
-    if not parsed.names:
+    sheet = read_sheet(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
+    if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
-    table = pd.DataFrame(parsed.values, columns=list(parsed.names))
-    table.attrs["units"] = dict(zip(parsed.names, parsed.units, strict=False))
+    names = [cell.text for cell in sheet.names]
+    table = pd.DataFrame(numbers(sheet), columns=names)
+    table.attrs["units"] = dict(zip(names, sheet.units, strict=True)) if any(sheet.units) else {}
     return table
 
 
@@ -306,47 +308,45 @@ def _dataset(
     result: superposition.Superposition, over: str, values: str, by: str, units: Mapping[str, str]
 ) -> xr.Dataset:
     size = result.groups.size
-    dataset = xr.Dataset(
-        coords={by: (by, result.groups, {"units": units.get(by, "")})},
-        attrs={
-            "abscissa": over,
-            "ordinate": values,
-            "group": by,
-            "reference": result.reference,
-            "noise": result.noise,
-            "freedom": result.freedom,
-        },
-    )
-    narrow, wide = (float(student.ppf(0.5 + share / 2, result.freedom)) for share in (SHARE_OF_BARS, CONFIDENCE))
+    attrs = {
+        "abscissa": over,
+        "ordinate": values,
+        "group": by,
+        "reference": result.reference,
+        "noise": result.noise,
+        "freedom": result.freedom,
+    }
+    found: dict[str, tuple[Any, ...]] = {}
+    narrow, wide = (float(stdtrit(result.freedom, 0.5 + share / 2)) for share in (SHARE_OF_BARS, CONFIDENCE))
     factors = {"shift_factor": (result.horizontal, result.horizontal_error)}
     factors["vertical_factor"] = (result.vertical, result.vertical_error)
     for name, (factor, error) in factors.items():
         meaning = f"decades added to log10 of {over if name == 'shift_factor' else values}"
-        dataset[name] = (by, factor, {"units": "1", "long_name": meaning})
-        dataset[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
-        dataset[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
-        dataset[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
-    dataset["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
-    dataset["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
-    dataset["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
-    dataset["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
-    dataset["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
+        found[name] = (by, factor, {"units": "1", "long_name": meaning})
+        found[f"{name}_error"] = (by, narrow * error, {"units": "1", "long_name": "half width of the 68 % interval"})
+        found[f"{name}_low"] = (by, factor - wide * error, {"units": "1"})
+        found[f"{name}_high"] = (by, factor + wide * error, {"units": "1"})
+    found["covariance"] = ((by, f"{by}_2"), result.covariance[:size, :size], {"units": "1"})
+    found["vertical_covariance"] = ((by, f"{by}_2"), result.covariance[size:, size:], {"units": "1"})
+    found["point_abscissa"] = ("point", 10**result.x, {"units": units.get(over, "")})
+    found["point_ordinate"] = ("point", 10**result.y, {"units": units.get(values, "")})
+    found["point_group"] = ("point", result.groups[result.member], {"units": units.get(by, "")})
     measured = {"measured_low": 10 ** result.measured[0], "measured_high": 10 ** result.measured[1]}
-    dataset["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
-    dataset["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
-    dataset["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
-    dataset["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
+    found["curve_abscissa"] = ("curve", 10**result.curve_x, {"units": units.get(over, ""), **measured})
+    found["curve_ordinate"] = ("curve", 10**result.curve_y, {"units": units.get(values, "")})
+    found["curve_error"] = ("curve", result.curve_error, {"units": "1", "long_name": "standard error, decades"})
+    found["curve_covariance"] = (("curve", "factor"), result.curve_cross, {"units": "1"})
     if result.draws.size:
         for name, drawn in (("shift_factor", result.draws[:, :size]), ("vertical_factor", result.draws[:, size:])):
             low, high = np.quantile(drawn, (0.5 - SHARE_OF_BARS / 2, 0.5 + SHARE_OF_BARS / 2), axis=0)
             about = {"units": "1", "long_name": "half width of 68 % of the bootstrap samples"}
-            dataset[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
-        dataset["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
-        dataset["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
-    return dataset
+            found[f"{name}_bootstrap"] = (by, (high - low) / 2, about)
+        found["draws"] = (("draw", by), result.draws[:, :size], {"units": "1"})
+        found["vertical_draws"] = (("draw", by), result.draws[:, size:], {"units": "1"})
+    return xr.Dataset(found, {by: (by, result.groups, {"units": units.get(by, "")})}, attrs)
 
 
-def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.DataArray]:
+def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.Variable]:
     """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
     size = result.groups.size
     covariance = result.covariance[:size, :size]
@@ -364,14 +364,14 @@ def _laws(result: superposition.Superposition, over: str, by: str, unit: str) ->
     return {name: value for law in fits for name, value in _constants(law).items()}
 
 
-def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.DataArray]:
+def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
     units = {"activation_energy": "J/mol", "c2": "K"}
     found = {}
     for key, (value, low, high) in law.constants.items():
         for suffix, number in (("", value), ("_low", low), ("_high", high)):
-            found[f"{law.name}_{key}{suffix}"] = xr.DataArray(number, attrs={"units": units.get(key, "1")})
+            found[f"{law.name}_{key}{suffix}"] = xr.Variable((), number, {"units": units.get(key, "1")})
     meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
-    found[f"{law.name}_residual"] = xr.DataArray(law.residual, attrs=meaning)
+    found[f"{law.name}_residual"] = xr.Variable((), law.residual, meaning)
     return found
 
 

@@ -263,6 +263,7 @@ def draw_starvation(groups: Mapping[str, xr.Dataset]) -> Figure:
             axes.set_xscale("symlog", linthresh=1)
             inlets = np.unique(np.concatenate([np.ravel(line.get_xdata()) for line in axes.lines if line.get_gid()]))
             shown = _apart(inlets)
+            axes.set_xlim(1.15 * inlets[0], 0.95 * inlets[-1])
             axes.set_xticks(shown, [f"{inlet:.3g}" for inlet in shown], fontsize="small", rotation=60)
     return figure
 

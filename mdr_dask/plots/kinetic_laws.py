@@ -33,10 +33,29 @@ def _constants(found: xr.Dataset, name: str) -> curves.Mean:
     return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
 
 
+def jumps(groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Return the series whose velocity jumps at once: the laws of a jump say nothing of other histories.
+
+    Raises
+    ------
+    DataError
+        If there is none.
+    """
+    found = {name: data for name, data in groups.items() if _is_jump(data)}
+    if not found:
+        raise DataError("expected a series with a jump of the velocity, got other histories: see the figure protocols")
+    return found
+
+
+def _is_jump(data: xr.Dataset) -> bool:
+    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
+    history = curves.parameters_of(data).get("protocol") or {}
+    return not varied and history.get("shape", "jump") == "jump"
+
+
 def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, xr.Dataset], list[str]]:
     """Return the series that varies along most of some parameters, those with most values, and which are left out."""
-    if not groups:
-        raise DataError("expected a store with at least one series, got none")
+    groups = jumps(groups)
 
     def rank(data: xr.Dataset) -> list[int]:
         sizes = [data[name].size if name in data.coords else 1 for name in varied]
@@ -157,6 +176,10 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
     series, told = _choose(groups, "velocity", "hurst")
     ((name, found),) = _fitted(series, "relaxation").items()
     powers = _powers(series)
+    if not well_known(np.ravel(found["rate_low"].values), np.ravel(found["rate_high"].values)).any():
+        raise DataError(
+            "expected a rate of relaxation known to a factor of 1.6, got none: more realisations are needed"
+        )
     figure, (axes,) = style.panels(1)
     left = 0
     for cases in by_hurst(found):

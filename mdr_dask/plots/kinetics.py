@@ -11,7 +11,7 @@ import xarray as xr
 from mdr_dask import aggregation
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate
+from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate, jumps
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,7 @@ def _early(data: xr.Dataset) -> xr.Dataset:
 
 def pick(groups: Mapping[str, xr.Dataset], outputs: Sequence[str], *varied: str) -> tuple[str, xr.Dataset, list[str]]:
     """Return the series that varies along most of some parameters, and which others there are."""
-    found = curves.with_outputs(groups, outputs)
+    found = curves.with_outputs(jumps(groups), outputs)
     rank = {
         name: [sum(data[key].size > 1 for key in varied if key in data.coords), data[outputs[0]].size]
         for name, data in found.items()
@@ -162,7 +162,7 @@ def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
     from mdr_dask.fit.kinetics import relaxation_curves
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"))
-    if "example" in groups:
+    if "example" in jumps(groups):
         name, data, told = pick({"example": groups["example"]}, (*OUTPUTS, "rms_slope"))
         told = ["series " + ", ".join(key for key in groups if key != "example")] if len(groups) > 1 else []
     data, more = _one_case(data)
@@ -216,7 +216,7 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
     from mdr_dask.fit.kinetic_cases import law_rate
-    from mdr_dask.fit.kinetics import LAW, jump_law
+    from mdr_dask.fit.kinetic_courses import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
     over = curves.along_dim(data, "velocity", BEFORE_JUMP)
@@ -234,11 +234,11 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         before, after = (float(aggregation.mean(case[part] / slope)) for part in (BEFORE_JUMP, AFTER))
         passing = float(case["velocity"] * case["relaxation_time"] * np.pi * case["points"] / case["length"])
         rate = float(law_rate(np.array(passing), np.array(float(case["hurst"]))))
-        jump = float(case["velocity_change"]) * float(jump_law(np.array(before), LAW))
         t = np.linspace(0, float(time[-1]), 400)
-        course = after + (before + jump - after) * np.exp(-rate * t)
+        change = float(case["velocity_change"])
+        course = relaxation_law(np.array([before]), np.array([after]), 1.0, change, rate, t)[0]
         error = np.sqrt(np.nanmean((np.interp(time[2:], t, course) - value.value.values[2:]) ** 2))
-        size = abs(after - before) + abs(jump)
+        size = abs(after - before) + abs(course[0] - before)
         axes.plot(t, course, "k--", lw=1, label="closed course")
         axes.set_title(
             f"{style.named('velocity', case['velocity'])}: rms {error / size:.1%} of the change", fontsize="small"

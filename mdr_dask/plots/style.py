@@ -23,7 +23,7 @@ MARKERS = ("o", "s", "^", "D")
 MOST_PANELS = 6
 #: Width and height of a panel in inches; characters of small print to an inch.
 PANEL = (6.4, 4.4)
-SMALL_PRINT = 15
+SMALL_PRINT = 12
 DPI = 150
 #: What data carry as their gid, so that they can be told from laws and guides.
 DATA, BAND = "data", "band"
@@ -48,7 +48,6 @@ QUANTITIES: Mapping[str, Quantity] = {
     "rotation_speed": Quantity("rotation speed", "rpm", 30 / np.pi),
     "temperature": Quantity("temperature", "°C", 1.0, -273.15),
     "shear_modulus": Quantity("shear modulus $G$", "MPa", 1e-6),
-    "modulus": Quantity("contact modulus $E^*$", "GPa", 1e-9),
     "contact_modulus": Quantity("contact modulus $E^*$", "GPa", 1e-9),
     "relaxation_time": Quantity(r"relaxation time $\tau$", "ms", 1e3),
     "hurst": Quantity("Hurst exponent $H$", ""),
@@ -71,7 +70,6 @@ QUANTITIES: Mapping[str, Quantity] = {
     "stick_radius": Quantity("stick radius $c/a_0$", ""),
     "cycles": Quantity("cycles", ""),
     "amplitude": Quantity("amplitude $U_0$", "µm", 1e6),
-    "load": Quantity("normal force $F_N$", "N"),
     "depth": Quantity("depth $d_0$", "µm", 1e6),
     "path": Quantity("sliding path", "m"),
     "friction": Quantity("coefficient of friction", ""),
@@ -132,7 +130,7 @@ def panels(count: int, columns: int = 3, size: tuple[float, float] = PANEL, **sh
 
 def title(figure: Figure, subject: str, *fixed: str) -> None:
     """Write the subject of a figure over it, and in small print what is held fixed and what bars mean."""
-    lines = [subject, *(line for text in fixed if text for line in _wrapped(figure, text))]
+    lines = [line for text in (subject, *fixed) if text for line in _wrapped(figure, text)]
     figure.suptitle("\n".join(lines), fontsize="medium")
 
 

@@ -22,8 +22,8 @@ RULE = "wear_rule"
 LINES = {"exact": "--", "fast": "-", "limit": ":"}
 #: What a title says of a case; rules and shapes come from the parameters of the series.
 CASE = (
-    *("shape", RULE, "hold", "stick_radius", "cycles", "xi", "curvature_radius", "angle", "modulus", "friction"),
-    *("amplitude", "load", "depth"),
+    *("shape", RULE, "hold", "stick_radius", "cycles", "xi", "indenter_radius", "indenter_angle", "contact_modulus"),
+    *("friction", "amplitude", "normal_force", "depth"),
 )
 PROFILES = (("worn_profile", "radius"), ("worn_image", "position"))
 
@@ -31,7 +31,8 @@ PROFILES = (("worn_profile", "radius"), ("worn_image", "position"))
 def _named_rules(data: xr.Dataset) -> xr.Dataset:
     """Return a series with its rule, shape and load condition as coordinates, where they are fixed."""
     parameters = curves.parameters_of(data)
-    words = {name: parameters.get(name) for name in (RULE, "shape", "hold")}
+    words = {name: parameters.get(name) for name in (RULE, "hold")}
+    words["shape"] = (parameters.get("indenter") or {}).get("shape") if "indenter" not in data.coords else None
     fixed = {name: word for name, word in words.items() if isinstance(word, str) and name not in data.coords}
     return data.assign_coords(fixed)
 
@@ -80,7 +81,7 @@ def _draw_limit(axes: Axes, groups: Mapping[str, xr.Dataset], data: xr.Dataset, 
         if output not in named or "limit" not in _rules(named) or not _alike(named, data):
             continue
         limit = named.isel({RULE: _rules(named).index("limit")}) if RULE in named.dims else named
-        keys = [key for key in ("stick_radius", "amplitude", "load", "depth") if key in limit.dims]
+        keys = [key for key in ("stick_radius", "amplitude", "normal_force", "depth") if key in limit.dims]
         limit = limit.sel({key: data[key] for key in keys if key in data.coords}, method="nearest")
         rest = [dim for dim in curves.axes_of(limit, output) if limit.sizes[dim] > 1 and dim != "cycles"]
         if any(not np.allclose(limit[key], data[key]) for key in keys if key in data.coords) or rest:
@@ -173,7 +174,7 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
     families, most = [], 1
     for axes, (name, data) in zip(panels, shown.items(), strict=True):
         along = found[name][1]
-        one = curves.family(data, "wear_volume", along, ("stick_radius", "load", "amplitude", RULE))
+        one = curves.family(data, "wear_volume", along, ("stick_radius", "normal_force", "amplitude", RULE))
         families.append(one)
         most = max(most, data.sizes["realisation"])
         told += [f"{name}: {each}" if name else each for each in one.left_out]
@@ -186,6 +187,8 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
         values = np.asarray(data[along].values, dtype=np.float64)
         if style.is_geometric(values):
             style.logarithmic(axes, "x")
+        if not dimensionless(data) and style.is_geometric(data["wear_volume"]):
+            style.logarithmic(axes, "y")
         curves.finish(figure, axes, one)
         own = curves.fixed_text(_without(one.held, ("cycles",)), CASE)
         axes.set_title("\n".join(part for part in (name, own) if part), fontsize="small", wrap=True)

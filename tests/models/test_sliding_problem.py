@@ -10,8 +10,9 @@ from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Aim, Arms, Line, solve
+from mdr_dask.physics.sliding.problem import Aim, Arms, solve
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.surfaces.waves import Waves
 
@@ -145,7 +146,7 @@ def test_a_new_shape_is_height_and_slopes(arms):
     numbers = np.array([0.02]), np.array([1.0])
     aim = Aim(accuracy=1e-3)
     cone, wedge, flat = (
-        solve(Line(Waves(line, 100), body), arms, *numbers, aim)[0]
+        solve(RoughLine(Waves(line, 100), body), arms, *numbers, aim)[0]
         for body in (PowerLaw(40.0, 1.0), Wedge(40.0, 0.0), Wedge(40.0, 0.125))
     )
     for column in ("drag", "depth", "contact_fraction", "contact_slope"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,14 +26,18 @@ class Turn:
     contact_points: NDArray[np.int32] | NDArray[np.int64]
     apart: int  # positions after which windows share no point
 
+    @cached_property
+    def _occupied(self) -> tuple[int, int]:
+        return breakthrough.occupied(self.contact_points)
+
     @property
     def probability(self) -> float:
         """Share of windows in intimate contact."""
-        return np.count_nonzero(self.contact_points) / self.contact_points.size
+        return self._occupied[0] / self.contact_points.size
 
     def contact_length(self, spacing: float) -> float:
         """Return the mean length in intimate contact in m, of points that far apart."""
-        return float(self.contact_points.sum(dtype=np.int64)) / self.contact_points.size * spacing
+        return self._occupied[1] / self.contact_points.size * spacing
 
 
 def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:

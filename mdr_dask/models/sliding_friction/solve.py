@@ -15,8 +15,9 @@ from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
-from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, Line, solve
+from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, solve
 from mdr_dask.physics.sliding.steady import Steady
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say
 NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
@@ -95,7 +96,7 @@ class _Group:
             )
             return 0
         try:
-            line = Line(roughness.waves(self.block.seed, realisation), self.setting.body)
+            line = RoughLine(roughness.waves(self.block.seed, realisation), self.setting.body)
             steady, errors = solve(line, self.setting.arms, self.deborah, self.loads, self.aim)
         except ValueError as problem:
             result.messages.update({(int(j), r): str(problem) for j in self.members})

@@ -17,7 +17,7 @@ from mdr_dask.models.parts.rough_line import Measured, Roughness
 from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
 from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
@@ -165,7 +165,7 @@ class _Marched(_Group):
             course,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
-        jumps = solve_jumps(Problem(Line(waves, None), loads, deborah), aim)
+        jumps = solve_jumps(Problem(RoughLine(waves), loads, deborah), aim)
         return self._of(jumps, loads, which), loads.size
 
     def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:

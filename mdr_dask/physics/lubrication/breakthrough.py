@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.compiling import compiled
 
 #: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
 #: testing every window by itself), judged whole and counted with its part inside (``clip``), judged and counted whole
@@ -120,8 +121,17 @@ class Clusters(NamedTuple):
         return self.total > self.limit * self.length.astype(np.float64) ** 3
 
 
-@njit(nogil=True, cache=True)
-def _scan(place, height, points, level, start, length, total, overlap):  # type: ignore[no-untyped-def]
+@compiled
+def _scan(
+    place: IntArray,
+    height: FloatArray,
+    points: int,
+    level: float,
+    start: IntArray,
+    length: IntArray,
+    total: FloatArray,
+    overlap: FloatArray,
+) -> int:
     """Fill the clusters of excursions in the order of their starts; return their number."""
     first = 0
     while first < place.size and (place[first - 1] + 1) % points == place[first]:
@@ -161,8 +171,8 @@ def find_clusters(above: Excursions, level: float, spacing: float, strength: flo
     return Clusters(start[:n], length[:n], total[:n], overlap, strength * spacing**2, points)
 
 
-@njit(nogil=True, cache=True)
-def _block(jumps, begin, count, value):  # type: ignore[no-untyped-def]
+@compiled
+def _block(jumps: NDArray[np.int32], begin: int, count: int, value: int) -> None:
     """Add `value` to `count` positions of the circle from `begin` on, as jumps."""
     points = jumps.size - 1
     begin %= points
@@ -175,7 +185,9 @@ def _block(jumps, begin, count, value):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True, cache=True)
-def _add_parts(overlap, limit, window, start, always, judged, jumps):  # type: ignore[no-untyped-def]
+def _add_parts(
+    overlap: FloatArray, limit: float, window: int, start: int, always: bool, judged: bool, jumps: NDArray[np.int32]
+) -> None:
     """Add what the window's edges leave of a cluster: heads, middles (where it is longer than the window), tails.
 
     A part counts if it breaks by itself where parts are `judged`, else if the cluster does (`always`).
@@ -201,7 +213,17 @@ def _add_parts(overlap, limit, window, start, always, judged, jumps):  # type: i
 
 
 @njit(nogil=True, cache=True)
-def _collect(start, length, total, overlap, limit, window, rule, jumps, trace):  # type: ignore[no-untyped-def]
+def _collect(
+    start: IntArray,
+    length: IntArray,
+    total: FloatArray,
+    overlap: FloatArray,
+    limit: float,
+    window: int,
+    rule: int,
+    jumps: NDArray[np.int32],
+    trace: NDArray[np.int32],
+) -> None:
     """Gather the jumps of the trace cluster by cluster, then sum them up."""
     points = trace.size
     offset = 0
@@ -246,8 +268,10 @@ def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArr
     return trace
 
 
-@njit(nogil=True, cache=True)
-def _beyond(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped-def]
+@compiled
+def _beyond(
+    line_1: FloatArray, line_2: FloatArray, level: float, p: int, q: int, step: int, most: int
+) -> tuple[int, float]:
     """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
     points = line_1.size
     n = 0
@@ -261,8 +285,8 @@ def _beyond(line_1, line_2, level, p, q, step, most):  # type: ignore[no-untyped
     return n, total
 
 
-@njit(nogil=True, cache=True)
-def _fill(line_1, line_2, level, p, q, overlap):  # type: ignore[no-untyped-def]
+@compiled
+def _fill(line_1: FloatArray, line_2: FloatArray, level: float, p: int, q: int, overlap: FloatArray) -> None:
     """Fill the overlaps of the window that stands at (p, q)."""
     points = line_1.size
     for k in range(overlap.size):
@@ -271,8 +295,18 @@ def _fill(line_1, line_2, level, p, q, overlap):  # type: ignore[no-untyped-def]
         q = q + 1 if q + 1 < points else 0
 
 
-@njit(nogil=True, cache=True)
-def _windows(line_1, line_2, level, limit, first_1, first_2, rule, overlap, contact):  # type: ignore[no-untyped-def]
+@compiled
+def _windows(
+    line_1: FloatArray,
+    line_2: FloatArray,
+    level: float,
+    limit: float,
+    first_1: IntArray,
+    first_2: IntArray,
+    rule: int,
+    overlap: FloatArray,
+    contact: IntArray,
+) -> None:
     """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` the workspace of a window."""
     points, window = line_1.size, overlap.size
     for w in range(first_1.size):
@@ -357,6 +391,16 @@ def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tup
     ways = np.asarray(way, dtype=np.float64)
     first, second = (np.round(ways * (1 + sign * slide_roll_ratio / 2)).astype(np.int64) % points for sign in (1, -1))
     return first, second
+
+
+@compiled
+def occupied(contact_points: NDArray[np.int32] | IntArray) -> tuple[int, int]:
+    """Return the number of windows in contact, and the sum of their points in contact, in one pass."""
+    windows, points = 0, 0
+    for number in contact_points:
+        windows += number > 0
+        points += number
+    return windows, points
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:

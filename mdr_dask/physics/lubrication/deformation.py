@@ -11,16 +11,17 @@ import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _second_integral(x: float) -> float:
     """Return the function whose second derivative is ``ln|x|``."""
     square = x * x
     return 0.0 if square == 0.0 else 0.25 * square * (log(square) - 3.0)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
     """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
     left = _second_integral(point - nodes[0])

@@ -27,6 +27,8 @@ _LEAST_LOGARITHM = -256.0
 _BALANCE = 100.0
 #: Distance of the means of two lines in rms heights at which there is no room left in double precision.
 _CLOSED = -37.0
+#: Greatest number of Newton steps to a distance; five are usual.
+_MOST_STEPS = 100
 #: Distance beyond which lines do not overlap in double precision.
 _APART = 9.0
 
@@ -40,10 +42,18 @@ def distance_of_means(room: float) -> float:
     """Return the distance d of the means, in rms heights, at which ``<(d - z)+>`` is the room given."""
     if room > _APART:
         return room
-    # the room at d is the overlap at -d, and never less than d
+    # the room at d is the overlap at -d; its logarithm is concave in d, so Newton comes from the left without fail
     if mean_overlap(-_CLOSED) >= room:
         return _CLOSED
-    return float(brentq(lambda d: log(mean_overlap(-d) / room), _CLOSED, room * (1 + 1e-12), xtol=1e-13))
+    middle = mean_overlap(0.0)
+    distance = room if room > middle else max(-sqrt(2 * log(middle / room)), _CLOSED)
+    for _ in range(_MOST_STEPS):
+        left = mean_overlap(-distance)
+        step = 2 * left / erfc(-distance / sqrt(2)) * log(left / room)
+        distance -= step
+        if abs(step) < 1e-13 * (1 + abs(distance)):
+            break
+    return distance
 
 
 class Asperities(NamedTuple):

@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
@@ -100,7 +101,7 @@ class Liquid(NamedTuple):
     density_saturation: float
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def log_viscosity(P: float, liquid: Liquid) -> tuple[float, float]:
     """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
     if liquid.exponent == 0.0:
@@ -119,7 +120,7 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     return result
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
     """Return the mean of 1/eta between two log-viscosities, exact for an exponential law, and its two derivatives."""
     rise = right - left
@@ -134,7 +135,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
     return scale * mean, -scale * (mean + slope), scale * slope
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of nodes f-1, f, f+1 for the value at the face between f and f+1, flow to the right."""
     if f == 0:
@@ -149,7 +150,7 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     return w0, 1.0 - w0 - w2, w2
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def balance(
     nodes: FloatArray,
     liquid: Liquid,
@@ -201,7 +202,7 @@ def balance(
             derivative[g, 2] -= d2
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
@@ -215,7 +216,7 @@ def _fill_jacobian_row(
             row[i - 2 + k] += by_pressure[i, k]
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill_active(
     influence: FloatArray,
     P: FloatArray,

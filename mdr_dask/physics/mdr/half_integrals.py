@@ -55,7 +55,7 @@ class Panels:
     barycentric: FloatArray
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def graded_panels(left: int, right: int, order: int) -> Panels:
     """Return panels that halve towards both ends.
 
@@ -116,21 +116,22 @@ def _add_panel(
     weights[members] += (high - low) * weight @ series @ to_series
     own = members[nodes[members] > low]
     derivative[np.ix_(own, members)] = legendre.legvander((nodes[own] - middle) * scale, size - 2) @ to_slope
-    for row, z in enumerate(nodes):
-        if z > low:
-            first, last = np.sqrt(max(z - min(high, z), 0.0)), np.sqrt(z - low)
-            step = first + (last - first) * abscissa
-            basis = legendre.legvander((z - step**2 - middle) * scale, size - 1) @ to_series
-            inner[row, members] += 2.0 / np.pi * (last - first) * weight @ basis
-            begin, end = np.arcsin(np.sqrt(low / z)), np.arcsin(np.sqrt(min(high, z) / z))
-            angle = begin + (end - begin) * many
-            basis = legendre.legvander((z * np.sin(angle) ** 2 - middle) * scale, size - 1) @ to_series
-            full[row, members] += 2.0 / np.pi * (end - begin) * heavy @ basis
-        if z < high:
-            first, last = np.sqrt(max(low, z) - z), np.sqrt(high - z)
-            step = first + (last - first) * abscissa
-            slope = legendre.legvander((z + step**2 - middle) * scale, size - 2) @ to_slope
-            outer[row, members] += 2.0 / np.pi * (last - first) * weight @ slope
+    rows = np.flatnonzero(nodes > low)
+    z = nodes[rows, None]
+    first, last = np.sqrt(np.maximum(z - high, 0.0)), np.sqrt(z - low)
+    step = first + (last - first) * abscissa
+    basis = legendre.legvander((z - step**2 - middle) * scale, size - 1) @ to_series
+    inner[np.ix_(rows, members)] += 2.0 / np.pi * (last - first) * np.einsum("k,rkm->rm", weight, basis)
+    begin, end = np.arcsin(np.sqrt(low / z)), np.arcsin(np.sqrt(np.minimum(high, z) / z))
+    angle = begin + (end - begin) * many
+    basis = legendre.legvander((z * np.sin(angle) ** 2 - middle) * scale, size - 1) @ to_series
+    full[np.ix_(rows, members)] += 2.0 / np.pi * (end - begin) * np.einsum("k,rkm->rm", heavy, basis)
+    rows = np.flatnonzero(nodes < high)
+    z = nodes[rows, None]
+    first, last = np.sqrt(np.maximum(low - z, 0.0)), np.sqrt(high - z)
+    step = first + (last - first) * abscissa
+    slope = legendre.legvander((z + step**2 - middle) * scale, size - 2) @ to_slope
+    outer[np.ix_(rows, members)] += 2.0 / np.pi * (last - first) * np.einsum("k,rkm->rm", weight, slope)
 
 
 def interpolate(panels: Panels, values: FloatArray, places: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.steady import Scheme, Steady
-from mdr_dask.physics.surfaces.cubic_line import indented_line, periodic_line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import Shape
 
 
@@ -52,24 +52,6 @@ class Settings(NamedTuple):
 
 
 SETTINGS = Settings()
-
-
-class Line(Protocol):
-    """A rough line that can be put on any grid, in units of its length and rms height."""
-
-    @property
-    def points(self) -> int:
-        """Number of Nyquist points."""
-
-    @property
-    def body(self) -> Shape | None:
-        """What is under the roughness; None for a plane."""
-
-    def heights(self, nodes: int) -> FloatArray:
-        """Return the roughness at equidistant nodes of one period."""
-
-    def slopes(self, nodes: int) -> FloatArray:
-        """Return its derivative by position, over the length of the line."""
 
 
 class Errors(NamedTuple):
@@ -110,7 +92,7 @@ class Ladder:
 
     Parameters
     ----------
-    line : Line
+    line : RoughLine
         The line.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
         Cubic cells, straight cells, or the papers' time steps.
@@ -120,7 +102,7 @@ class Ladder:
         The columns of a `Steady` that are wanted: what an accuracy is asked of.
     """
 
-    line: Line
+    line: RoughLine
     scheme: Scheme
     deborah: FloatArray
     loads: FloatArray
@@ -174,8 +156,7 @@ class Ladder:
         height, slope = nodes
         scheme = scheme or self.scheme
         slopes = slope if scheme == "hermite" else None
-        body = self.line.body
-        line = periodic_line(height, slopes) if body is None else indented_line(height, slopes, body)
+        line = self.line.through(height, slopes)
         if scheme == "backward_euler":
             contact = not {"contact_fraction", "contact_slope"}.isdisjoint(self.columns)
             return sliding.stepped_sliding(line, self.deborah, self.loads, contact)

@@ -19,35 +19,13 @@ from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, relative
 from mdr_dask.physics.sliding.steady import Scheme, Steady, unsolved, valid
 from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.solids import prony
-from mdr_dask.physics.surfaces.cubic_line import indented_line, periodic_line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
-from mdr_dask.physics.surfaces.shapes import PowerLaw, Shape, smooth
-from mdr_dask.physics.surfaces.waves import Waves
+from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 COARSEST, FINEST = 4, 256  # points for every Nyquist point that `auto` begins and ends with for a general solid
 CELLS = 4  # the general solver compares grids of every, every second and every fourth node
 CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
-
-
-@dataclass(frozen=True)
-class Line:
-    """Roughness over what is under it, in units of the length of the line and of one height."""
-
-    roughness: Waves
-    body: Shape | None
-
-    @property
-    def points(self) -> int:
-        """Number of Nyquist points."""
-        return self.roughness.points
-
-    def heights(self, nodes: int) -> FloatArray:
-        """Return the roughness at equidistant nodes of one period."""
-        return self.roughness.heights(nodes)
-
-    def slopes(self, nodes: int) -> FloatArray:
-        """Return its derivative by position."""
-        return self.roughness.slopes(nodes)
 
 
 @dataclass(frozen=True)
@@ -83,12 +61,14 @@ class Aim:
     with_errors: bool = True
 
 
-def solve(line: Line, arms: Arms | None, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
+def solve(
+    line: RoughLine, arms: Arms | None, deborah: FloatArray, loads: FloatArray, aim: Aim
+) -> tuple[Steady, Errors]:
     """Return the steady states of a solid that slides over a line, and their absolute discretisation errors.
 
     Parameters
     ----------
-    line : Line
+    line : RoughLine
         What it slides over.
     arms : Arms or None
         Of the solid; None for a Kelvin solid.
@@ -112,7 +92,7 @@ def solve(line: Line, arms: Arms | None, deborah: FloatArray, loads: FloatArray,
     return ladder.on_grid(aim.oversampling), Errors.unknown(loads.size)
 
 
-def _general(line: Line, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
+def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
     """Solve cases of any linear solid one by one, each on the coarsest grid that meets the accuracy."""
     steady, errors = unsolved(loads.size), Errors.unknown(loads.size)
     for k in np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)):
@@ -120,9 +100,7 @@ def _general(line: Line, arms: Arms, deborah: FloatArray, loads: FloatArray, aim
         oversampling = COARSEST if aim.oversampling == "auto" else aim.oversampling
         while True:
             nodes = -(-line.points * oversampling // CELLS) * CELLS
-            heights = line.heights(nodes)
-            cells = periodic_line(heights, None) if line.body is None else indented_line(heights, None, line.body)
-            found = steady_viscoelastic_sliding(cells, solid, float(loads[k]))
+            found = steady_viscoelastic_sliding(line.straight(nodes), solid, float(loads[k]))
             one = _columns(found.values[:, None], np.array([found.status], np.int8))
             known = Errors(*found.errors[:, None])
             met = np.all(relative(one, known, aim.columns) <= aim.accuracy)

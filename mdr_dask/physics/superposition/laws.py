@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
@@ -18,6 +18,9 @@ from mdr_dask.physics.solids import GAS_CONSTANT
 CONFIDENCE = 0.95
 ITERATIONS, CONVERGED = 40, 1e-12
 """Gauss-Newton steps at most, and the change of the sum of squares, relative to itself, at which they end."""
+
+RIDGE = 1e-12
+"""Added to the precision of the constants, relative to it, so that a step is finite where they cannot be told apart."""
 
 STRAIGHTEST = 1e-5
 """Span of the temperatures over c2, below which factors are as good as linear in temperature."""
@@ -103,10 +106,14 @@ def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatA
     fitted = _fit("wlf", law, guess, log_factors, covariance)
     slope, bend = float(fitted.constants[0]), float(np.clip(fitted.constants[1], *bounds))
     c1, c2 = slope / bend, 1 / bend
+    if bend == bounds[0]:  # as good as linear: neither constant has an end above
+        least = 1 / min(bend + fitted.quantile * float(np.sqrt(fitted.covariance[1, 1])), bounds[1])
+        first, last = sorted([slope * least, float(np.copysign(np.inf, slope))])
+        constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
+        return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
     change = np.array([[1 / bend, -slope / bend**2], [0.0, -1 / (bend**2 * (c2 - lowest))]])
     half = fitted.quantile * np.sqrt(np.diag(change @ fitted.covariance @ change.T))
-    spread = np.exp(np.clip([-half[1], half[1]], -700, 700)) if bend > bounds[0] else np.array([0.0, np.inf])
-    ends = lowest + (c2 - lowest) * spread
+    ends = lowest + (c2 - lowest) * np.exp(np.clip([-half[1], half[1]], -700, 700))
     constants = {"c1": (c1, c1 - float(half[0]), c1 + float(half[0])), "c2": (c2, float(ends[0]), float(ends[1]))}
     return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
 
@@ -151,12 +158,12 @@ def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance
         return squares / freedom - 1
 
     scatter, largest = 0.0, float(np.std(factors))
-    if excess(0.0) > 0:
-        ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
-        scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-4)))
+    ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
+    if excess(0.0) > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
+        scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-3)))
     best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
     residual = float(np.sqrt(np.mean((law(best)[0] - factors) ** 2)))
-    quantile = float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
+    quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
     return _Fitted(best, np.asarray(np.linalg.pinv(precision), dtype=np.float64), quantile, residual, scatter)
 
 
@@ -178,7 +185,10 @@ def _solved(
     rows, miss, squares = at(constants)
     for _ in range(ITERATIONS):
         weighed = rows / variances[:, None]
-        step = np.linalg.lstsq(rows / np.sqrt(variances)[:, None], -miss / np.sqrt(variances), rcond=None)[0]
+        precision = rows.T @ weighed
+        scale = np.sqrt(np.diag(precision)) + 1e-300
+        relative = precision / np.outer(scale, scale) + RIDGE * np.eye(scale.size)
+        step = -np.linalg.solve(relative, weighed.T @ miss / scale) / scale
         share, before = 1.0, squares
         while share > 1e-4:
             proposal = at(constants + share * step)

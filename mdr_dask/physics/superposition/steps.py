@@ -32,15 +32,15 @@ from mdr_dask.physics.superposition.problem import Common, Problem
 class Settings(NamedTuple):
     """Numbers of the scan; `python -m benchmarks.superposition` shows what they do."""
 
-    scatters: tuple[float, float, int] = (0.04, 1.0, 9)
+    scatters: tuple[float, float, int] = (0.04, 1.0, 7)
     """Least, largest and number of the scatters considered of steps about their mean, in widths of a curve."""
-    means: int = 41
+    means: int = 25
     """Number of common means considered."""
     margin: float = 0.15
     """Widths of a curve by which they reach beyond the steps themselves."""
     noisy: float = 0.4
     """Power of the likelihood of a step that the curves do not tell."""
-    coarse: int = 49
+    coarse: int = 37
     """Places of a step between the ends where its neighbours cease to overlap."""
     unlikely: float = 12.0
     """Logarithm of a likelihood, below the largest, that no scan needs to visit."""

@@ -1,5 +1,5 @@
 """Lines that an elastomer slides over: where they come from and how they run between their nodes.
 
 Read `waves` (the common form of any roughness), `roughness` (generated lines), `measured` (recorded lines), `shapes`
-(indenters) and `cubic_line` (the line that the solvers take).
+(indenters), `rough_line` (roughness over an indenter or a plane) and `cubic_line` (the line that the solvers take).
 """

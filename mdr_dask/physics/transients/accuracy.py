@@ -8,16 +8,15 @@ friction itself.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.ends import Ends, ends_on
-from mdr_dask.physics.transients.ends import Line as Prepared
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.transients.ends import Ends, Line, ends_on
 from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jumps
 
 
@@ -58,33 +57,19 @@ class Settings(NamedTuple):
 SETTINGS = Settings()
 
 
-class Line(Protocol):
-    """A rough line that can be put on any grid, in units of its length and rms height."""
-
-    @property
-    def points(self) -> int:
-        """Number of Nyquist points."""
-
-    def heights(self, nodes: int) -> FloatArray:
-        """Return the roughness at equidistant nodes of one period."""
-
-    def slopes(self, nodes: int) -> FloatArray:
-        """Return its derivative by position, over the length of the line."""
-
-
 class Problem(NamedTuple):
     """Jumps on one line without dimensions.
 
     Parameters
     ----------
-    line : Line
+    line : RoughLine
     loads : array, shape (cases,)
         F_N / (4 G L h).
     deborah : array, shape (cases, 2)
         v_1 tau / L and v_2 tau / L.
     """
 
-    line: Line
+    line: RoughLine
     loads: FloatArray
     deborah: FloatArray
 
@@ -92,10 +77,9 @@ class Problem(NamedTuple):
         """Return some of the cases."""
         return self._replace(loads=self.loads[cases], deborah=self.deborah[cases])
 
-    def on(self, oversampling: int) -> Prepared:
+    def on(self, oversampling: int) -> Line:
         """Return the line with so many nodes for every Nyquist point."""
-        nodes = self.line.points * oversampling
-        return Prepared.of(periodic_line(self.line.heights(nodes), self.line.slopes(nodes)))
+        return Line.of(self.line.cubic(self.line.points * oversampling))
 
 
 class Aim(NamedTuple):

@@ -72,7 +72,10 @@ def exact(
     wanted = sorted({float(amount) for amount in amounts})
     resolution = forced_resolution(accuracy) if solve is forced_contacts else Resolution(accuracy)
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
-    judged = {amount: replace(found[amount], rougher=tuple(one[amount] for one in rougher)) for amount in wanted}
+    judged = {
+        amount: replace(one, rougher=tuple(other[amount] for other in rougher), slowness=resolution.slowness)
+        for amount, one in found.items()
+    }
     return [judged[float(amount)] for amount in amounts]
 
 
@@ -87,18 +90,32 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
         return limit(profile, stick_radius)
     resolution = forced_resolution(accuracy)
     found, *rougher = _solutions(lambda one: forced_end(profile, stick_radius, one), resolution, errors)
-    return replace(found, rougher=tuple(rougher))
+    return replace(found, rougher=tuple(rougher), slowness=resolution.slowness)
 
 
 def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:
-    """Solve at a resolution, and twice rougher; a rougher way that cannot be gone is gone in shorter steps."""
-    found = [solve(resolution)]
+    """Solve at a resolution, and twice rougher; one rougher solution is enough where the other cannot be found."""
+    found = [_first_of(solve, (resolution, resolution.finer(2.0), resolution.finer(4.0)))]
+    reasons = []
     for rough in resolution.rougher() if errors else ():
         try:
-            found.append(solve(rough))
-        except NotConvergedError:
-            found.append(solve(rough.halfway_to(resolution)))
+            between = rough.halfway_to(resolution)
+            found.append(_first_of(solve, (rough, between, between._replace(fewer=max(rough.fewer - 1, 0)))))
+        except NotConvergedError as reason:
+            reasons.append(reason)
+    if len(reasons) > 1:
+        raise NotConvergedError(f"the error of the worn contact is not known: {reasons[0]}")
     return found
+
+
+def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) -> Found:
+    """Solve at the first resolution at which the evolution can be advanced."""
+    for way in ways[:-1]:
+        try:
+            return solve(way)
+        except NotConvergedError:
+            continue
+    return solve(ways[-1])
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
@@ -130,7 +147,7 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
     def height(radius: FloatArray) -> FloatArray:
         result, z = profile.height(radius), place(radius)
         scar = (z > 0.0) & (z < 1.0)
-        result[scar] += np.sqrt(z[scar]) * interpolate(panels, rooted, z[scar])
+        result[scar] += np.sqrt(z[scar]) * np.maximum(interpolate(panels, rooted, z[scar]), 0.0)
         return result
 
     def nodal(values: FloatArray, x: FloatArray) -> FloatArray:

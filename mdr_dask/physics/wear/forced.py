@@ -48,6 +48,8 @@ class Settings(NamedTuple):
         Accuracy beyond which steps do not follow the border.
     rougher : tuple of float
         How much wider the accuracy of the two rougher solutions is.
+    slowness : float
+        How much more slowly than usual the error falls from them.
     """
 
     jump: float = 0.1
@@ -57,6 +59,7 @@ class Settings(NamedTuple):
     torn: float = 1e-2
     coarsest: float = 1e-3
     rougher: tuple[float, float] = (2.0, 4.0)
+    slowness: float = 2.0
 
 
 SETTINGS = Settings()
@@ -95,7 +98,7 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
 
 def forced_resolution(accuracy: float) -> Resolution:
     """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
-    return Resolution(min(accuracy, SETTINGS.coarsest), rough=SETTINGS.rougher)
+    return Resolution(min(accuracy, SETTINGS.coarsest), rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:

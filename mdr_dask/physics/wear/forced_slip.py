@@ -95,7 +95,7 @@ class ForcedSlip:
     def holds(self, unknowns: FloatArray) -> bool:
         """Tell whether unknowns describe a contact."""
         _, width, _, border = self.split(unknowns)
-        return width > 0.0 and border > -0.5
+        return width > 0.0 and self.virgin.virgin_width * border > -0.5 * self.virgin.inner_radius**2
 
     def places(self, unknowns: FloatArray) -> FloatArray:
         """Return the squared radii of the nodes, counted from c^2."""

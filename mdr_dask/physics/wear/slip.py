@@ -180,7 +180,7 @@ def partial_slip(profile: Profile, stick_radius: float, panels: Panels, reach: f
     c = stick_radius
     eta = float(profile.rise(np.array(1.0 - c), c))
     smallest = 0.5 * panels.nodes[0] * (1.0 - c) * (1.0 + c)
-    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 600)
+    table = np.linspace(np.log(smallest), np.log((reach - c) * (reach + c)), 300)
     step = table[1] - table[0]
     r = np.sqrt(c * c + np.exp(table))
     abscissa, weight = gauss(40)

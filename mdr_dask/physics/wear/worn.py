@@ -28,8 +28,9 @@ class Settings(NamedTuple):
 
     Parameters
     ----------
-    safety : float
-        Error over the distance from rougher solutions.
+    safety, edges : float
+        Error over the distance from rougher solutions; of the radii of scar and stick zone, which are the least
+        determined quantities.
     second : float
         Share of the distance from the second one, which counts where the first is close by chance.
     reach : int
@@ -38,7 +39,8 @@ class Settings(NamedTuple):
         Share of the largest distance that counts everywhere.
     """
 
-    safety: float = 2.5
+    safety: float = 1.5
+    edges: float = 2.5
     second: float = 0.5
     reach: int = 5
     floor: float = 0.02
@@ -69,6 +71,8 @@ class Worn:
         Time steps taken.
     rougher : tuple of Worn
         Two rougher solutions of the same contact, which tell its error.
+    slowness : float
+        How much more slowly than usual the error falls from the rougher solutions to this one.
     relative_error : float
         Error of every output over its largest value, where there is no rougher solution.
     """
@@ -85,6 +89,7 @@ class Worn:
     energy_volume: float = np.nan
     steps: int = 0
     rougher: tuple[Worn, ...] = ()
+    slowness: float = 1.0
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
@@ -122,7 +127,8 @@ class Worn:
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
         weighted = [gap * (SETTINGS.second if number else 1.0) for number, gap in enumerate(gaps)]
-        return np.asarray(SETTINGS.safety * np.max(weighted, axis=0))
+        safety = SETTINGS.edges if output in ("contact_radius", "stick_border") else SETTINGS.safety
+        return np.asarray(safety * self.slowness * np.max(weighted, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
         """Return places that crowd at the borders of stick and contact."""

@@ -6,9 +6,9 @@ from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.accuracy import COLUMNS, Ladder, relative
 from mdr_dask.physics.sliding.nodes import nodes, refine, weights
-from mdr_dask.physics.sliding.problem import Line
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 
 POINTS, MODES = 400, 200
@@ -110,7 +110,7 @@ def test_a_line_that_does_not_divide_by_the_blocks():
 
 def random_line(generator, points, hurst):
     share = 0.5 * roughness.amplitudes(points // 2, hurst)
-    return Line(Waves(share * np.exp(2j * np.pi * generator.uniform(size=points // 2)), points), None)
+    return RoughLine(Waves(share * np.exp(2j * np.pi * generator.uniform(size=points // 2)), points), None)
 
 
 def truth(surface, deborah, loads, oversampling=128):
@@ -156,7 +156,7 @@ def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
     # all grids agreed on friction 23 % too small, and 4 % too large
     deborah, loads = np.array([velocity * 1e-3 / 0.02]), np.array([force / (4 * 1e7 * 0.02 * 0.5e-6)])
     turned = roughness.turns(31337, 0, points // 2)
-    surface = Line(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * turned, points), None)
+    surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * turned, points), None)
     exact = truth(surface, deborah, loads)
     for accuracy in (0.05, 0.01, 0.002):
         steady, errors = Ladder(surface, "hermite", deborah, loads, COLUMNS).to_accuracy(accuracy)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from mdr_dask.errors import DataError, FitError
@@ -236,3 +237,38 @@ def test_vertical_factors_of_many_kinds_of_tables_have_finite_bars():
         result = superpose(np.arange(curves), [(x, y - away) for x, y in table], vertical=True)
         assert np.all(np.isfinite(result.covariance))
         assert np.count_nonzero(result.vertical_error) == curves - 1
+
+
+@pytest.mark.parametrize("c2", [35.0, 51.6, 300.0])
+@pytest.mark.parametrize("scatter", [1e-3, 0.2])
+def test_wlf_is_that_of_a_general_least_squares(c2, scatter):
+    """Beside scipy with finite differences, at the scatter that the fit found."""
+    random, kelvins = np.random.default_rng(3), np.linspace(280, 350, 10)
+    distance = kelvins - kelvins[4]
+    noise = np.where(distance == 0, 0.0, scatter * random.standard_normal(10))
+    factors, known = -9 * distance / (c2 + distance) + noise, distance != 0
+    law = fit_wlf(kelvins, factors, np.diag(known * 0.01**2), kelvins[4])
+    width = np.hypot(0.01, law.scatter)
+    found = least_squares(
+        lambda c: (-c[0] * distance / (c[1] + distance) - factors)[known] / width,
+        [9.0, c2],
+        x_scale=[1, 10],
+        xtol=1e-14,
+    )
+    assert law.constants["c1"][0] == pytest.approx(found.x[0], rel=1e-4)
+    assert law.constants["c2"][0] == pytest.approx(found.x[1], rel=1e-4)
+    if law.scatter:
+        assert 2 * found.cost == pytest.approx(7, rel=5e-3)
+    half = student.ppf(0.975, 7) * np.sqrt(np.linalg.inv(found.jac.T @ found.jac)[0, 0])
+    assert law.constants["c1"][2] - law.constants["c1"][0] == pytest.approx(half, rel=1e-2)
+
+
+def test_wlf_of_factors_linear_in_temperature_has_no_upper_end_of_c2():
+    kelvins = np.linspace(280, 350, 10)
+    factors = -0.1 * (kelvins - 280) - 1e-5 * (kelvins - 280) ** 2  # bent a little the other way
+    law = fit_wlf(kelvins, factors, np.diag(np.r_[0.0, np.full(9, 0.02**2)]), 280.0)
+    for name in ("c1", "c2"):
+        value, low, high = law.constants[name]
+        assert 10 < low < value < high == np.inf
+    assert law.constants["c1"][1] / law.constants["c2"][1] == pytest.approx(0.1, rel=0.02)
+    assert law.residual < 0.03

@@ -63,7 +63,7 @@ def test_the_evolution_converges_with_the_panels():
     errors = [np.max(np.abs(f - profiles[-1])) for f in profiles[:-1]]
     assert errors == sorted(errors, reverse=True)
     assert errors[0] > 50 * errors[-1]
-    assert errors[-1] < 5e-6
+    assert errors[-1] < 6e-6
 
 
 def test_energy_is_volume_and_force_falls(checked):

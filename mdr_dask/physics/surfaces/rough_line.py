@@ -1,0 +1,51 @@
+"""Roughness over what is under it: the line that problems are stated on, before it is put on a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
+from mdr_dask.physics.surfaces.shapes import Shape
+from mdr_dask.physics.surfaces.waves import Waves
+
+
+@dataclass(frozen=True)
+class RoughLine:
+    """A rough line, in units of its length and of one height.
+
+    Parameters
+    ----------
+    roughness : Waves
+        What it is rough by.
+    body : Shape or None
+        What is under the roughness; None for a plane, whose line is periodic.
+    """
+
+    roughness: Waves
+    body: Shape | None = None
+
+    @property
+    def points(self) -> int:
+        """Number of Nyquist points."""
+        return self.roughness.points
+
+    def heights(self, nodes: int) -> FloatArray:
+        """Return the roughness at equidistant nodes of one period."""
+        return self.roughness.heights(nodes)
+
+    def slopes(self, nodes: int) -> FloatArray:
+        """Return its derivative by position, over the length of the line."""
+        return self.roughness.slopes(nodes)
+
+    def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
+        """Return the line of cubic cells through heights and slopes of the roughness; straight cells without slopes."""
+        return periodic_line(height, slope) if self.body is None else indented_line(height, slope, self.body)
+
+    def cubic(self, nodes: int) -> CubicLine:
+        """Return the line of cubic cells on a grid."""
+        return self.through(self.heights(nodes), self.slopes(nodes))
+
+    def straight(self, nodes: int) -> CubicLine:
+        """Return the line of straight cells on a grid."""
+        return self.through(self.heights(nodes), None)

@@ -1,0 +1,111 @@
+"""Stated errors of worn contacts against finer solutions, and little wear against its first order in closed form."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.mdr.transforms import power_pressure
+from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.history import LoadBlock, history
+from mdr_dask.physics.wear.rules import limit_radius
+
+PLACES = np.linspace(0.0, 1.6, 161)
+
+
+@pytest.fixture(scope="module")
+def cases():
+    """Random bodies, stick radii and cycles, few cycles among them, with what a far finer solution says."""
+    rng = np.random.default_rng(20)
+    found = []
+    for number in range(18):
+        n = float(np.exp(rng.uniform(np.log(0.5), np.log(6.0))))
+        c = float(rng.uniform(0.05, 0.97)) if number % 6 else 1.0 - 10.0 ** float(rng.uniform(-6.0, -2.0))
+        cycles = sorted((10.0 ** rng.uniform(-4.0, 1.2, 5)).tolist())
+        profile = PowerProfile(n)
+        reach = limit_radius(profile, c)
+        radii = c + (1.02 * reach - c) * np.sin(0.5 * np.pi * np.arange(1, 80) / 80.0) ** 3
+        found.append((profile, c, cycles, radii, exact(profile, c, cycles, 1.2e-5, errors=False)))
+    return found
+
+
+@pytest.mark.parametrize("accuracy", [1e-1, 1e-2, 1e-3, 1e-4])
+def test_stated_errors_hold_at_every_accuracy(cases, accuracy):
+    """With the estimate of before, from one run that shared panels and first steps, 62, 3, 98 and 68 % held."""
+    held, missed = [], []
+    for profile, c, cycles, radii, truth in cases:
+        eta = float(profile.rise(np.array(1.0 - c), c))
+        for worn, true in zip(exact(profile, c, cycles, accuracy), truth, strict=True):
+            error = np.abs(worn.height(radii) - true.height(radii))
+            stated = worn.error("worn_profile", radii)
+            numbers = ("wear_volume", "contact_radius", "normal_force", "worn_depth")
+            apart = [abs(getattr(worn, name) - getattr(true, name)) for name in numbers]
+            within = [gap <= worn.error(name, radii) + 1e-14 for name, gap in zip(numbers, apart, strict=True)]
+            held.append([np.max(error) <= np.max(stated), np.mean(error <= stated + 1e-15), *within])
+            missed.append(np.max(error) > 1.5 * accuracy * eta)
+    shares = np.mean(np.array(held, dtype=float), axis=0)
+    print(accuracy, shares)
+    assert np.all(shares >= 0.95)
+    assert np.mean(missed) <= 0.05
+
+
+@pytest.mark.parametrize("accuracy", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.222), (1.37, 0.8), (4.608, 0.1109), (1.0, 0.5), (2.0, 0.999)])
+def test_little_wear_is_of_the_first_order(exponent, c, accuracy):
+    """To first order f - f0 = N p0 s0 of the virgin contact; it was up to 45 % off below N = 1e-4."""
+    profile, eta = PowerProfile(exponent), -np.expm1(exponent * np.log(c))
+    radii = c + (1.0 - c) * np.array([0.1, 0.4, 0.7, 0.9])
+
+    def slip(r):
+        angle = np.arctan2(np.sqrt((r - c) * (r + c)), c)
+        term = lambda t: float(profile.rise(np.array(2 * r * np.sin((angle + t) / 2) * np.sin((angle - t) / 2)), c))  # noqa: E731
+        return 2.0 / np.pi * quad(term, 0.0, angle)[0]
+
+    first = power_pressure(exponent, radii, 1.0) * np.array([slip(r) for r in radii]) / eta
+    cycles = np.sqrt((1.0 - c) * (1.0 + c)) * np.array([1e-6, 1e-5, 1e-4])  # in the time in which the contact changes
+    for n, worn in zip(cycles, exact(profile, c, cycles, accuracy, errors=False), strict=True):
+        np.testing.assert_allclose((worn.height(radii) - profile.height(radii)) / n, first, rtol=0.02, atol=2e-16 / n)
+
+
+def test_few_cycles_of_the_review_state_their_error():
+    """Errors of 1.2e-6 and 2.5e-4 were stated as 7.2e-9 and 3.7e-6."""
+    for exponent, c, cycles in ((1.37, 0.8, 0.004905), (4.608, 0.1109, 0.05509)):
+        profile = PowerProfile(exponent)
+        rough, fine = (exact(profile, c, [cycles], accuracy)[0] for accuracy in (1e-2, 2e-5))
+        gap = np.abs(rough.height(PLACES) - fine.height(PLACES))
+        assert np.max(gap) <= np.max(rough.error("worn_profile", PLACES)) <= 1e-2
+        assert np.max(fine.error("worn_profile", PLACES)) < np.max(rough.error("worn_profile", PLACES))
+
+
+def test_the_estimate_under_constant_force_falls_with_the_accuracy():
+    """It grew from 4.9e-3 to 1.3e-2 at N = 8 when the accuracy went from 1e-3 to 1e-4."""
+    cycles = [0.5, 2.0, 8.0]
+    rough, fine = (exact(PowerProfile(2.0), 0.455, cycles, one, constant_force=True) for one in (1e-3, 1e-4))
+    for coarse, close in zip(rough, fine, strict=True):
+        for name in ("worn_profile", "wear_volume", "stick_border"):
+            stated = [np.max(worn.error(name, PLACES)) for worn in (coarse, close)]
+            gap = np.max(np.abs(coarse.value(name, PLACES) - close.value(name, PLACES)))
+            assert gap <= stated[0]
+            assert stated[1] < stated[0] or name == "wear_volume"  # which agrees by chance now and then
+
+
+@pytest.mark.parametrize("hold", ["depth", "force"])
+@pytest.mark.parametrize(("exponent", "c"), [(2.0, 0.455), (1.0, 0.4), (3.0, 0.6)])
+def test_estimates_of_histories_hold_before_and_after_the_image_jumps(exponent, c, hold):
+    """Half of the cells were the only judge, and told a quarter of the error at N = 8."""
+    profile, eta, force = PowerProfile(exponent), 1.0 - c**exponent, 2.0 * exponent / (exponent + 1.0)
+    kept = {"depth": 1.0} if hold == "depth" else {"force": force}
+    blocks = [LoadBlock(cycles, eta, **kept) for cycles in (0.3, 1.7, 6.0)]
+    truth = exact(profile, c, [0.3, 2.0, 8.0], 2e-4, constant_force=hold == "force", errors=False)
+    for worn, true in zip(history(profile, blocks, cells=80), truth, strict=True):
+        gap = np.abs(worn.height(PLACES) - true.height(PLACES))
+        assert np.max(gap) <= np.max(worn.error("worn_profile", PLACES))
+        assert np.mean(gap <= worn.error("worn_profile", PLACES)) > 0.95
+
+
+def test_errors_are_nowhere_beyond_the_scar_and_nan_where_there_is_no_value():
+    worn = exact(PowerProfile(2.0), 0.455, [1.0], 1e-3)[0]
+    assert np.all(worn.error("worn_profile", PLACES)[PLACES > 1.2] == 0.0)
+    slid = exact(PowerProfile(2.0), 0.0, [1.0], 1e-3)[0]
+    beyond = slid.contact_radius < PLACES
+    assert np.all(np.isnan(slid.error("worn_image", PLACES)[beyond]))
