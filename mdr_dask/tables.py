@@ -209,6 +209,29 @@ def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
     return Sheet(source, *_units(headings, width), tuple(rows))
 
 
+def numbers(sheet: Sheet) -> FloatArray:
+    """Return the entries of a table as they are written, whatever their units, shape (rows, columns).
+
+    NaN where an entry is empty.
+
+    Raises
+    ------
+    TableError
+        If an entry is no number.
+    """
+    problems = [
+        cell.problem(f"expected a number, got {cell.text[:60]!r}")
+        for row in sheet.rows
+        for cell in row
+        if not _NUMBER.match(cell.text) and cell.text.lower() not in _MISSING
+    ]
+    if problems:
+        raise TableError(sheet.source, problems)
+    return np.array(
+        [[float(cell.text) if _NUMBER.match(cell.text) else math.nan for cell in row] for row in sheet.rows]
+    )
+
+
 def _are_units(row: tuple[Cell, ...], numeric: bool) -> bool:
     """Return whether a row holds units: any words in a table of numbers, only known ones in one with words."""
     units = [cell.text.strip("[]() ") for cell in row]

@@ -33,7 +33,7 @@ def test_a_table_is_shifted_kept_drawn_and_referenced_anew(tmp_path, capsys):
     [
         ("normal_force,velocity\n1,2\n", "name them by --over, --of and --by"),
         ("force,mu,velocity\n1,0.5,1\n2,0.4,1\n", "two or more values of 'velocity', got one value"),
-        ("normal_force,velocity,mu\n1,2,high\n", ":2: expected 3 numbers"),
+        ("normal_force,velocity,mu\n1,2,high\n", ":2:5: expected a number, got 'high'"),
     ],
 )
 def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, content, message):

@@ -15,10 +15,10 @@ from scipy.special import stdtrit
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.base import Fit
-from mdr_dask.models.parts.tables import parse_table
 from mdr_dask.physics.superposition import laws as shift_laws
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
+from mdr_dask.tables import numbers, read_sheet
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
@@ -49,11 +49,12 @@ def read_table(path: str | Path) -> pd.DataFrame:
     DataError
         If there is no row of names, or an entry is not a number.
     """
-    parsed = parse_table(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
-    if not parsed.names:
+    sheet = read_sheet(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
+    if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
-    table = pd.DataFrame(parsed.values, columns=list(parsed.names))
-    table.attrs["units"] = dict(zip(parsed.names, parsed.units, strict=False))
+    names = [cell.text for cell in sheet.names]
+    table = pd.DataFrame(numbers(sheet), columns=names)
+    table.attrs["units"] = dict(zip(names, sheet.units, strict=True)) if any(sheet.units) else {}
     return table
 
 

@@ -353,7 +353,8 @@ def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
     bars = curves.meaning_of_bars(*found.values(), outputs=GROWTH)
     names = [name for name in found for _ in GROWTH]
     subject = r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load"
-    _titles(figure, panels, names, families, subject, bars)
+    grown = _said("contact_growth", "exponent", "exponent of the contact length", found)
+    _titles(figure, panels, names, families, subject, "; ".join(part for part in (bars, grown) if part))
     style.leave_out(figure, told)
     return figure
 
@@ -412,8 +413,26 @@ def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
     figure.colorbar(drawn, ax=axes, label=by)
     style.legend(axes)
     spread = f"{int(known.sum())} cases; half of them deviate from the law by less than {_half(off):.0%}"
-    style.title(figure, "collapse of friction on the scales of eq. 3.23", spread)
+    shifted = _said("collapse", "collapsed", "share of the spread that free shifts take away", found)
+    style.title(figure, "collapse of friction on the scales of eq. 3.23", spread, shifted)
     return figure
+
+
+def _said(name: str, constant: str, what: str, found: Mapping[str, xr.Dataset]) -> str:
+    """Return the range of a constant of the fit of the same name, and where its law holds; nothing without a fit."""
+    from mdr_dask.fit import available
+
+    try:
+        known = {key: data for key, data in found.items() if _has_hurst(data)}
+        fits = curves.results(available(MODELS[0])[name].compute, known)
+    except (FitError, DataError):
+        return ""
+    values = np.concatenate([np.ravel(each[constant].values) for each in fits.values()])
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return ""
+    ends = f"{values.min():.3g}" if values.size == 1 else f"{values.min():.3g} to {values.max():.3g}"
+    return f"fit {name}: {what} {ends}; {curves.verdict(fits.values())}"
 
 
 def _half(ratio: Any) -> float:

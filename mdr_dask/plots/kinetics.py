@@ -216,7 +216,7 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
     from mdr_dask.fit.kinetic_cases import law_rate
-    from mdr_dask.fit.kinetics import LAW, jump_law
+    from mdr_dask.fit.kinetic_courses import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
     over = curves.along_dim(data, "velocity", BEFORE_JUMP)
@@ -234,11 +234,11 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         before, after = (float(aggregation.mean(case[part] / slope)) for part in (BEFORE_JUMP, AFTER))
         passing = float(case["velocity"] * case["relaxation_time"] * np.pi * case["points"] / case["length"])
         rate = float(law_rate(np.array(passing), np.array(float(case["hurst"]))))
-        jump = float(case["velocity_change"]) * float(jump_law(np.array(before), LAW))
         t = np.linspace(0, float(time[-1]), 400)
-        course = after + (before + jump - after) * np.exp(-rate * t)
+        change = float(case["velocity_change"])
+        course = relaxation_law(np.array([before]), np.array([after]), 1.0, change, rate, t)[0]
         error = np.sqrt(np.nanmean((np.interp(time[2:], t, course) - value.value.values[2:]) ** 2))
-        size = abs(after - before) + abs(jump)
+        size = abs(after - before) + abs(course[0] - before)
         axes.plot(t, course, "k--", lw=1, label="closed course")
         axes.set_title(
             f"{style.named('velocity', case['velocity'])}: rms {error / size:.1%} of the change", fontsize="small"

@@ -130,11 +130,11 @@ def test_a_reference_between_velocities_follows_their_logarithm():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "expected rows of numbers, got none"),
-        ("a,b\n", "expected rows of numbers, got only names"),
+        ("", "expected a line of names and at least one line of values"),
+        ("a,b\n", "expected a line of names and at least one line of values"),
         ("1,2\n3,4\n", "expected names of columns, got numbers"),
-        ("a,b\n1,2\n3,x\n", "table.csv:3: expected 2 numbers"),
-        ("a,b\n1,2\n3\n", "table.csv:3: expected 2 numbers"),
+        ("a,b\n1,2\n3,x\n", "table.csv:3:3: expected a number, got 'x'"),
+        ("a,b\n1,2\n3\n", "table.csv:3:1: expected 2 values as in line 1, got 1"),
     ],
 )
 def test_tables_that_cannot_be_read(tmp_path, text, message):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Blocks, blocks_of, patches_at
 from mdr_dask.physics.sliding.steady import steady_on_cells
@@ -131,10 +132,14 @@ def ends_on(line: Line, loads: FloatArray, deborah: FloatArray, near: Ends | Non
     touching = np.full(loads.size, None, dtype=object)
     good = np.flatnonzero(outcome == Outcome.CONVERGED)
     if good.size:
-        n = line.track.cells
+        n, sums = line.track.cells, np.empty(SWEEP_SUMS)
         for k in good:
             before, after = deborah[k] * n
-            first = touching[k] = line.patches(depth[k, 0] + line.cells.top, before, np.empty(SWEEP_SUMS))
+            # at the depth itself: the search for it ends nearby, where other cells may be in contact as a whole
+            first = touching[k] = line.patches(depth[k, 0] + line.cells.top, before, sums)
+            drag[k, 0] = sums[SWEEP_DRAG]
+            line.patches(depth[k, 1] + line.cells.top, after, sums)
+            drag[k, 1] = sums[SWEEP_DRAG]
             found = _release(line.track, first, line.barriers(after), after, loads[k] * n)
             at[k], rate[k], tilt[k], outcome[k] = found
     return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, outcome)

@@ -21,7 +21,7 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET = 3e-4  # of a cell: a last Newton step that is not checked
+MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 

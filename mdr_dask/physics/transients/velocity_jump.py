@@ -36,8 +36,9 @@ class Settings(NamedTuple):
         Of depth and drag, where the march ends, at 24 steps a decade.
     share : float
         Of the accuracy: how near to its end friction is left.
-    long, stray : float
-        Relaxation times after which friction has come so near to its end, of all its changes.
+    long, stray, leap : float
+        Relaxation times after which friction has come so near to its end, of all its changes, or of itself: it leaps
+        where a cell comes to touch as a whole, whose slope is summed otherwise than that of parts of cells.
     margin : float
         Of the change of depth, by which a depth may leave its ends.
     widenings : int
@@ -54,6 +55,7 @@ class Settings(NamedTuple):
     share: float = 0.1
     long: float = 15.0
     stray: float = 0.02
+    leap: float = 1e-5
     margin: float = 0.25
     widenings: int = 3
     moments: int = 3000
@@ -279,7 +281,8 @@ class _Relaxation(NamedTuple):
         if outcome == LEFT_LIMITS:
             return None
         time, depth, _, drag = (column[:count] for column in found)
-        strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > SETTINGS.stray * np.ptp(drag)
+        near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
+        strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
         ends = np.array([self.after, self.depth[1]])

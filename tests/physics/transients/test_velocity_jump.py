@@ -48,7 +48,7 @@ def test_ends_in_the_direct_steady_state(change: float) -> None:
     height, slope = line()
     steady = on_line(height, slope, np.array([REACH, REACH * (1 + change)]), np.full(2, LOAD))
     assert found.outcome == Outcome.CONVERGED
-    assert np.allclose([found.before, found.after], steady.drag, rtol=1e-12)
+    assert np.allclose([found.before, found.after], steady.drag, rtol=1e-6)
     assert found.depth[-1] == pytest.approx(steady.depth[1], rel=1e-9)
     relaxing = np.abs(found.trace - found.after)
     # exp(-20), and the last secant step of each moment
