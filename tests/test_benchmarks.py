@@ -17,7 +17,7 @@ def benchmark_script(monkeypatch):
 
 def test_error_estimates_beyond_cubic_cells_on_planes_are_honest(benchmark_script):
     """95 % of 500 cases are asked for and were measured; of 60 the part scatters by 3 %."""
-    script = benchmark_script("honesty_bodies")
+    script = benchmark_script("friction.honesty_bodies")
     judged = dict(script.indenters(60, 3, (0.01,))) | dict(script.schemes(60, 3, (0.01,)))
     judged |= dict(script.materials(60, 3, (4, 16))) | dict(script.measured(60, 3, (4,)))
     assert len(judged) == 25
@@ -28,7 +28,7 @@ def test_error_estimates_beyond_cubic_cells_on_planes_are_honest(benchmark_scrip
 
 
 def test_a_campaign_finds_grid_and_lines_for_its_accuracy(benchmark_script, tmp_path):
-    script = benchmark_script("work_precision_campaign")
+    script = benchmark_script("friction.campaigns")
     scene = "typical: transition"
     truth, lines, _ = script.run(tmp_path, scene, "hermite", 4, 40, 1)
     assert truth.shape == (4, 4)

@@ -1,4 +1,4 @@
-"""The thesis, claim by claim: our figure for each, and the verdict; ``python -m benchmarks.thesis [LINES]``."""
+"""The thesis, claim by claim: our figure for each, and the verdict; ``python -m benchmarks thesis page [LINES]``."""
 
 from benchmarks.thesis import chapter_2, chapter_3, chapter_4, chapter_5, chapter_6
 from benchmarks.thesis.ledger import Claim, Studies, Verdict, page

@@ -145,7 +145,7 @@ CLAIMS = (
     Claim(
         "(2.20)",
         "C1D = pi q C2D keeps rms height and the full gradient",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _rule,
         "An identity of the integrals; chapters 3 to 5 stand on it. A measured scan is not this line: its slope is "
         "smaller by the square root of two.",
@@ -153,14 +153,14 @@ CLAIMS = (
     Claim(
         "(2.25)",
         "rms height from the integral of the spectrum",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _continuum("height"),
         "The sum over harmonics is not its integral, since the first harmonics carry the height.",
     ),
     Claim(
         "(2.26), (2.27)",
         "rms slope from the integral of the spectrum",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _continuum("slope"),
         "The short waves carry the slope, and there are many of them; near H = 1 the lower limit counts.",
     ),

@@ -221,7 +221,7 @@ CLAIMS = (
     Claim(
         "(3.16)",
         "The sqrt 2 comes from exponentially distributed slopes",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _gaussian,
         "Slopes of these lines are normally distributed; that the plateau is near sqrt 2 has another reason: the "
         "slopes in contact are not those of the whole line.",
@@ -271,14 +271,14 @@ CLAIMS = (
     Claim(
         "3.3.4",
         "At 40 N the contact is as wide as the layer is thick",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _layer,
         "By F = (2/3) G D^3/R; the kink at 40 N needs a model of the layer.",
     ),
     Claim(
         "3.3.4",
         "The rubber warms by 0.06 K at 100 N and 1 cm/s",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _heating,
         "0.04 mm is the depth at 1 N. For a sphere the factor is 4/3 in place of 2.",
     ),

@@ -63,14 +63,14 @@ CLAIMS = (
     Claim(
         "6.4.2, 6.5",
         "The fast rule is 600 times faster",
-        "python -m benchmarks.work_precision_wear",
+        "python -m benchmarks wear work_precision",
         told(Verdict.WITHIN, "8 times at 100 nodes, 570 at 1600"),
         "It depends on the grid; error against time is the fair figure.",
     ),
     Claim(
         "(6.16)",
         "a(c) of the parabola, in closed form",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         _printed,
         "An approximation; the exact equation is solved here.",
     ),
@@ -84,7 +84,7 @@ CLAIMS = (
     Claim(
         "fig. 6.2",
         "c = 0.455 belongs to the amplitudes of its panels",
-        "python -m benchmarks.thesis",
+        "python -m benchmarks thesis page",
         told(Verdict.FAILS, "0.455 disagrees with its own 0.652 and 0.41 by (6.7)"),
         "0.55, of figure 6.1, fits them.",
     ),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from slow_friction import Body, reference, samples, waves
+from references.slow_friction import Body, reference, samples, waves
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.measured_line import ProfileFile

@@ -155,7 +155,7 @@ def test_full_contact_is_exact_in_any_units():
 
 @pytest.mark.slow
 def test_the_error_estimate_is_honest():
-    script = Path(__file__).parents[2] / "benchmarks" / "honesty_friction.py"
+    script = Path(__file__).parents[2] / "benchmarks" / "friction" / "honesty.py"
     covered, ratio = runpy.run_path(str(script))["honesty"](cases=200)
     # 95 % of 500 cases are asked for; 200 scatter by 1.5 %
     assert covered > 0.92

@@ -46,7 +46,7 @@ class Attempt(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """Numbers of the solver, chosen with ``python -m benchmarks.honesty_ehl`` on seeds kept apart from its tables.
+    """Numbers of the solver, chosen with ``python -m benchmarks ehl honesty`` on seeds kept apart from its tables.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ from mdr_dask.physics.surfaces.cubic_line import highest_point
 
 
 class Settings(NamedTuple):
-    """What was tuned for the fewest sweeps: ``python -m benchmarks.work_precision_friction``."""
+    """What was tuned for the fewest sweeps: ``python -m benchmarks friction work_precision``."""
 
     iterations: int = 25
     coarsening: int = 4

@@ -13,7 +13,7 @@ from mdr_dask.physics.superposition.steps import Steps, scan, scan_pairs, togeth
 
 
 class Settings(NamedTuple):
-    """Numbers of the search; `python -m benchmarks.superposition` shows what they do."""
+    """Numbers of the search; `python -m benchmarks superposition accuracy` shows what they do."""
 
     first_weight: float = 1e-3
     """Smoothing of the first curve, relative to the points in a cell."""

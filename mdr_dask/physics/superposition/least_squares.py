@@ -17,7 +17,7 @@ DEGREE = 3
 
 
 class Settings(NamedTuple):
-    """Numbers of the solver; `python -m benchmarks.superposition` shows what they do."""
+    """Numbers of the solver; `python -m benchmarks superposition accuracy` shows what they do."""
 
     cells: int = 8
     """Spline cells along a curve of median width; smoothing decides how many of them count."""

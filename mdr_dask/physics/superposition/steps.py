@@ -30,7 +30,7 @@ from mdr_dask.physics.superposition.problem import Common, Problem
 
 
 class Settings(NamedTuple):
-    """Numbers of the scan; `python -m benchmarks.superposition` shows what they do."""
+    """Numbers of the scan; `python -m benchmarks superposition accuracy` shows what they do."""
 
     scatters: tuple[float, float, int] = (0.04, 1.0, 7)
     """Least, largest and number of the scatters considered of steps about their mean, in widths of a curve."""

@@ -21,7 +21,7 @@ from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jum
 
 
 class Settings(NamedTuple):
-    """Factors of the estimates, chosen by ``python -m benchmarks.honesty_kinetics`` on seeds other than its own.
+    """Factors of the estimates, chosen by ``python -m benchmarks kinetics honesty`` on seeds other than its own.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from mdr_dask.physics.transients.patches import Patches, Track
 
 
 class Settings(NamedTuple):
-    """Numbers of the march, chosen by ``python -m benchmarks.grid_kinetics`` and ``benchmarks.honesty_kinetics``.
+    """Numbers of the march, chosen by ``python -m benchmarks kinetics grid`` and ``benchmarks.kinetics.honesty``.
 
     Parameters
     ----------

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from slow_friction import Body, reference
-from slow_friction import samples as through
+from references.slow_friction import Body, reference
+from references.slow_friction import samples as through
 
 sys.path.insert(0, str(Path(__file__).parents[3]))  # for benchmarks
-from benchmarks import honesty_lines
-from benchmarks.lines import FAMILIES
+from benchmarks.friction import honesty_lines as honesty_lines
+from benchmarks.friction.lines import FAMILIES
 
 CASES, SEED = 12, 11  # of a family
 

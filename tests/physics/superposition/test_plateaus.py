@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from benchmarks.superposition import PLATEAUS, plateau_family
+from benchmarks.superposition.accuracy import PLATEAUS, plateau_family
 from mdr_dask.physics.superposition.master_curve import superpose
 
 

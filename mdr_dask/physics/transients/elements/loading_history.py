@@ -20,7 +20,7 @@ from mdr_dask.physics.transients.elements.steps import State
 
 
 class Settings(NamedTuple):
-    """Steps of a history at 12 of them in a decade, chosen by ``python -m benchmarks.honesty_protocols``.
+    """Steps of a history at 12 of them in a decade, chosen by ``python -m benchmarks protocols honesty``.
 
     Parameters
     ----------

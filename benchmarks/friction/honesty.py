@@ -1,0 +1,98 @@
+"""How honest the error estimate of sliding friction is: ``python -m benchmarks friction honesty [cases [seed]]``.
+
+Random cases in all regions, solved with ``oversampling: auto``, against oversampling 128; every tenth is a line of 9000
+or 30000 points under the loads of the spacing series of the PRL campaign, against oversampling 64. Then the long lines
+of that series, against 32 or 64: the grid of the reference has to be that fine, or its own error is what is seen.
+"""
+
+import sys
+
+import numpy as np
+
+from mdr_dask.models.base import Block
+from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
+from mdr_dask.physics.surfaces import roughness
+
+OUTPUTS = ("friction_coefficient", "friction_coefficient_error", "rms_slope")
+LONG = {20000: 64, 50000: 64, 97200: 32, 200000: 32}  # points, and oversampling of the reference
+ROUNDING = 1e-9
+
+
+def solve(hurst, points, force, reach, realisation, oversampling, accuracy=0.01):
+    """Return the outputs of cases on one line, one for every force and reach."""
+    force, reach = np.atleast_1d(force), np.atleast_1d(reach)
+    parameters = SlidingFriction(
+        length=1.0,
+        points=points,
+        oversampling=oversampling,
+        hurst=hurst,
+        rms_roughness=1.0,
+        shear_modulus=1.0,
+        relaxation_time=1.0,
+        normal_force=float(force[0]),
+        velocity=float(reach[0]),
+    )
+    outputs = OUTPUTS if oversampling == "auto" else OUTPUTS[:1]
+    columns = {"normal_force": force, "velocity": reach}
+    return MODEL.compute(Block(parameters, columns, force.size, (realisation,), 1, outputs, accuracy)).values
+
+
+def judged(found, exact):
+    """Return errors and estimates of cases."""
+    errors = np.abs(found["friction_coefficient"] / exact["friction_coefficient"] - 1)
+    return errors.ravel(), (found["friction_coefficient_error"] / found["friction_coefficient"]).ravel()
+
+
+def honesty(cases=500, accuracy=0.01, seed=0):
+    """Return the share of cases whose error is below its estimate, and the median of estimate over error."""
+    generator = np.random.default_rng(seed)
+    errors, estimates = np.empty(cases), np.empty(cases)
+    for k in range(cases):
+        hurst = float(generator.choice([0, 1, generator.uniform(), generator.uniform()]))
+        points = int(generator.choice([100, 500, 2000]))
+        force = 10 ** generator.uniform(-3, 3)
+        fine = k % 10 == 9
+        if fine:
+            points, force = int(generator.choice([9000, 30000])), 10 ** generator.uniform(0, 2)
+        slope = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
+        reach = 10 ** generator.uniform(-2, 3) / slope if k % 5 else 10 ** generator.uniform(-8, 2)
+        line = 1000 * seed + k
+        found = solve(hurst, points, force, reach, line, "auto", accuracy)
+        exact = solve(hurst, points, force, reach, line, 64 if fine else 128)
+        errors[k], estimates[k] = (column.item() for column in judged(found, exact))
+    return summary(errors, estimates)
+
+
+def long_lines(hurst, points, lines=8, accuracy=0.01, seed=0, speeds=20):
+    """Return the same of the spacing series, every other case under another load, and the share within the accuracy."""
+    generator = np.random.default_rng((seed, points))
+    columns = []
+    for line in range(lines):
+        reach = 5e-2 * 10 ** generator.uniform(-4, 3, speeds)
+        force = np.where(np.arange(speeds) % 2, 15.0, 10 ** generator.uniform(0, 2, speeds))
+        found = solve(hurst, points, force, reach, 1000 * seed + line, "auto", accuracy)
+        columns.append(judged(found, solve(hurst, points, force, reach, 1000 * seed + line, LONG[points])))
+    errors, estimates = np.concatenate(columns, axis=1)
+    return *summary(errors, estimates), float(np.mean(errors <= accuracy))
+
+
+def summary(errors, estimates):
+    """Return the share of errors below their estimate, and the median of estimate over error."""
+    over = np.median(estimates / np.maximum(errors, 1e-12))
+    return float(np.mean(errors <= estimates + ROUNDING)), float(over)
+
+
+def main(cases=500, seed=0):
+    for target in (0.05, 0.01, 0.002):
+        share, over = honesty(cases, target, seed)
+        print(f"{cases} cases at {target:g}: {share:.1%} below the estimate, {over:.1f} times too large (median)")
+    print("| long lines at 1 %: points | H | below the estimate | estimate / error, median | within 1 % |")
+    print("|---|---|---|---|---|")
+    for points in LONG:
+        for hurst in (0.0, 0.1, 0.3):
+            share, over, within = long_lines(hurst, points, seed=seed)
+            print(f"| {points} | {hurst} | {share:.1%} | {over:.1f} | {within:.1%} |", flush=True)
+
+
+if __name__ == "__main__":
+    main(*(int(argument) for argument in sys.argv[1:]))

@@ -1,0 +1,130 @@
+"""Coverage of the bars of shift factors, and processor time: ``python -m benchmarks superposition accuracy [40]``
+
+Families of ten curves of thirty points on one curve, two decades wide, 0.2 to 0.6 decades apart; then families that run
+into a plateau, with short overlaps, for which intervals of 95 % are judged.
+"""
+
+import sys
+import time
+
+import numpy as np
+from scipy.stats import t as student
+
+from mdr_dask.errors import DataError
+from mdr_dask.physics.superposition.master_curve import superpose
+
+SHAPES = {
+    "sigmoid": lambda x: 2 * np.tanh(x / 2),
+    "nearly straight": lambda x: 0.5 * x + 0.02 * x**2,
+    "bump": lambda x: np.exp(-(x**2) / 2),
+    "power law": lambda x: 0.3 * x,
+    "flat plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
+}
+ON_PLATEAUS = {
+    "sigmoid": lambda x: np.tanh(x / 5),
+    "steep": lambda x: 2 + 1.5 * np.tanh(x / 2),
+    "decay": lambda x: -np.log10(1 + 10**x),
+}
+PLATEAUS = (
+    ("decay", 15, 10, 0.02, 0.3),
+    ("decay", 15, 20, 0.005, 0.3),
+    ("decay", 15, 20, 0.02, 0.6),
+    ("decay", 8, 20, 0.02, 0.3),
+    ("decay", 3, 20, 0.02, 0.3),
+    ("steep", 15, 10, 0.02, 0.3),
+    ("steep", 15, 20, 0.005, 0.3),
+    ("steep", 15, 20, 0.02, 0.6),
+    ("steep", 5, 20, 0.01, 0.4),
+    ("sigmoid", 15, 10, 0.02, 0.3),
+    ("sigmoid", 8, 20, 0.005, 0.5),
+    ("sigmoid", 3, 10, 0.02, 0.3),
+)
+"""Shape, curves, points, relative scatter of the ordinate, and overlap of neighbours."""
+
+SCATTER = (0.003, 0.01, 0.03)
+FIRST_SEED = {False: 500_000, True: 1_200_000}
+RISE = 0.02
+
+
+def family(seed, scatter, shape, vertical, curves=10, points=30):
+    """Return groups, curves, and true horizontal and vertical factors, zero for the sixth curve."""
+    random = np.random.default_rng(seed)
+    shifts = np.append(0, np.cumsum(random.uniform(0.2, 0.6, curves - 1)))
+    shifts -= shifts[5]
+    heights = RISE * vertical * (np.arange(curves) - 5)
+    x = np.linspace(-1, 1, points)
+    pieces = [
+        (x, SHAPES[shape](x + shift) - height + scatter * random.standard_normal(points))
+        for shift, height in zip(shifts, heights, strict=True)
+    ]
+    return np.arange(curves, dtype=float), pieces, shifts, heights
+
+
+def judged(shape, scatter, vertical, families):
+    """Return the share of factors inside their bars of 68 %, processor times, and how many families were refused."""
+    inside, times, refused = [], [], 0
+    for seed in range(FIRST_SEED[vertical], FIRST_SEED[vertical] + families):
+        groups, pieces, shifts, heights = family(seed, scatter, shape, vertical)
+        start = time.process_time()
+        try:
+            result = superpose(groups, pieces, vertical, reference=5.0)
+        except DataError:
+            refused += 1
+            continue
+        finally:
+            times.append(time.process_time() - start)
+        bars = student.ppf(0.8413, result.freedom) * np.array([result.horizontal_error, result.vertical_error])
+        found = np.abs([result.horizontal - shifts, result.vertical - heights]) <= bars
+        inside.append(np.delete(found[: 1 + vertical], 5, axis=1).mean())
+    return float(np.mean(inside)), times, refused
+
+
+def plateau_family(shape, curves, points, noise, overlap, seed):
+    """Return groups, curves two decades wide, and true factors, zero for the middle one; overlaps vary by an eighth."""
+    random = np.random.default_rng(seed)
+    steps = 2 * (1 - overlap) * (1 + 0.25 * random.uniform(-0.5, 0.5, curves - 1))
+    shifts = np.append(0, np.cumsum(steps))
+    shifts -= shifts[curves // 2]
+    x = np.linspace(-1, 1, points)
+    scatter = np.log10(1 + noise * random.standard_normal((curves, points)))
+    pieces = [(x, ON_PLATEAUS[shape](x + shift) + each) for shift, each in zip(shifts, scatter, strict=True)]
+    return np.arange(curves, dtype=float), pieces, shifts
+
+
+def on_plateaus(families=40, first=900_000):
+    """Print for each setting how many intervals of 95 % hold, the largest error, its half width, and processor time."""
+    print("intervals of 95 % on plateaus: held, median largest error and its half width, families beyond three of them")
+    for setting in PLATEAUS:
+        held, largest, half, beyond, times = [], [], [], 0, []
+        for seed in range(first, first + families):
+            groups, pieces, shifts = plateau_family(*setting, seed)
+            start = time.process_time()
+            result = superpose(groups, pieces)
+            times.append(time.process_time() - start)
+            width = student.ppf(0.975, result.freedom) * result.horizontal_error
+            others = np.arange(shifts.size) != shifts.size // 2
+            error = np.abs(result.horizontal - shifts)
+            held.append(np.mean(error[others] <= width[others]))
+            largest.append(error.max())
+            half.append(width[np.argmax(error)])
+            beyond += bool(np.any(error[others] > 3 * width[others]))
+        middle = np.median(largest), np.median(half)
+        print(f"{setting!s:34s} {np.mean(held):.3f} {middle[0]:.3f} {middle[1]:.3f} {beyond}/{families}", end=" ")
+        print(f"{1e3 * np.median(times):.1f} ms")
+
+
+def main(families=40):
+    for vertical in (False, True):
+        superpose(*family(0, 0.01, "sigmoid", vertical)[:2], vertical)  # compiles
+        print("vertical factors too" if vertical else "horizontal factors", "at scatter", *SCATTER)
+        for shape in SHAPES:
+            found = [judged(shape, scatter, vertical, families) for scatter in SCATTER]
+            shares = " / ".join(f"{share:.2f}" for share, _, _ in found)
+            median, most = (" / ".join(f"{1e3 * of(times):.1f}" for _, times, _ in found) for of in (np.median, np.max))
+            refused = sum(number for *_, number in found)
+            print(f"{shape:16s} covered {shares}, median time {median} ms, longest {most} ms, refused {refused}")
+    on_plateaus(families)
+
+
+if __name__ == "__main__":
+    main(*(int(argument) for argument in sys.argv[1:]))
