@@ -18,7 +18,6 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.steady import Scheme, Steady
-from mdr_dask.physics.sliding.vectorised import Change
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import Shape
 
@@ -34,21 +33,20 @@ class Settings(NamedTuple):
     of_a_peak: float = 0.1  # the error of that, times the oversampling squared
     restart: int = 4  # oversampling of the cubic cells that take over
     sampled: int = 2  # oversampling of a line that cases go along from node to node
-    refinements: tuple[int, ...] = (1, 2, 4, 8, 16, 32, 64, 128, 256)  # of the cells of half the width
-    quickest: float = 2e-3  # accuracy that needs more than going from node to node
-    quick_safety: float = 0.6  # of the last change of the drag between grids
-    quick_memory: float = 0.06  # of the change before that
-    hope: int = 2  # refinement from which on a grid without a solution ends the way from node to node
-    few: int = 10  # nodes in contact that are too few to go from node to node
-    profile: float = 1e-5  # of the profile between nodes, under the lightest contacts
-    many: int = 1000  # nodes in contact whose errors are an average
-    safety_of_many: float = 0.4
-    # on the first three grids, with so many nodes: of the changes of drag and contact, and of those before
-    of_drag: float = 0.12
-    of_contact: float = 0.15
-    of_drag_before: float = 0.02
-    of_contact_before: float = 0.03
-    of_first_contact: float = 0.5  # of the change of the contact on the first two grids
+    refinements: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128, 256, 512)  # of its cells, where they are touched
+    quickest: float = 1e-4  # accuracy that needs more than going from node to node
+    # from node to node, for every column: of the last change between grids, of the one before it over that, and of the
+    # largest relative change of any column but the depth (of the depth in rms heights)
+    of_change: tuple[float, ...] = (0.07, 0.2, 0.2, 0.2)
+    of_change_before: float = 0.1
+    of_any_change: tuple[float, ...] = (0.02, 0.01, 0.2, 0.2)
+    averaged: float = 800.0  # nodes whose errors are an average: fewer of them are trusted less
+    by_chance: float = 0.3  # over the nodes in contact: what agrees on the first two grids by chance
+    few: int = 5  # nodes in contact that are too few to go from node to node
+    # of the profile between nodes, under the lightest contacts: relative errors, and of the depth in rms heights
+    profile: tuple[float, ...] = (5e-5, 1e-6, 5e-5, 5e-5)
+    lightest: float = 0.1  # Nyquist points in contact for which that is twice as large
+    hope: int = 4  # refinement from which on a grid without a solution ends the way from node to node
     roughly: float = 0.5  # of the accuracy, that the search for the depth may leave on the second grid
     trusted: float = 0.1  # and on finer ones
 
@@ -172,26 +170,22 @@ class Ladder:
         left = np.flatnonzero(sliding.valid(self.deborah, self.loads))
         height, slope = self._nodes(settings.sampled)
         cases = self.deborah[left], self.loads[left]
-        coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
-        before = Change(np.zeros(left.size), np.zeros(left.size))
-        for grids, refinement in enumerate(settings.refinements, 2):
-            found, change = vectorised.extrapolated(coarse, fine)
-            touching = fine.contact_fraction * self.line.points * 2 * refinement
-            doubt = settings.profile + fine.doubt + vectorised.EXTRAPOLATED * coarse.doubt
-            estimate = _estimate(grids, touching, change, before) + doubt
-            estimate = np.where(np.isfinite(estimate), estimate, np.inf)
-            known = _changes(coarse, fine, found, estimate)
+        line, coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
+        before = np.zeros((len(COLUMNS), left.size))
+        for refinement in (1, *settings.refinements):
+            if refinement > 1:
+                cases = self.deborah[left], self.loads[left]
+                grids, trusted = (coarse, fine), settings.trusted * accuracy
+                coarse, fine = fine, vectorised.settle(line, refinement, *cases, grids, trusted)
+            found, change = fine.steady(), _changes(coarse, fine)
+            touched = fine.contact_fraction * self.line.points
+            errors_now = _sampled_errors(found, touched, settings.sampled * refinement, change, before)
+            known = Errors(*(errors_now + np.nan_to_num(fine.doubts)))
             steady, errors = steady.replaced(left, found), errors.replaced(left, known)
             still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
-            left, before = left[still], change.only(still)
-            coarse, fine = coarse.only(still), fine.only(still)
-            if not left.size or refinement == settings.refinements[-1]:
+            left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
+            if not left.size:
                 break
-            cases = self.deborah[left], self.loads[left]
-            if refinement == settings.refinements[0]:
-                line = vectorised.finer(height, slope)
-            grid = vectorised.settle(line, refinement, *cases, (coarse, fine), settings.trusted * accuracy)
-            coarse, fine = fine, grid
         return steady, errors
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, Errors]:
@@ -226,7 +220,10 @@ class Ladder:
         # where a coarse grid has no solution nothing is known
         lost = np.isnan(drag) & (other.status == Outcome.CONVERGED)
         drag = np.where(lost, np.inf, np.maximum(drag, SETTINGS.rounding))
-        return _changes(steady, other, steady, np.maximum(SETTINGS.safety * drag, least))
+        errors = SETTINGS.safety * _changes(steady, other)
+        with np.errstate(all="ignore"):
+            errors[COLUMNS.index("drag")] = np.maximum(SETTINGS.safety * drag, least) * steady.drag
+        return Errors(*errors)
 
 
 def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:
@@ -234,27 +231,34 @@ def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:
     return body is None and accuracy >= SETTINGS.quickest
 
 
-def _changes(coarse: Any, fine: Any, steady: Steady, drag: FloatArray) -> Errors:
-    """Return the errors of a solution: of its drag as estimated, of the rest from the change between two grids."""
+def _changes(coarse: Any, fine: Any) -> FloatArray:
+    """Return the changes of the columns between two grids, infinite where either has no solution."""
     with np.errstate(all="ignore"):
-        rest = [SETTINGS.safety * np.abs(getattr(fine, name) - getattr(coarse, name)) for name in COLUMNS[1:]]
-        return Errors(drag * steady.drag, *rest)
+        changes = np.array([np.abs(getattr(fine, name) - getattr(coarse, name)) for name in COLUMNS])
+    return np.where(np.isfinite(changes), changes, np.inf)
 
 
-def _estimate(grids: int, touching: FloatArray, change: Change, before: Change) -> FloatArray:
-    """Return the relative error of the drag extrapolated from the last of some grids, infinite if too few nodes touch.
+def _sampled_errors(
+    steady: Steady, touched: FloatArray, oversampling: int, change: FloatArray, before: FloatArray
+) -> FloatArray:
+    """Return the errors of the finer of two grids from the changes of the columns, infinite if too few nodes touch.
 
-    Two grids may agree by chance, hardly three, and hardly in the length in contact as well.
+    Two grids may agree by chance: hardly in all columns, hardly twice, and hardly where many nodes touch, or for the
+    contact where many do not. `touched` is how many Nyquist points are in contact.
     """
     settings = SETTINGS
-    many = touching > settings.many
-    if grids == 2:
-        estimate = np.maximum(change.drag, settings.of_first_contact * change.contact)
-        return np.where(many, estimate, np.inf)
-    safety = np.where(many, settings.safety_of_many, settings.quick_safety)
-    estimate = np.maximum(safety * change.drag, settings.quick_memory * before.drag)
-    if grids == 3:
-        memory = np.maximum(settings.of_drag_before * before.drag, settings.of_contact_before * before.contact)
-        seen = np.where(many, settings.of_drag, settings.quick_safety) * change.drag
-        estimate = np.maximum(np.maximum(seen, settings.of_contact * change.contact), memory)
-    return np.where(touching > settings.few, estimate, np.inf)
+    of_change, of_any, profile = (
+        np.array(factors)[:, None] for factors in (settings.of_change, settings.of_any_change, settings.profile)
+    )
+    sizes = np.array([steady.drag, np.ones(steady.drag.size), steady.contact_fraction, steady.contact_slope])
+    touching = touched * oversampling
+    with np.errstate(all="ignore"):
+        apart = np.clip(touching * (1 / steady.contact_fraction - 1), settings.few, touching)
+        nodes = np.array([touching, touching, apart, apart])
+        any_change = np.max((change / sizes)[[0, 2, 3]], axis=0)
+        errors = np.maximum(of_change * change, of_change * settings.of_change_before * before)
+        errors = np.maximum(errors, of_any * any_change * sizes) * (1 + np.sqrt(settings.averaged / nodes))
+        if oversampling == settings.sampled:
+            errors[[0, 2, 3]] = np.maximum(errors, settings.by_chance / nodes * sizes)[[0, 2, 3]]
+        errors += profile * (1 + settings.lightest / touched) * sizes
+    return np.where((touching > settings.few) & np.isfinite(errors), errors, np.inf)

@@ -11,9 +11,10 @@ from numba import njit
 from mdr_dask.arrays import FloatArray
 
 BLOCK = 32  # cells
-BEFORE, AFTER = 4, 5  # nodes of the turns before and after, as many as `refine` reads
+WING = 4  # nodes to either side that a finer grid follows from
+BEFORE, AFTER = WING + 1, WING + 2  # nodes of the turns before and after, as many as `refine` reads
+ABOVE = 4 / 27  # of its slopes at both ends, that a cubic cell reaches above its ends at most
 SUMMIT = 64  # nodes in a cell that its highest point is taken from
-WING = 4  # nodes to either side that the middle of a cell follows from
 
 # What is known of a block of cells, in this order
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
@@ -48,11 +49,16 @@ def _close(turn: FloatArray) -> None:
 
 
 @njit(nogil=True, cache=True, inline="always")
-def slope_square(s: FloatArray, i: int) -> float:
-    """Return the integral of the slope squared over a cell by Euler and Maclaurin, exact over a whole line."""
-    before, first, last, after = s[i - 1] * s[i - 1], s[i] * s[i], s[i + 1] * s[i + 1], s[i + 2] * s[i + 2]
-    square: float = 0.5 * (first + last) + (first + last - before - after) / 24
-    return square
+def end_term(h: FloatArray, s: FloatArray, i: int) -> float:
+    """Return what Euler and Maclaurin add to the trapezium of the slope squared at its first node, in cells.
+
+    The derivatives come from heights and slopes at the nodes beside; over a whole line the terms cancel.
+    """
+    rise, fall = h[i + 1] - h[i - 1], (h[i + 1] - h[i]) - (h[i] - h[i - 1])
+    tilt, bow = s[i + 1] + s[i - 1], s[i + 1] - s[i - 1]
+    second, third, fourth = 2 * fall - 0.5 * bow, 7.5 * rise - 1.5 * (tilt + 8 * s[i]), 6 * bow - 12 * fall
+    term: float = s[i] * second / 6 - (s[i] * fourth + 3 * second * third) / 360
+    return term
 
 
 @njit(nogil=True, cache=True)
@@ -84,12 +90,15 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     for j in range(blocks.shape[0]):
         last = BEFORE + (j + 1) * BLOCK
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
+        term = end_term(h, s, last - BLOCK)
         for i in range(last - BLOCK, last):
-            bend = s[i] - s[i + 1]
-            above = max(h[i], h[i + 1]) + 0.125 * max(bend, 0.0)
+            fall = s[i] - s[i + 1]
+            above = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
             peak, lowest, steepest = max(peak, above), min(lowest, h[i]), min(steepest, s[i])
-            heights += 0.5 * (h[i] + h[i + 1]) + bend / 12
-            squares += slope_square(s, i)
+            heights += 0.5 * (h[i] + h[i + 1]) + fall / 12
+            next_term = end_term(h, s, i + 1)
+            squares += 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + term - next_term
+            term = next_term
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
     return Nodes(h, s, blocks, top)
@@ -115,49 +124,13 @@ def _hermite(places: FloatArray, x: float) -> FloatArray:
 
 @lru_cache
 def weights(refinement: int) -> FloatArray:
-    """Return how the nodes of a finer grid follow from three nodes to either side, shape (2, refinement, 12).
+    """Return how the nodes of a finer grid follow from `WING` nodes to either side, shape (2, refinement, 4 WING).
 
-    Rows are as in `_hermite`, for every node in a cell.
+    Rows are as in `_hermite`, for every node in a cell. The polynomial is of degree 15: with two nodes a Nyquist point
+    its error is below 1e-7 of the shortest wave.
     """
-    return np.stack([_hermite(np.arange(-2.0, 4.0), step / refinement) for step in range(refinement)], axis=1)
-
-
-def halved(height: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return heights and slopes of a periodic line on cells of half the width.
-
-    The polynomial of degree 15 through four nodes to either side: with two nodes a Nyquist point the error is below
-    1e-7 of the shortest wave.
-
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Heights and derivatives by position over the length of the line.
-    """
-    n, finer = height.size, np.empty((2, 2 * height.size))
-    table = _middle().copy()
-    table[:, 2 * WING :] /= n
-    table[1] *= n
-    _halve(np.pad(height, WING, mode="wrap"), np.pad(slope, WING, mode="wrap"), table, finer[0], finer[1])
-    return finer[0], finer[1]
-
-
-@lru_cache
-def _middle() -> FloatArray:
-    """Return the middle of a cell from the nodes to either side, as in `_hermite`."""
-    return _hermite(np.arange(1.0 - WING, 1.0 + WING), 0.5)
-
-
-@njit(nogil=True, cache=True)
-def _halve(h: FloatArray, s: FloatArray, table: FloatArray, height: FloatArray, slope: FloatArray) -> None:
-    """Write every node and, from the sums and differences of those around it, the middle of the cell after it."""
-    for i in range(height.size // 2):
-        value, rate = 0.0, 0.0
-        for k in range(WING):
-            before, after = i + 1 + k, i + 2 * WING - k
-            value += table[0, k] * (h[before] + h[after]) + table[0, 2 * WING + k] * (s[before] - s[after])
-            rate += table[1, k] * (h[before] - h[after]) + table[1, 2 * WING + k] * (s[before] + s[after])
-        height[2 * i], slope[2 * i] = h[i + WING], s[i + WING]
-        height[2 * i + 1], slope[2 * i + 1] = value, rate
+    places = np.arange(1.0 - WING, 1.0 + WING)
+    return np.stack([_hermite(places, step / refinement) for step in range(refinement)], axis=1)
 
 
 @njit(nogil=True, cache=True)
@@ -167,11 +140,11 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
     h, s = line.height, line.slope
     for place in range(-1, cells * refinement + 2):
         cell = place // refinement
-        step, i = place - cell * refinement, first + cell - 2
+        step, i = place - cell * refinement, first + cell + 1 - WING
         value, rate = 0.0, 0.0
-        for k in range(6):
-            value += weights[0, step, k] * h[i + k] + weights[0, step, 6 + k] * s[i + k]
-            rate += weights[1, step, k] * h[i + k] + weights[1, step, 6 + k] * s[i + k]
+        for k in range(2 * WING):
+            value += weights[0, step, k] * h[i + k] + weights[0, step, 2 * WING + k] * s[i + k]
+            rate += weights[1, step, k] * h[i + k] + weights[1, step, 2 * WING + k] * s[i + k]
         height[place + 1], slope[place + 1] = value, rate / refinement
 
 

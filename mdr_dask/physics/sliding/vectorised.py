@@ -1,13 +1,14 @@
 """Steady sliding of a Kelvin foundation from node to node, many cases of a periodic line at once.
 
-The quick way to about a part in a thousand: see :mod:`mdr_dask.physics.sliding.walk` for what a cell adds. Heights and
-slopes are exact at the nodes; the depth is searched for on finer and finer grids, and the drag extrapolated from two.
+See :mod:`mdr_dask.physics.sliding.walk` for what a cell adds. Heights and slopes are exact at the nodes; the depth is
+searched for on finer and finer grids, each from the answer of the one before.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,17 +16,17 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, halved, nodes, summit, weights
+from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, nodes, summit, weights
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
+    DEBORAH,
     DEPTH,
     LANES,
     LENGTH,
     LOAD,
     LOSS,
     RATE,
-    REACH,
-    ROOM,
+    ROWS,
     STRETCH,
     closed,
     load_case,
@@ -33,56 +34,61 @@ from mdr_dask.physics.sliding.walk import (
 )
 from mdr_dask.physics.surfaces.cubic_line import highest_point
 
-ITERATIONS = 25
-COARSENING = 4
-COARSEST = 64  # nodes of the grid that the search for the depth starts on
-# relative step of the depth that a secant is trusted with, and what that may cost to start the next grid
-ANSWER_STEP, START = 0.03, (0.1, 0.03)
-# of the change of the depth between two grids, where the search on the next one begins, and how far off that may be
-DEEPER_FIRST, DEEPER, NEAR = 0.21, 0.13, 0.3
-EXTRAPOLATED = 1 / 7  # of the change between grids: the error falls by 8 where the cells are halved
-DOUBTED = 0.1  # of the last step of the drag, which is taken along the secant
-EXACT_STEP, ROUNDING = 1e-12, 3e-12
+
+class Settings(NamedTuple):
+    """What was tuned for the fewest sweeps: ``python -m benchmarks.work_precision_friction``."""
+
+    iterations: int = 25
+    coarsening: int = 4
+    coarsest: int = 64  # nodes of the grid that the search for the depth starts on
+    answer_step: float = 0.03  # relative step of the depth that a secant is trusted with
+    start: tuple[float, float] = (0.1, 0.03)  # the same to start the next grid, and what that step may cost
+    ahead: float = 0.06  # of the change of the depth between two grids, where the search on the next one begins
+    near: float = 0.3  # how far off that may be
+    doubted: float = 0.1  # of the last step of a column, which is taken along its secant
+    doubted_rate: float = 3e-3  # of the last step of the depth, which is taken along the tangent
+    exact_step: float = 1e-12
+    rounding: float = 3e-12
+
+
+SETTINGS = Settings()
+# what a search writes of a case: three columns that have secants, their relative errors, and that of the depth
+DRAG, FRACTION, SLOPE, DOUBTS, DOUBT_OF_DEPTH = 0, 1, 2, 3, 6
+SECANTS, RESULTS = 3, 7
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """Steady states on a grid, one entry for every case; drag, fraction and slope are NaN where no depth was found.
+    """Steady states on a grid, one entry for every case; all but the depth are NaN where no depth was found.
 
     Parameters
     ----------
-    depth : array
-        Penetration of the mean line, in the unit of height.
-    rate : array
-        Relative change of the drag with the depth.
-    drag, contact_fraction, contact_slope : array
+    rates : array, shape (cases, 3)
+        Relative changes of drag, contact fraction and contact slope with the depth.
+    drag, depth, contact_fraction, contact_slope : array, shape (cases,)
         As in :class:`mdr_dask.physics.sliding.steady.Steady`.
-    doubt : array
-        Bound of the relative error of the drag from the search for the depth.
+    doubts : array, shape (4, cases)
+        What the search for the depth may have left in them.
     """
 
-    depth: FloatArray
-    rate: FloatArray
+    rates: FloatArray
     drag: FloatArray
+    depth: FloatArray
     contact_fraction: FloatArray
     contact_slope: FloatArray
-    doubt: FloatArray
+    doubts: FloatArray
 
     def only(self, cases: NDArray[np.bool_]) -> Sampled:
         """Return some of the cases."""
-        return Sampled(**{name: column[cases] for name, column in vars(self).items()})
+        columns = {name: column[cases] for name, column in vars(self).items() if name != "doubts"}
+        return Sampled(**columns, doubts=self.doubts[:, cases])
 
-
-@dataclass(frozen=True)
-class Change:
-    """Relative changes between two grids of the drag and of the length in contact, one entry for every case."""
-
-    drag: FloatArray
-    contact: FloatArray
-
-    def only(self, cases: NDArray[np.bool_]) -> Change:
-        """Return some of the cases."""
-        return Change(self.drag[cases], self.contact[cases])
+    def steady(self) -> Steady:
+        """Return the states."""
+        status = np.where(np.isfinite(self.drag) & (self.drag > 0), Outcome.CONVERGED, Outcome.DEPTH_NOT_FOUND)
+        columns = np.array([self.drag, self.depth, self.contact_fraction, self.contact_slope])
+        drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
+        return Steady(drag, depth, fraction, slope, status.astype(np.int8))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -90,10 +96,11 @@ def _solve(
     line: Nodes,
     weights: FloatArray,
     rise: float,
-    reaches: FloatArray,
+    deborah: FloatArray,
     loads: FloatArray,
     near_step: float,
     trusted: float,
+    settings: Settings,
     depths: FloatArray,
     rates: FloatArray,
     results: FloatArray,
@@ -108,115 +115,113 @@ def _solve(
         From `weights`.
     rise : float
         Height of the summit over the highest node.
-    reaches, loads : array, shape (cases,)
+    deborah, loads : array, shape (cases,)
         v tau / L, and F_N / (4 G L) in the unit of height.
     near_step, trusted : float
         Bounds of the last relative step of the depth and of what it costs.
-    depths, rates : array, shape (cases,)
-        Penetration of the summit, and relative change of the drag with it, NaN where it is not known; read and
-        written.
-    results : array, shape (cases, 4)
-        Written: F_x / (4 G), length in contact over length of the line, rms slope over it, and a bound of the relative
-        error of the search; NaN where no depth is found.
+    depths : array, shape (cases,)
+        Penetration of the summit; read and written.
+    rates : array, shape (cases, SECANTS)
+        Relative changes of the results with it, NaN where they are not known; read and written.
+    results : array, shape (cases, RESULTS)
+        Written: the results, bounds of their relative errors from the search, and that of the depth; NaN where no
+        depth is found.
     """
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
     local = np.empty((2, cells + 3))
-    room, near = np.zeros(ROOM * LANES), np.zeros(ROOM * LANES)
+    workspace, near = np.zeros(ROWS * LANES), np.zeros(ROWS * LANES)
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
-    last_step, last_drag = np.empty(LANES), np.empty(LANES)
+    last_step, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
         count = min(LANES, loads.size - begin)
         for k in range(count):
             lanes[k] = begin + k
-            last_step[k] = last_drag[k] = np.nan
-            load_case(room, k, depths[begin + k] - rise, reaches[begin + k] * n, cells)
+            last_step[k], last[k] = np.nan, np.nan
+            load_case(workspace, k, depths[begin + k] - rise, deborah[begin + k] * n, cells)
             results[begin + k] = np.nan
-        for _ in range(ITERATIONS):
+        for _ in range(settings.iterations):
             if count == 0:
                 break
-            sweep(line, weights, local, room, near, queue, count)
+            sweep(line, weights, local, workspace, near, queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]
-                depth, drag = room[DEPTH * LANES + k] + rise, room[LOSS * LANES + k]
-                step = (loads[case] * n - room[LOAD * LANES + k]) / room[RATE * LANES + k]
+                depth = workspace[DEPTH * LANES + k] + rise
+                step = (loads[case] * n - workspace[LOAD * LANES + k]) / workspace[RATE * LANES + k]
                 size = abs(step) / depth
-                rate = (1 - last_drag[k] / drag) / last_step[k]
-                rate = rate if math.isfinite(rate) else rates[case]
-                doubt = DOUBTED * abs(rate * step)
-                if size < EXACT_STEP:
-                    rate, doubt = (rate if math.isfinite(rate) else 0.0), 0.0
-                if size <= near_step and doubt <= trusted and closed(room, k):
+                length, stretch = workspace[LENGTH * LANES + k], workspace[STRETCH * LANES + k]
+                now[DRAG], now[FRACTION] = workspace[LOSS * LANES + k], length / n
+                now[SLOPE] = n * math.sqrt(stretch / length) if length > 0 else 0.0
+                for j in range(SECANTS):
+                    rate[j] = (1 - last[k, j] / now[j]) / last_step[k]
+                    rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
+                    if size < settings.exact_step and not math.isfinite(rate[j]):
+                        rate[j] = 0.0
+                doubt = settings.doubted * abs(rate[DRAG] * step)
+                if size <= near_step and doubt <= trusted and closed(workspace, k):
                     depths[case], rates[case] = depth + step, rate
-                    length, stretch = room[LENGTH * LANES + k], room[STRETCH * LANES + k]
-                    results[case, 0] = drag * (1 + rate * step)
-                    results[case, 1] = length / n
-                    results[case, 2] = n * math.sqrt(stretch / length) if length > 0 else 0.0
-                    results[case, 3] = doubt + ROUNDING
+                    for j in range(SECANTS):
+                        results[case, j] = now[j] * (1 + rate[j] * step)
+                        results[case, DOUBTS + j] = settings.doubted * abs(rate[j] * step) + settings.rounding
+                    results[case, DOUBT_OF_DEPTH] = (settings.doubted_rate + 0.5 * size) * abs(
+                        step
+                    ) + settings.rounding * depth
                     continue
                 ahead = depth + step if step > -0.7 * depth else 0.3 * depth
-                last_step[kept], last_drag[kept], lanes[kept] = ahead - depth, drag, case
-                load_case(room, kept, ahead - rise, room[REACH * LANES + k], cells)
+                last_step[kept], last[kept], lanes[kept] = ahead - depth, now, case
+                load_case(workspace, kept, ahead - rise, workspace[DEBORAH * LANES + k], cells)
                 kept += 1
             count = kept
 
 
 def begin(
-    height: FloatArray, slope: FloatArray, reaches: FloatArray, loads: FloatArray, trusted: float
-) -> tuple[Sampled, Sampled]:
-    """Return the steady states on every other node of a periodic line, found roughly, and on all of them.
+    height: FloatArray, slope: FloatArray, deborah: FloatArray, loads: FloatArray, trusted: float
+) -> tuple[Nodes, Sampled, Sampled]:
+    """Return a periodic line from its summit on, and the steady states on every other node of it and on all of them.
 
     Parameters
     ----------
     height, slope : array, shape (n,)
         Heights into the elastomer, and their derivative by position over the length of the line; two nodes or more
         for every Nyquist point.
-    reaches, loads : array, shape (cases,)
+    deborah, loads : array, shape (cases,)
         v tau / L and F_N / (4 G L), positive and finite.
     trusted : float
         Relative error of the drag on all nodes that the search may leave.
     """
-    strides = [1, 2]
-    while height.size > COARSENING * COARSEST * strides[-1]:
-        strides.append(strides[-1] * COARSENING)
-    depths, results = _shallow(loads), np.empty((loads.size, 4))
-    rates = np.full(loads.size, np.nan)
-    highest = int(np.argmax(height))
-    found = []
+    strides = [2]
+    while height.size > SETTINGS.coarsening * SETTINGS.coarsest * strides[-1]:
+        strides.append(strides[-1] * SETTINGS.coarsening)
+    depths, results = _shallow(loads), np.empty((loads.size, RESULTS))
+    rates = np.full((loads.size, SECANTS), np.nan)
+    highest, cases = int(np.argmax(height)), (deborah, loads)
     for stride in reversed(strides):
-        line = nodes(height, slope, highest, stride, stride <= strides[1])
-        bounds = (ANSWER_STEP, trusted) if stride == 1 else START
-        _solve(line, weights(1), 0.0, reaches, loads, *bounds, depths, rates, results)
-        if stride <= strides[1]:
-            found.append(_sampled(line.top, depths, rates, results.copy()))
-    return found[0], found[1]
-
-
-def finer(height: FloatArray, slope: FloatArray) -> Nodes:
-    """Return the line that :func:`begin` was given on cells of half the width, from its summit on."""
-    height, slope = halved(height, slope)
+        line = nodes(height, slope, highest, stride, stride == strides[0])
+        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, SETTINGS, depths, rates, results)
+    coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
-    return nodes(height, slope, (cell + 1) % height.size, 1, True)
+    line = nodes(height, slope, (cell + 1) % height.size, 1, True)
+    return line, coarse, _settled(line, 1, cases, coarse.depth, rates, trusted)
 
 
 def settle(
     line: Nodes,
     refinement: int,
-    reaches: FloatArray,
+    deborah: FloatArray,
     loads: FloatArray,
     grids: tuple[Sampled, Sampled],
     trusted: float,
 ) -> Sampled:
-    """Return the steady states on a line, or on a finer grid where it is touched.
+    """Return the steady states on a grid that is finer where the line is touched.
 
     Parameters
     ----------
     line : Nodes
-        The line that :func:`begin` was given, from :func:`finer`.
+        From :func:`begin`.
     refinement : int
         Cells of the finer grid for each of the line.
-    reaches, loads : array, shape (cases,)
+    deborah, loads : array, shape (cases,)
         As in :func:`begin`.
     grids : tuple of Sampled
         The states on two coarser grids, the finer one last.
@@ -224,14 +229,27 @@ def settle(
         Relative error of the drag that the search may leave.
     """
     coarse, fine = grids
-    ahead = (DEEPER_FIRST if refinement == 1 else DEEPER) * (fine.depth - coarse.depth)
+    ahead = SETTINGS.ahead * (fine.depth - coarse.depth)
+    top = line.top + summit(line)
+    depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
+    return _settled(line, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
+
+
+def _settled(
+    line: Nodes,
+    refinement: int,
+    cases: tuple[FloatArray, FloatArray],
+    depths: FloatArray,
+    rates: FloatArray,
+    trusted: float,
+) -> Sampled:
+    """Return the steady states on a grid, searched for from some depths of the mean line on."""
     rise = summit(line)
-    depths = fine.depth + (line.top + rise)
-    depths += np.where(np.abs(ahead) < NEAR * depths, ahead, 0.0)
-    depths = np.where(depths > 0, depths, _shallow(loads))
-    rates, results = fine.rate.copy(), np.empty((loads.size, 4))
-    _solve(line, weights(refinement), rise, reaches, loads, ANSWER_STEP, trusted, depths, rates, results)
-    return _sampled(line.top + rise, depths, rates, results)
+    top, results = line.top + rise, np.empty((depths.size, RESULTS))
+    depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
+    bounds = SETTINGS.answer_step, trusted
+    _solve(line, weights(refinement), rise, *cases, *bounds, SETTINGS, depths, rates, results)
+    return _sampled(top, depths, rates, results)
 
 
 def _shallow(loads: FloatArray) -> FloatArray:
@@ -240,21 +258,6 @@ def _shallow(loads: FloatArray) -> FloatArray:
 
 
 def _sampled(top: float, depths: FloatArray, rates: FloatArray, results: FloatArray) -> Sampled:
-    drag, fraction, slope, doubt = results.T
-    return Sampled(depths - top, rates, drag, fraction, slope, doubt)
-
-
-def extrapolated(coarse: Sampled, fine: Sampled) -> tuple[Steady, Change]:
-    """Return the states on a grid with the drag extrapolated from one of twice its cells, and what changed.
-
-    The change is infinite where either grid has no solution.
-    """
-    with np.errstate(all="ignore"):
-        drag = fine.drag + EXTRAPOLATED * (fine.drag - coarse.drag)
-        change = np.abs(fine.drag / coarse.drag - 1), np.abs(fine.contact_fraction / coarse.contact_fraction - 1)
-    good = np.isfinite(change[0]) & (drag > 0)
-    status = np.where(good, Outcome.CONVERGED, Outcome.DEPTH_NOT_FOUND).astype(np.int8)
-    known = (fine.depth, fine.contact_fraction, fine.contact_slope)
-    depth, fraction, slope = (np.where(good, column, np.nan) for column in known)
-    known_change = Change(*(np.where(good & np.isfinite(part), part, np.inf) for part in change))
-    return Steady(np.where(good, drag, np.nan), depth, fraction, slope, status), known_change
+    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = results.T.copy()
+    doubts = np.array([of_drag * drag, of_depth, of_fraction * fraction, of_slope * slope])
+    return Sampled(rates, drag, depths - top, fraction, slope, doubts)

@@ -1,16 +1,17 @@
 """Cases of a Kelvin foundation that go along a periodic line together, from node to node.
 
-In a cell the force of contact, f = w + reach w', and the slope run straight between the nodes; it leaves where f falls
-to 0, which raises exp(s / reach) w to its peak, and touches where a parabola meets what is free. With
-integral(u + reach u') = integral(f) and integral(reach u'^2) = integral(f w') - change of u^2 / 2 a cell that is
-partly in contact adds what the force alone gives; cells wholly in contact are integrated exactly, so that full contact
-is exact on any grid. Everything is measured in cells, as in `kelvin`. The inner loops run over
+In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De its Deborah number
+v tau in cells. An element leaves where the force w + De w' falls to 0 and touches where the gap closes. A cell that is
+partly in contact adds positive terms only, so that nothing cancels in slow sliding: of the piece in contact the
+integrals of w and of De w'^2, of a flight those of u and u^2 / De. Cells wholly in contact are integrated exactly, so
+that full contact is exact on any grid. Everything is measured in cells, as in `kelvin`. The inner loops run over
 cases, so that they are vector instructions; each case does the same arithmetic whatever runs beside it.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.sliding.nodes import (
+    ABOVE,
     AFTER,
     BEFORE,
     BLOCK,
@@ -27,8 +29,8 @@ from mdr_dask.physics.sliding.nodes import (
     SQUARES,
     STEEPEST,
     Nodes,
+    end_term,
     refine,
-    slope_square,
 )
 
 LANES = 64  # cases that go along the line together
@@ -38,78 +40,197 @@ CLOSED = 1e-9  # relative difference of the displacement before and after a turn
 
 # What a sweep holds of a case, in this order: its state, sums, and what does not change
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(8)
-DEPTH, REACH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
-ROOM = 14
-STATES = DEPTH
+DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
+CALM, LEAVES, CREST, GAP, HELD, LEFT, TOUCHES, WAITED = range(14, 22)
+ROWS = 22
+STATES, MOVED = DEPTH, CALM
+
+_inlined = njit(nogil=True, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
+
+
+@njit(nogil=True, cache=True, inline="always")
+def _fading(time: float) -> float:
+    """Return exp(-time), to 1e-4 up to 1 and small where it is small."""
+    y = time * 0.125
+    y = y if y < 1.0 else 1.0
+    e = 1.0 + y * (-1.0 + y * (0.5 - y * (1 / 6)))
+    e *= e
+    e *= e
+    return e * e
+
+
+class Cell(NamedTuple):
+    """The line in a cell: h + s x + a x^2 + b x^3, its end, mean height, integral of the slope squared, and summit."""
+
+    h: float
+    s: float
+    a: float
+    b: float
+    h_end: float
+    s_end: float
+    mean: float
+    square: float
+    summit: float
+    h_summit: float
+    steepest: float
+
+
+@_inlined
+def _pass_cell(cell: Cell, above: float, workspace: FloatArray, count: int) -> tuple[int, int]:
+    """Take cases over a cell that are in contact or in flight all along; return how many may leave, and may touch."""
+    leaving, touching = 0, 0
+    for k in range(count):
+        d, r, decay = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[DECAY * LANES + k]
+        u, fade, was = workspace[U * LANES + k], workspace[FADE * LANES + k], workspace[CONTACT * LANES + k] > 0
+        w, kept, lost = d + cell.h_end, decay * u, 1 - decay
+        force = w + r * cell.s_end
+        stays = was & (force > 0)
+        flies = (not was) & (d + above <= kept)
+        calm = stays | flies
+        leaving += 0 if calm | (force > 0) else 1
+        touching += 0 if calm | was else 1
+        load = r * lost * u if flies else 0.0
+        loss = 0.5 * lost * (1 + decay) * u * u if flies else 0.0
+        rate = r * lost * fade if flies else 0.0
+        workspace[LOAD * LANES + k] += cell.mean + d if stays else load
+        workspace[LOSS * LANES + k] += r * cell.square if stays else loss
+        workspace[RATE * LANES + k] += 1.0 if stays else rate
+        workspace[LENGTH * LANES + k] += 1.0 if stays else 0.0
+        workspace[STRETCH * LANES + k] += cell.square if stays else 0.0
+        then = kept if flies else u
+        workspace[U * LANES + k] = w if stays else then
+        faded = decay * fade if flies else fade
+        workspace[FADE * LANES + k] = 1.0 if stays else faded
+        workspace[CALM * LANES + k], workspace[LEFT * LANES + k] = 1.0 if calm else 0.0, 0.0
+    return leaving, touching
+
+
+@_inlined
+def _leave(cell: Cell, workspace: FloatArray, count: int) -> None:
+    """Write where cases leave whose force falls to 0 in a cell, or would if they touched before."""
+    s2, s3 = 2 * cell.a, 3 * cell.b
+    for k in range(count):
+        d, r, inverse = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[INVERSE * LANES + k]
+        u, was = workspace[U * LANES + k], workspace[CONTACT * LANES + k] > 0
+        w0 = d + cell.h
+        # before the summit of the cell it falls only where it is positive from the first node on
+        f0, f1 = w0 + r * cell.s, d + cell.h_end + r * cell.s_end
+        begins = 0.0 if f0 > 0 else cell.summit
+        f0 = f0 if f0 > 0 else d + cell.h_summit
+        peaked, fall = (f0 > 0) & (f1 <= 0), (1 - begins) / (f0 - f1)
+        x = begins + f0 * fall if peaked else 1.0
+        w, s = w0 + x * (cell.s + x * (cell.a + x * cell.b)), cell.s + x * (s2 + x * s3)
+        tangent = s + r * (s2 + 2 * s3 * x)
+        tangent = -1 / tangent if tangent * fall < -0.5 else fall
+        x += (w + r * s) * tangent if peaked else 0.0
+        x = x if x > begins else begins
+        x = x if x < 1 else 1.0
+        peak = w0 + x * (cell.s + x * (cell.a + x * cell.b))
+        peak = peak if peak < r * cell.steepest else r * cell.steepest
+        peak = peak if peak > 0 else 0.0
+        gap = u * _fading(x * inverse) - peak
+        workspace[LEAVES * LANES + k], workspace[CREST * LANES + k], workspace[GAP * LANES + k] = x, peak, gap
+        workspace[HELD * LANES + k] = _fading((1 - x) * inverse)
+        workspace[LEFT * LANES + k] = 1.0 if peaked & (was | (gap < 0)) else 0.0
+
+
+@_inlined
+def _touch(cell: Cell, workspace: FloatArray, count: int) -> None:
+    """Write where cases in flight touch in a cell: a parabola through the gap at its ends, and one step of Newton."""
+    for k in range(count):
+        d, decay, inverse = workspace[DEPTH * LANES + k], workspace[DECAY * LANES + k], workspace[INVERSE * LANES + k]
+        u, left = workspace[U * LANES + k], workspace[LEFT * LANES + k] > 0
+        w0 = d + cell.h
+        last = workspace[LEAVES * LANES + k] if left else 1.0
+        gap, closing = u - w0, cell.s + u * inverse
+        closed = workspace[GAP * LANES + k] if left else decay * u - (d + cell.h_end)
+        bow = (gap - closing * last - closed) / (last * last + SMALL)
+        steep = math.sqrt(abs(closing * closing + 4 * gap * bow)) + SMALL
+        root = 2 * gap / (closing + steep)
+        root = root if root > 0 else 0.0
+        root = root if root < last else last
+        w, waited = w0 + root * (cell.s + root * (cell.a + root * cell.b)), _fading(root * inverse)
+        step = (u * waited - w) / steep
+        low, high = -0.5 * root, 0.5 * (last - root)
+        step = step if step > low else low
+        step = step if step < high else high
+        workspace[TOUCHES * LANES + k] = root + step
+        workspace[WAITED * LANES + k] = waited * max(1 - step * inverse, 0.0)
+
+
+@_inlined
+def _add(cell: Cell, workspace: FloatArray, count: int) -> None:
+    """Add what a cell gives to the cases that touch or leave in it."""
+    s2, s3 = 2 * cell.a, 3 * cell.b
+    for k in range(count):
+        d, r, decay = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[DECAY * LANES + k]
+        u, fade, was = workspace[U * LANES + k], workspace[FADE * LANES + k], workspace[CONTACT * LANES + k] > 0
+        calm = workspace[CALM * LANES + k] > 0
+        w0, w1, kept = d + cell.h, d + cell.h_end, decay * u
+        now = (w1 + r * cell.s_end > 0) & (was | (w1 >= kept))
+        left = (workspace[LEFT * LANES + k] > 0) & (not now)
+        touching = (not was) & (now | left)
+        contact = was | touching
+        start = workspace[TOUCHES * LANES + k] if touching else 0.0
+        leaves = workspace[LEAVES * LANES + k] if left else 0.0
+        stop = 1.0 if now else leaves
+        part, x = stop - start, 0.5 * (start + stop)
+        w_start = w0 + start * (cell.s + start * (cell.a + start * cell.b))
+        w_middle = w0 + x * (cell.s + x * (cell.a + x * cell.b))
+        w_stop = w1 if now else workspace[CREST * LANES + k]
+        s_start, s_middle = cell.s + start * (s2 + start * s3), cell.s + x * (s2 + x * s3)
+        s_stop = cell.s + stop * (s2 + stop * s3)
+        force = part / 6 * (w_start + 4 * w_middle + w_stop)
+        square = part / 6 * (s_start * s_start + 4 * s_middle * s_middle + s_stop * s_stop)
+        # in flight: what it forgets before it touches, and after it left
+        keeps = workspace[WAITED * LANES + k] if touching else 1.0
+        keeps = keeps if contact else decay
+        held = workspace[HELD * LANES + k] if left else 1.0
+        forgets, loses = 1 - keeps, 1 - held
+        load = force + r * (u * forgets + w_stop * loses)
+        loss = r * square + 0.5 * (u * u * forgets * (1 + keeps) + w_stop * w_stop * loses * (1 + held))
+        rate = part + r * (fade * forgets + loses)
+        workspace[LOAD * LANES + k] += 0.0 if calm else load
+        workspace[LOSS * LANES + k] += 0.0 if calm else loss
+        workspace[RATE * LANES + k] += 0.0 if calm else rate
+        workspace[LENGTH * LANES + k] += 0.0 if calm else part
+        workspace[STRETCH * LANES + k] += 0.0 if calm else square
+        then, faded = w_stop * held if contact else kept, held if contact else decay * fade
+        then, faded = w1 if now else then, 1.0 if now else faded
+        workspace[U * LANES + k] = u if calm else then
+        workspace[FADE * LANES + k] = fade if calm else faded
+        landed = 1.0 if now else 0.0
+        workspace[CONTACT * LANES + k] = workspace[CONTACT * LANES + k] if calm else landed
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, room: FloatArray, count: int) -> None:
-    """Take cases from node to node; `room` holds row after row of `LANES`."""
+def _walk(height: FloatArray, slope: FloatArray, first: int, end: int, workspace: FloatArray, count: int) -> None:
+    """Take cases from node to node; `workspace` holds row after row of `LANES`."""
+    term = end_term(height, slope, first)
     for i in range(first, end):
         h0, h1, s0, s1 = height[i], height[i + 1], slope[i], slope[i + 1]
-        bend = s1 - s0
-        mean, square = 0.5 * (h0 + h1) - bend / 12, slope_square(slope, i)
-        for k in range(count):
-            d, r, decay, inverse = (
-                room[DEPTH * LANES + k],
-                room[REACH * LANES + k],
-                room[DECAY * LANES + k],
-                room[INVERSE * LANES + k],
-            )
-            u, fade, was = room[U * LANES + k], room[FADE * LANES + k], room[CONTACT * LANES + k] > 0
-            w0, w1 = d + h0, d + h1
-            f0, f1 = w0 + r * s0, w1 + r * s1
-            # it leaves where the force falls to 0
-            falls = f1 < 0
-            peaked = (f0 > 0) & falls
-            leaves = f0 / (f0 - f1)
-            lead = w0 + (0.5 * leaves * f0 * inverse if peaked else 0.0)
-            higher = lead - u
-            top = lead if higher > 0 else u
-            free = decay * top
-            now = (w1 >= free) & (f1 > 0)
-            whole, lifted = was & now, (higher > 0) & (not was)
-            then = w1 if w1 > free else free
-            # it touches where the gap, a parabola, does, with the slope `steep`
-            below, q = u - w0, s0 + u * inverse
-            curve = 0.5 * bend if falls else w1 - decay * u + below - q
-            steep = math.sqrt(abs(q * q + 4 * below * curve))
-            touches = 2 * below / (q + steep + SMALL)
-            touches = touches if touches > 0 else 0.0
-            touches = touches if touches < 1 else 1.0
-            start = touches if now & (not was) else 0.0
-            stays = leaves if peaked else 1.0
-            stays = stays if was & (f0 > 0) else 0.0
-            stop = 1.0 if now else stays
-            lost = 1 - decay
-            s_start, s_stop = s0 + start * bend, s0 + stop * bend
-            f_start = f0 if was else u * (1 - start * lost) + r * s_start
-            f_stop = f1 if now else 0.0
-            part = stop - start
-            force = 0.5 * part * (f_start + f_stop)
-            work = part * (f_start * (2 * s_start + s_stop) + f_stop * (s_start + 2 * s_stop)) / 6
-            load = force + r * (u - then)
-            loss = work + 0.5 * (u - then) * (u + then)
-            load = r * lost * (u + 0.5 * higher) if lifted else load
-            loss = 0.5 * lost * (1 + decay) * u * u + r * higher * steep * (2 / 3) if lifted else loss
-            room[LOAD * LANES + k] += mean + d if whole else load
-            room[LOSS * LANES + k] += r * square if whole else loss
-            remembered = r * lost * ((1 - stop) if was else start * fade)
-            remembered = remembered if was | now else r * lost * fade
-            room[RATE * LANES + k] += 1.0 if whole else part + remembered
-            room[LENGTH * LANES + k] += part
-            squared = part * (s_start * s_start + s_start * s_stop + s_stop * s_stop) / 3
-            room[STRETCH * LANES + k] += square if whole else squared
-            after = decay if was | lifted else decay * fade
-            room[FADE * LANES + k] = 1.0 if now else after
-            room[U * LANES + k] = then
-            room[CONTACT * LANES + k] = 1.0 if now else 0.0
+        rise, fall = h1 - h0, s0 - s1
+        mean = 0.5 * (h0 + h1) + fall / 12
+        next_term = end_term(height, slope, i + 1)
+        square, term = 0.5 * (s0 * s0 + s1 * s1) + term - next_term, next_term
+        a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
+        summit = s0 / fall if (s0 > 0) & (s1 < 0) else 0.0
+        h_summit = h0 + summit * (s0 + summit * (a + summit * b))
+        steepest = max(-s0, -s1, 0.25 * (s0 + s1) - 1.5 * rise, 0.0)
+        cell = Cell(h0, s0, a, b, h1, s1, mean, square, summit, h_summit, steepest)
+        leaving, touching = _pass_cell(cell, max(h0, h1) + ABOVE * (max(s0, 0.0) + max(-s1, 0.0)), workspace, count)
+        if leaving + touching == 0:
+            continue
+        if leaving > 0:
+            _leave(cell, workspace, count)
+        if touching > 0:
+            _touch(cell, workspace, count)
+        _add(cell, workspace, count)
 
 
 @njit(nogil=True, cache=True)
 def _pass_block(
-    block: FloatArray, last: float, refinement: int, room: FloatArray, count: int, queue: NDArray[np.int64]
+    block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
     """Take cases over a block by closed sums; queue those that touch or leave in it, and return their number."""
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
@@ -118,27 +239,27 @@ def _pass_block(
     queued = 0
     for k in range(count):
         d, r, u, touching = (
-            room[DEPTH * LANES + k],
-            room[REACH * LANES + k],
-            room[U * LANES + k],
-            room[CONTACT * LANES + k] > 0,
+            workspace[DEPTH * LANES + k],
+            workspace[DEBORAH * LANES + k],
+            workspace[U * LANES + k],
+            workspace[CONTACT * LANES + k] > 0,
         )
-        through = room[THROUGH * LANES + k]
+        through = workspace[THROUGH * LANES + k]
         if not touching and peak + d <= u * through:
             memory = r * (1 - through)
-            room[LOAD * LANES + k] += u * memory
-            room[RATE * LANES + k] += room[FADE * LANES + k] * memory
-            room[LOSS * LANES + k] += 0.5 * u * u * (1 - through) * (1 + through)
-            room[U * LANES + k] = u * through if u * through > SMALL else 0.0
-            room[FADE * LANES + k] *= through
+            workspace[LOAD * LANES + k] += u * memory
+            workspace[RATE * LANES + k] += workspace[FADE * LANES + k] * memory
+            workspace[LOSS * LANES + k] += 0.5 * u * u * (1 - through) * (1 + through)
+            workspace[U * LANES + k] = u * through if u * through > SMALL else 0.0
+            workspace[FADE * LANES + k] *= through
         elif touching and lowest + d + r * steepest > 0:
-            room[LOAD * LANES + k] += heights + cells * d
-            room[RATE * LANES + k] += cells
-            room[LOSS * LANES + k] += r * squares
-            room[LENGTH * LANES + k] += cells
-            room[STRETCH * LANES + k] += squares
-            room[U * LANES + k] = last + d
-            room[FADE * LANES + k] = 1.0
+            workspace[LOAD * LANES + k] += heights + cells * d
+            workspace[RATE * LANES + k] += cells
+            workspace[LOSS * LANES + k] += r * squares
+            workspace[LENGTH * LANES + k] += cells
+            workspace[STRETCH * LANES + k] += squares
+            workspace[U * LANES + k] = last + d
+            workspace[FADE * LANES + k] = 1.0
         else:
             queue[queued] = k
             queued += 1
@@ -148,7 +269,7 @@ def _pass_block(
 @njit(nogil=True, cache=True)
 def _move(source: FloatArray, target: FloatArray, queue: NDArray[np.int64], queued: int) -> None:
     """Bring the cases of a queue together."""
-    for row in range(ROOM):
+    for row in range(MOVED):
         for q in range(queued):
             target[row * LANES + q] = source[row * LANES + queue[q]]
 
@@ -166,7 +287,7 @@ def sweep(
     line: Nodes,
     weights: FloatArray,
     local: FloatArray,
-    room: FloatArray,
+    workspace: FloatArray,
     near: FloatArray,
     queue: NDArray[np.int64],
     count: int,
@@ -181,38 +302,41 @@ def sweep(
     # the summit, where every case touches, lies in the cell before the first one
     refine(line, BEFORE - 1, 1, weights, local[0], local[1])
     for k in range(count):
-        room[U * LANES + k] = max(room[DEPTH * LANES + k] + line.height[BEFORE - 1], 0.0)
-        room[FADE * LANES + k] = room[CONTACT * LANES + k] = 1.0
-    _walk(local[0], local[1], 1, 1 + refinement, room, full)
-    room[BEGAN * LANES : ROOM * LANES] = room[U * LANES : FADE * LANES]
-    room[LOAD * LANES : STATES * LANES] = 0.0
+        w = workspace[DEPTH * LANES + k] + line.height[BEFORE - 1]
+        force = w + workspace[DEBORAH * LANES + k] / refinement * line.slope[BEFORE - 1]
+        workspace[U * LANES + k], workspace[FADE * LANES + k] = max(w, 0.0), 1.0
+        workspace[CONTACT * LANES + k] = 1.0 if w > 0 and force > 0 else 0.0
+    _walk(local[0], local[1], 1, 1 + refinement, workspace, full)
+    workspace[BEGAN * LANES : MOVED * LANES] = workspace[U * LANES : FADE * LANES]
+    workspace[LOAD * LANES : STATES * LANES] = 0.0
     for j in range(blocks.shape[0]):
         first, end = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
-        queued = _pass_block(blocks[j], line.height[end], refinement, room, count, queue)
+        queued = _pass_block(blocks[j], line.height[end], refinement, workspace, count, queue)
         if queued == 0:
             continue
-        _move(room, near, queue, queued)
+        _move(workspace, near, queue, queued)
         lanes = -(-queued // VECTOR) * VECTOR
         if refinement == 1:
             _walk(line.height, line.slope, first, end, near, lanes)
         else:
             refine(line, first, BLOCK, weights, local[0], local[1])
             _walk(local[0], local[1], 1, 1 + BLOCK * refinement, near, lanes)
-        _return(near, room, queue, queued)
+        _return(near, workspace, queue, queued)
     first = blocks.shape[0] * BLOCK
     refine(line, BEFORE + first, n - first, weights, local[0], local[1])
-    _walk(local[0], local[1], 1, 1 + (n - first) * refinement, room, full)
+    _walk(local[0], local[1], 1, 1 + (n - first) * refinement, workspace, full)
 
 
 @njit(nogil=True, cache=True)
-def load_case(room: FloatArray, k: int, depth: float, reach: float, cells: int) -> None:
+def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write what does not change of a case on a grid."""
-    room[DEPTH * LANES + k], room[REACH * LANES + k], room[INVERSE * LANES + k] = depth, reach, min(1 / reach, LARGE)
-    room[DECAY * LANES + k], room[THROUGH * LANES + k] = math.exp(-1 / reach), math.exp(-cells / reach)
+    workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k] = depth, deborah
+    workspace[INVERSE * LANES + k] = min(1 / deborah, LARGE)
+    workspace[DECAY * LANES + k], workspace[THROUGH * LANES + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
 
 
 @njit(nogil=True, cache=True, inline="always")
-def closed(room: FloatArray, k: int) -> bool:
+def closed(workspace: FloatArray, k: int) -> bool:
     """Return whether a case ended its turn as it began it: not so where the first cell is not touched."""
-    same: bool = abs(room[U * LANES + k] - room[BEGAN * LANES + k]) <= CLOSED * room[U * LANES + k]
+    same: bool = abs(workspace[U * LANES + k] - workspace[BEGAN * LANES + k]) <= CLOSED * workspace[U * LANES + k]
     return same
