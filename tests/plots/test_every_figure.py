@@ -282,8 +282,20 @@ def drawn_ends(figure) -> np.ndarray:
     return values[np.isfinite(values)]
 
 
+def stored(data, name, factor=1.0):
+    """Mean and ends of the interval of an output, from the store alone: what figures have to draw."""
+    values = data[name] * factor
+    error = data[f"{name}_error"] * factor if f"{name}_error" in data else None
+    middle = values.mean("realisation")
+    low, high = (aggregation.interval(values, error).isel(bound=k, drop=True) for k in (0, 1))
+    if error is not None:
+        half = abs(error).mean("realisation")
+        low, high = low.fillna(middle - half), high.fillna(middle + half)
+    return curves.Mean(middle, low, high)
+
+
 def over_slope(output, factor=1.0):
-    return lambda data: curves.measured(data, output, factor / spectral_slope(data))
+    return lambda data: stored(data, output, factor / spectral_slope(data))
 
 
 def friction(factor):
@@ -292,28 +304,28 @@ def friction(factor):
 
         plane = is_plane(data) if factor != 1.0 else on_generated_line(data)
         if plane:
-            return curves.measured(data, "friction_coefficient", factor / spectral_slope(data))
-        return curves.measured(data, "friction_coefficient", 1 / spectral_slope(data))
+            return stored(data, "friction_coefficient", factor / spectral_slope(data))
+        return stored(data, "friction_coefficient", 1 / spectral_slope(data))
 
     return value
 
 
 def output(name, factor=1.0):
-    return lambda data: curves.measured(data, name, factor)
+    return lambda data: stored(data, name, factor)
 
 
 def of_film(name, factor=1.0):
-    return lambda data: curves.measured(data.isel(realisation=[0]), name, factor)
+    return lambda data: stored(data.isel(realisation=[0]), name, factor)
 
 
 def share(data):
-    return curves.measured(data, "contact_length", 50 / data["contact_half_width"])
+    return stored(data, "contact_length", 50 / data["contact_half_width"])
 
 
 def volume(data):
     values = data["wear_volume"]
     if values.sizes["realisation"] < 2:
-        return curves.measured(data, "wear_volume")
+        return stored(data, "wear_volume")
     known = values.notnull().any("realisation")
     ends = [values.where(known, 0.0).quantile(q, "realisation").where(known) for q in (0.025, 0.5, 0.975)]
     return curves.Mean(ends[1], ends[0], ends[2])
