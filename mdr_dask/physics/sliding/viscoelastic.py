@@ -16,7 +16,7 @@ from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
 class Settings(NamedTuple):
-    """What was tuned, with ``python -m benchmarks friction honesty_bodies`` on seeds kept apart from those of the docs."""
+    """What was tuned with ``python -m benchmarks friction honesty_bodies``, on seeds other than those of the docs."""
 
     tolerance: float = 1e-11  # last step of Newton's method, of the depth: above rounding
     shortest: float = 1e-9  # of a cell: arms that relax within count as a dashpot, which is an arm of a tenth of it
