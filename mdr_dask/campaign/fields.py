@@ -87,6 +87,22 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
     return None
 
 
+def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
+    """Return what a file may say so that there is a field at a path, each such as ``indenter: {shape: power}``."""
+    name, *rest = path
+    if name not in parameters.model_fields or not rest:
+        return ()
+    found: list[str] = []
+    for kind in structures(parameters.model_fields[str(name)]):
+        if rest[0] in kind.model_fields:
+            needed = [key for key, info in kind.model_fields.items() if info.is_required() and key != rest[0]]
+            only = fixed(kind)
+            said = [f"{key}: {only.get(key, '...')}" for key in dict.fromkeys([*only, *needed])]
+            deeper = [[*said, one] for one in choices(kind, tuple(rest))] if len(rest) > 1 else [said]
+            found.extend(f"{name}: {{{', '.join(parts)}}}" for parts in deeper)
+    return tuple(found)
+
+
 def unit_at(parameters: type[BaseModel], path: Path, data: Any) -> str | None:
     """Return the SI unit of the field at a path into the data, None if it is not a quantity."""
     found = owner(parameters, path, data)

@@ -136,10 +136,17 @@ def _are_sound(
             given = given.get(part) if isinstance(given, dict) else None
         twice = given is not None or column.path in seen
         if found is None:
-            hint = did_you_mean(column.origin.name, list(parameters.model_fields))
-            problems.add(column.origin.place, column.origin.name, f"no such parameter{hint}")
+            problems.add(column.origin.place, column.origin.name, _unknown(column, parameters))
         elif twice:
             problems.add(column.origin.place, column.origin.name, "given twice (remove it from one of the two places)")
         sound = sound and found is not None and not twice
         seen.add(column.path)
     return sound
+
+
+def _unknown(column: Variation, parameters: type[Parameters]) -> str:
+    """Say what is wrong with a column that names no parameter of this campaign."""
+    choices = fields.choices(parameters, column.path)
+    if choices:
+        return f"expected {' or '.join(choices)} in the campaign file"
+    return f"no such parameter{did_you_mean(column.origin.name, list(parameters.model_fields))}"

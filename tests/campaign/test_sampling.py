@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mdr_dask.campaign import loads
+from mdr_dask.errors import CampaignError
 
 HEAD = "name: a\nmodel: rubbing\nparameters:\n  length: 20 mm\n"
 RANGES = "  normal_force: {geometric: [1 mN, 1 kN]}\n  velocity: {linear: [1 mm/s, 3 mm/s]}\n"
@@ -83,6 +84,22 @@ def test_a_table_gives_the_cases(tmp_path):
     labelled = next(axis for axis in series.axes if axis.path == "oversampling")
     assert (labelled.values, labelled.labels) == (("auto", 2, 4), ("auto", "2", "4"))
     assert series.parameters.indenter.angle == values(series, "indenter.angle")[0]
+
+
+@pytest.mark.parametrize(
+    ("column", "message"),
+    [
+        ("indenter.angle", "expected indenter: {shape: cone} in the campaign file"),
+        ("indenter.exponent", "expected indenter: {shape: power, radius: ...} in the campaign file"),
+        ("finish.wavelength", "expected finish: {} in the campaign file"),
+        ("indenter.angel", "no such parameter"),
+        ("velocty", r"no such parameter \(did you mean 'velocity'\?\)"),
+    ],
+)
+def test_a_column_within_a_parameter_says_what_the_file_lacks(tmp_path, column, message):
+    (tmp_path / "cases.csv").write_text(f"normal_force [N],{column}\n1,0.5\n2,0.6\n")
+    with pytest.raises(CampaignError, match=f"cases.csv:1:18: {column}: {message}"):
+        read("", "sampling: {table: cases.csv}\n", tmp_path)
 
 
 def test_cells_may_carry_units(tmp_path):

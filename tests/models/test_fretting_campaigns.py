@@ -175,20 +175,57 @@ def test_bad_numbers_are_refused_with_their_place(write, capsys, parameters, pla
     ("rows", "message"),
     [
         ("0,0\n1e-4,2e-6\n2e-4,1e-6\n1e-3,1e-3\n", "the profile must rise with the radius, got 1e-06 after 2e-06"),
-        ("0,0\n1e-4,nan\n2e-4,1e-6\n1e-3,1e-3\n", "a profile must be finite, got 0.0001, nan in row 2"),
-        ("0,0\n1e-4,inf\n2e-4,1e-6\n1e-3,1e-3\n", "a profile must be finite, got 0.0001, inf in row 2"),
+        ("0,0\n1e-4,nan\n2e-4,1e-6\n1e-3,1e-3\n", "profile.csv:3:6: column height: expected a number, got 'nan'"),
+        ("0,0\n1e-4,inf\n2e-4,1e-6\n1e-3,1e-3\n", "profile.csv:3:6: column height: expected a number, got 'inf'"),
         ("1e-5,0\n1e-4,1e-6\n2e-4,2e-6\n1e-3,1e-3\n", "must start at 0 and increase"),
-        ("0,0\n1e-4,high\n", "needs two columns of numbers"),
+        ("0,0\n1e-4,high\n", "profile.csv:3:6: column height: expected a number, got 'high'"),
     ],
 )
 def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
     path = write(TABLE)
-    Path("profile.csv").write_text("radius,height\n" + rows)
+    Path("profile.csv").write_text("radius [m],height [m]\n" + rows)
     assert main(["check", str(path)]) == 2
     error = capsys.readouterr().err
-    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv: " in error
+    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv:" in error
     assert message in error
     assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        ("radius,height [um]", "profile.csv:1:1: column radius: expected its unit, such as 'radius [mm]'"),
+        ("radius [mm],height [s]", "profile.csv:1:13: column height: "),
+        ("radius [mm],hight [um]", "profile.csv:1:13: unknown column 'hight' (did you mean 'height'?)"),
+        ("radius [mm],radius [mm]", "profile.csv:1:13: column radius is given twice"),
+    ],
+)
+def test_columns_of_a_profile_need_their_names_and_units(write, capsys, names, message):
+    """Any header was skipped, and every number taken in metres."""
+    path = write(TABLE)
+    Path("profile.csv").write_text(f"{names}\n0,0\n1e-1,1\n2e-1,2\n1,1e3\n")
+    assert main(["check", str(path)]) == 2
+    error = capsys.readouterr().err
+    assert "wear.yaml:4:34: parameters.indenter.file: profile.csv:1:" in error
+    assert message in error
+    assert len(error.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("shape", "message"),
+    [
+        ("", "expected indenter: {shape: power} in the campaign file"),
+        ("  indenter: {shape: cone}\n", "expected indenter: {shape: power} in the campaign file"),
+    ],
+)
+def test_a_column_of_one_shape_says_which_shape_the_file_lacks(write, capsys, shape, message):
+    """It was "no such parameter (did you mean 'indenter'?)"."""
+    path = write(f"  stick_radius: 0.5\n{shape}", "sampling: {table: cases.csv}\n")
+    Path("cases.csv").write_text("indenter.exponent,cycles\n1.5,1\n3,2\n")
+    assert main(["check", str(path)]) == 2
+    assert capsys.readouterr().err == f"cases.csv:1:1: indenter.exponent: {message}\n"
+    path = write("  stick_radius: 0.5\n  indenter: {shape: power}\n", "sampling: {table: cases.csv}\n")
+    assert main(["check", str(path)]) == 0
 
 
 @pytest.mark.parametrize(
@@ -203,7 +240,7 @@ def test_bad_tables_are_refused_with_their_place(write, capsys, rows, message):
 )
 def test_impossible_contacts_are_failed_cases_with_a_sentence(write, capsys, parameters, message):
     path = write(parameters)
-    Path("profile.csv").write_text("radius,height\n0,0\n1e-6,1e-10\n2e-6,4e-10\n3e-6,9e-10\n")
+    Path("profile.csv").write_text("radius [m],height [m]\n0,0\n1e-6,1e-10\n2e-6,4e-10\n3e-6,9e-10\n")
     assert main(["run", str(path), "--quiet"]) == 1
     assert "0 done, 1 failed" in capsys.readouterr().out
     main(["status", "wear.zarr", "--failures"])

@@ -150,14 +150,18 @@ def test_a_history_may_slip_everywhere():
     assert result.values["wear_volume"][0, 0] > 0
 
 
-def table(tmp_path, rows):
+def named(path):
     from hashlib import sha256
 
-    path = tmp_path / "profile.csv"
-    path.write_text("radius,height\n" + "\n".join(f"{r!r},{f!r}" for r, f in rows))
     return Table(
         shape="table", file=DataFile(name=path.name, path=str(path), sha256=sha256(path.read_bytes()).hexdigest())
     )
+
+
+def table(tmp_path, rows):
+    path = tmp_path / "profile.csv"
+    path.write_text("radius [m],height [m]\n" + "\n".join(f"{r!r},{f!r}" for r, f in rows))
+    return named(path)
 
 
 def table_case(shape, **changes):
@@ -172,6 +176,22 @@ def test_table_of_a_ball(tmp_path):
     smooth = run(FrettingWear(**{**STEEL, "normal_force": None, "depth": 4.7e-6}))
     for name in ("wear_volume", "contact_radius", "contact_force"):
         assert measured.values[name][0, 0] == pytest.approx(smooth.values[name][0, 0], rel=1e-5)
+
+
+def test_a_table_of_a_profile_may_have_its_columns_in_any_order_and_unit(tmp_path):
+    """Names and units were ignored: such a table was read as radii of heights, in metres."""
+    path = tmp_path / "profile.csv"
+    r = np.linspace(0, 1.0, 51).tolist()
+    texts = (
+        "radius [m],height [m]\n" + "".join(f"{x / 1e3!r},{x**2 / 2e4!r}\n" for x in r),
+        "# stylus\nHeight [um];radius [mm]\n" + "".join(f"{50 * x**2!r};{x!r}\n".replace(".", ",") for x in r),
+    )
+    found = []
+    for text in texts:
+        path.write_text(text)
+        found.append(table_case(named(path)).values["wear_volume"][0, 0])
+    assert found[0] > 0
+    assert found[1] == pytest.approx(found[0], rel=1e-9)
 
 
 def test_contact_beyond_the_table(tmp_path):

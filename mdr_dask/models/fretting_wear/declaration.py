@@ -10,7 +10,9 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
 from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
+from mdr_dask.tables import Column, read_table
 
 
 class Parabola(Parameters):
@@ -53,10 +55,10 @@ class Power(Parameters):
 
 
 class Table(Parameters):
-    """A measured profile: a CSV table with two columns, radius and height, in metres, and a header line."""
+    """A measured profile: a table with the columns radius and height, and their units."""
 
     shape: Literal["table"]
-    file: NamedFile
+    file: NamedFile = Field(description="table with the columns radius and height, and their units")
 
     @property
     def power_law(self) -> tuple[float, float]:
@@ -66,13 +68,23 @@ class Table(Parameters):
     @field_validator("file")
     @classmethod
     def _is_profile(cls, file: NamedFile) -> NamedFile:
-        from mdr_dask.physics.mdr.profile_table import read_table
+        from mdr_dask.physics.mdr.revolution import check_table
 
         try:
-            read_table(file.read_text())
+            columns = profile_columns(file)
+        except DataError as problem:
+            raise ValueError(str(problem)) from None
+        try:
+            check_table(*columns)
         except ValueError as problem:
             raise ValueError(f"{file.name}: {problem}") from None
         return file
+
+
+def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
+    """Return radii and heights of a measured profile, in metres."""
+    table = read_table(file.read_text(), file.name, (Column("radius", "m", ("r",)), Column("height", "m", ("h", "f"))))
+    return table["radius"], table["height"]
 
 
 Indenter = Annotated[Parabola | Cone | Power | Table, Field(discriminator="shape")]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, canonical
-from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table
+from mdr_dask.models.base import Block, NamedFile, canonical
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table, profile_columns
 
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
@@ -139,15 +139,14 @@ def table_profile(indenter: Indenter, depth: float) -> TableProfile:
     """Read a table and press it; cached by content."""
     if not isinstance(indenter, Table):
         raise ValueError("tables and formulas of profiles cannot be mixed along one axis")
-    return _pressed_table(indenter.file.read_text(), depth)
+    return _pressed_table(indenter.file, depth)
 
 
 @lru_cache(maxsize=64)
-def _pressed_table(text: str, depth: float) -> TableProfile:
-    from mdr_dask.physics.mdr.profile_table import read_table
+def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 
-    return from_table(*read_table(text), depth)
+    return from_table(*profile_columns(file), depth)
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:

@@ -15,7 +15,6 @@ from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, inlined
-from mdr_dask.physics.mdr.profile_table import check_table
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
 
 
@@ -230,6 +229,27 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
         )
     a0 = bisect(lambda x: float(image_curve(x)) - depth, 0.0, float(r[-1]))
     return TableProfile(_scaled(interpolant, a0, depth), _scaled(image_curve, a0, depth), a0, depth)
+
+
+def check_table(radius: FloatArray, height: FloatArray) -> None:
+    """Raise ValueError unless a table of a profile starts at the axis, is finite and rises."""
+    if radius.ndim != 1 or radius.shape != height.shape or radius.size < 4:
+        raise ValueError(
+            f"a profile needs two columns of at least 4 rows, got shapes {radius.shape!r} and {height.shape!r}"
+        )
+    if not (np.all(np.isfinite(radius)) and np.all(np.isfinite(height))):
+        bad = int(np.argmin(np.isfinite(radius) & np.isfinite(height)))
+        raise ValueError(
+            f"a profile must be finite, got {float(radius[bad])!r}, {float(height[bad])!r} in row {bad + 1}"
+        )
+    if radius[0] != 0.0 or np.any(np.diff(radius) <= 0.0):
+        raise ValueError(f"the radii of a profile must start at 0 and increase, got {float(radius[0])!r} first")
+    if np.any(np.diff(height) <= 0.0):
+        bad = int(np.argmax(np.diff(height) <= 0.0))
+        raise ValueError(
+            f"the profile must rise with the radius, got {float(height[bad + 1])!r} after {float(height[bad])!r} "
+            f"at r = {float(radius[bad + 1])!r}"
+        )
 
 
 def _scaled(curve: PPoly, length: float, height: float) -> PPoly:
