@@ -16,7 +16,13 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.wear.evolution import Dense, NotConvergedError, Resolution, integral_along, march
-from mdr_dask.physics.wear.forced import border_moves, forced_contacts, forced_end, forced_resolution
+from mdr_dask.physics.wear.forced import (
+    border_moves,
+    forced_contacts,
+    forced_end,
+    forced_resolution,
+    least_edge_error,
+)
 from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
@@ -72,8 +78,14 @@ def exact(
     wanted = sorted({float(amount) for amount in amounts})
     resolution = forced_resolution(accuracy) if solve is forced_contacts else Resolution(accuracy)
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
+    least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
     judged = {
-        amount: replace(one, rougher=tuple(other[amount] for other in rougher), slowness=resolution.slowness)
+        amount: replace(
+            one,
+            rougher=tuple(other[amount] for other in rougher),
+            slowness=resolution.slowness,
+            least_edge_error=least,
+        )
         for amount, one in found.items()
     }
     return [judged[float(amount)] for amount in amounts]
@@ -90,7 +102,8 @@ def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1
         return limit(profile, stick_radius)
     resolution = forced_resolution(accuracy)
     found, *rougher = _solutions(lambda one: forced_end(profile, stick_radius, one), resolution, errors)
-    return replace(found, rougher=tuple(rougher), slowness=resolution.slowness)
+    least = least_edge_error(stick_radius, accuracy)
+    return replace(found, rougher=tuple(rougher), slowness=resolution.slowness, least_edge_error=least)
 
 
 def _solutions(solve: Callable[[Resolution], Found], resolution: Resolution, errors: bool) -> list[Found]:

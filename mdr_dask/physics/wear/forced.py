@@ -50,6 +50,9 @@ class Settings(NamedTuple):
         How much wider the accuracy of the two rougher solutions is.
     slowness : float
         How much more slowly than usual the error falls from them.
+    least_edge_error : float
+        Least error of the radii over accuracy and width of the virgin slip zone: next to full stick the border stops
+        at one place in all solutions.
     """
 
     jump: float = 0.1
@@ -60,6 +63,7 @@ class Settings(NamedTuple):
     coarsest: float = 1e-3
     rougher: tuple[float, float] = (2.0, 4.0)
     slowness: float = 2.0
+    least_edge_error: float = 0.1
 
 
 SETTINGS = Settings()
@@ -108,6 +112,11 @@ def border_moves(stick_radius: float, accuracy: float) -> bool:
     the root of that share.
     """
     return 0.5 * (1.0 - stick_radius) > accuracy**2
+
+
+def least_edge_error(stick_radius: float, accuracy: float) -> float:
+    """Return the least error of the radii under constant force."""
+    return SETTINGS.least_edge_error * min(accuracy, SETTINGS.coarsest) * (1.0 - stick_radius)
 
 
 def farthest_contact(profile: Profile, stick_radius: float) -> float:

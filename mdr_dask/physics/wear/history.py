@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +18,26 @@ from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.uniform_grid import UniformGrid, uniform_grid
 from mdr_dask.physics.wear.worn import Worn
 
-#: Share of the largest stable explicit step, 1.7 h.
-_STEP_SHARE = 0.45
-#: How much more slowly the error falls on grids of half as many cells than with the accuracy of the evolution.
-_SLOWNESS = 2.0
+
+class Settings(NamedTuple):
+    """Tuned numbers of histories; `tests/physics/wear/test_errors.py` judges those of the errors.
+
+    Parameters
+    ----------
+    step_share : float
+        Share of the largest stable explicit step, 1.7 h.
+    slowness : float
+        How much more slowly the error falls on grids of half as many cells than with the accuracy of the evolution.
+    least_edge_error : float
+        Least error of the radii, in cells: between nodes their place is hardly known, and grids agree by chance.
+    """
+
+    step_share: float = 0.45
+    slowness: float = 2.0
+    least_edge_error: float = 0.5
+
+
+SETTINGS = Settings()
 
 
 @dataclass(frozen=True)
@@ -86,11 +103,11 @@ def history(
         _run(profile, blocks, uniform_grid(number, length))
         for number in (cells, cells // 2, cells // 4)[: 3 if errors else 1]
     )
-    return (
-        [replace(one, rougher=tuple(others), slowness=_SLOWNESS) for one, *others in zip(fine, *rough, strict=True)]
-        if rough
-        else fine
-    )
+    least = SETTINGS.least_edge_error * length / cells
+    return [
+        replace(one, rougher=tuple(others), slowness=SETTINGS.slowness, least_edge_error=least)
+        for one, *others in zip(fine, *rough, strict=True)
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +135,7 @@ def _advance(grid: UniformGrid, image_0: FloatArray, worn: FloatArray, block: Lo
     """Step through a block by Heun's rule; return the worn depth and the energy over mu."""
     done, energy = 0.0, 0.0
     while done < block.cycles:
-        step = min(_STEP_SHARE * 1.7 * grid.spacing, block.cycles - done)
+        step = min(SETTINGS.step_share * 1.7 * grid.spacing, block.cycles - done)
         first = _state(grid, image_0 + grid.forward @ worn, block)
         rate = first.pressure * first.slip
         second = _state(grid, image_0 + grid.forward @ (worn + step * rate), block)

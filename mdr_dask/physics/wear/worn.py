@@ -73,6 +73,8 @@ class Worn:
         Two rougher solutions of the same contact, which tell its error.
     slowness : float
         How much more slowly than usual the error falls from the rougher solutions to this one.
+    least_edge_error : float
+        Least error of the radii of scar and stick zone: rougher solutions may agree on them by chance.
     relative_error : float
         Error of every output over its largest value, where there is no rougher solution.
     """
@@ -90,6 +92,7 @@ class Worn:
     steps: int = 0
     rougher: tuple[Worn, ...] = ()
     slowness: float = 1.0
+    least_edge_error: float = 0.0
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
@@ -127,8 +130,10 @@ class Worn:
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
         weighted = [gap * (SETTINGS.second if number else 1.0) for number, gap in enumerate(gaps)]
-        safety = SETTINGS.edges if output in ("contact_radius", "stick_border") else SETTINGS.safety
-        return np.asarray(safety * self.slowness * np.max(weighted, axis=0))
+        distance = self.slowness * np.max(weighted, axis=0)
+        if output in ("contact_radius", "stick_border"):
+            return np.asarray(np.maximum(SETTINGS.edges * distance, self.least_edge_error))
+        return np.asarray(SETTINGS.safety * distance)
 
     def _crowd(self, last: float) -> FloatArray:
         """Return places that crowd at the borders of stick and contact."""
