@@ -42,7 +42,7 @@ def _jump_law(studies: Studies) -> Found:
 def _one_exponential(studies: Studies) -> Found:
     """Fit one exponential to the case of figure 4.3."""
     fitted = next(iter(studies.fit("kinetics2014", "relaxation", ("example",), points="5000").values())).squeeze()
-    return judged(f"b = {interval(fitted, 'rate', 2)} by least squares", abs(float(fitted.rate) / 2.4 - 1), 0.05, 1.0)
+    return judged(f"b = {interval(fitted, 'rate', 2)} by least squares", abs(float(fitted.rate) / 2.4 - 1), 0.02, 1.0)
 
 
 def _linear(studies: Studies) -> Found:
