@@ -85,7 +85,7 @@ def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=8)  # powers of two: lines of a hundred times the points share them
 def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     factors = np.empty((modes, 2))
     _turn(_generator(seed, realisation).random(modes), factors)
