@@ -35,6 +35,7 @@ series:
   velocity: {hurst: [0.2, 0.6], velocity: {geometric: [0.1 mm/s, 1 m/s, 9]}}
   slow: {hurst: 0.4, velocity: {geometric: [0.05 mm/s, 0.5 mm/s, 4]}}
   force_velocity: {normal_force: [0.1 N, 10 N], velocity: [1 mm/s, 0.1 m/s]}
+errors: false
 outputs:
   - friction_coefficient_before
   - friction_coefficient_jump

@@ -44,7 +44,10 @@ WRONG = [
     ("aggregate STORE -o STORE", "expected a place for the statistics, got the store of a study: 'STORE'"),
     ("aggregate STORE -o small.yaml/x.csv", "small.yaml/x.csv: Not a directory"),
     ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
-    ("plot STORE nothing", "no figure of sliding_friction is called 'nothing'; known: regions, velocity"),
+    (
+        "plot STORE nothing",
+        "no figure of sliding_friction is called 'nothing'; known: contact, lines, regions, velocity",
+    ),
     ("plot STORE velocity --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
     ("plot STORE velocity -o velocity.bmp", "expected a file that ends in .png, .pdf or .svg, got 'velocity.bmp'"),
     ("plot STORE velocity force -o both.png", "expected a folder for the figures, got 'both.png'"),

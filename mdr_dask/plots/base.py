@@ -10,6 +10,7 @@ import xarray as xr
 
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
+from mdr_dask.store import is_damage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,6 +55,8 @@ class Plot:
         except MdrDaskError:
             raise
         except Exception as error:
+            if is_damage(error):
+                raise
             # a fault of the figure must neither end the others nor the program
             problem = f"{type(error).__name__}: {error}"
             raise DataError(f"a fault of this figure, please report it with the campaign: {problem}") from error

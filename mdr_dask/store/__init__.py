@@ -19,7 +19,7 @@ from mdr_dask.store.blocks import (
 from mdr_dask.store.files import attributes, exists, is_study, lock, sweep
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
-from mdr_dask.store.reading import datasets, readable, save
+from mdr_dask.store.reading import datasets, is_damage, readable, save
 
 __all__ = [
     "Place",
@@ -28,6 +28,7 @@ __all__ = [
     "attributes",
     "datasets",
     "exists",
+    "is_damage",
     "is_study",
     "lay_out",
     "ledger",

@@ -25,11 +25,16 @@ def readable(url: str) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
-        room = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
-        if isinstance(error, OSError) or room not in ("zarr", "numcodecs"):
+        if not is_damage(error):
             raise
         raise StoreError(f"{url}: damaged, a chunk cannot be read: {error}") from None
+
+
+def is_damage(error: Exception) -> bool:
+    """Return whether it is Zarr that complains: of a chunk that cannot be read."""
+    *_, (innermost, _) = traceback.walk_tb(error.__traceback__)
+    room = str(innermost.f_globals.get("__name__", "")).partition(".")[0]
+    return not isinstance(error, OSError) and room in ("zarr", "numcodecs")
 
 
 def datasets(url: str) -> dict[str, xr.Dataset]:

@@ -29,7 +29,7 @@ class Generated:
         from mdr_dask.physics.surfaces.waves import Waves
 
         amplitude = _amplitudes(self)
-        return Waves(0.5 * amplitude * roughness.turns(seed, realisation, self.points // 2), self.points)
+        return Waves(0.5 * amplitude * roughness.phase_factors(seed, realisation, self.points // 2), self.points)
 
     def slope(self) -> float:
         """Return the spectral rms slope."""

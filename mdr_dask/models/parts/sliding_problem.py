@@ -65,6 +65,13 @@ class SlidingProblems:
             if sound:
                 yield self.settings[sound[0]], tuple(others), np.array(sound)
 
+    def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the different Deborah numbers and loads among some cases, and which of them each case has."""
+        pairs = list(zip(self.deborah[members].tolist(), self.loads[members].tolist(), strict=True))
+        places = {pair: k for k, pair in enumerate(sorted(set(pairs)))}
+        deborah, loads = np.array(list(places)).T.copy()
+        return deborah, loads, np.array([places[pair] for pair in pairs])
+
 
 def sliding_problems(block: Block[Any]) -> SlidingProblems:
     """Return the cases of a block of any `SlidingBody` without units."""

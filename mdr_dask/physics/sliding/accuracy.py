@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -180,12 +181,12 @@ class Ladder:
             found, change = fine.steady(), _changes(coarse, fine)
             touched = fine.contact_fraction * self.line.points
             errors_now = _sampled_errors(found, touched, settings.sampled * refinement, change, before)
-            known = Errors(*(errors_now + np.nan_to_num(fine.doubts)))
+            known = Errors(*(errors_now + np.where(np.isnan(fine.doubts), 0.0, fine.doubts)))
             steady, errors = steady.replaced(left, found), errors.replaced(left, known)
             still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
-            left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
-            if not left.size:
+            if not np.any(still):
                 break
+            left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
         return steady, errors
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, Errors]:
@@ -238,6 +239,12 @@ def _changes(coarse: Any, fine: Any) -> FloatArray:
     return np.where(np.isfinite(changes), changes, np.inf)
 
 
+@lru_cache
+def _column(factors: tuple[float, ...]) -> FloatArray:
+    """Return one factor a row."""
+    return np.array(factors)[:, None]
+
+
 def _sampled_errors(
     steady: Steady, touched: FloatArray, oversampling: int, change: FloatArray, before: FloatArray
 ) -> FloatArray:
@@ -247,9 +254,7 @@ def _sampled_errors(
     contact where many do not. `touched` is how many Nyquist points are in contact.
     """
     settings = SETTINGS
-    of_change, of_any, profile = (
-        np.array(factors)[:, None] for factors in (settings.of_change, settings.of_any_change, settings.profile)
-    )
+    of_change, of_any, profile = map(_column, (settings.of_change, settings.of_any_change, settings.profile))
     sizes = np.array([steady.drag, np.ones(steady.drag.size), steady.contact_fraction, steady.contact_slope])
     touching = touched * oversampling
     with np.errstate(all="ignore"):

@@ -34,7 +34,7 @@ PEAK, LOWEST, STEEPEST, BEFORE, HEIGHTS, RISES, WORK, SQUARES = range(8)
 KNOWN = 8
 # What a sweep holds of a case, in this order; the last four while it goes from node to node
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
-ROOM = 7
+ROWS = 7
 
 
 @njit(nogil=True, cache=True)
@@ -74,10 +74,10 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 def _pass_block(
     block: FloatArray,
     last: float,
-    reaches: FloatArray,
+    deborah: FloatArray,
     decay: FloatArray,
     depth: FloatArray,
-    room: FloatArray,
+    workspace: FloatArray,
     sums: FloatArray,
     queue: NDArray[np.int64],
 ) -> int:
@@ -86,18 +86,18 @@ def _pass_block(
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
     queued = 0
     for k in range(depth.size):
-        d, u = depth[k], room[U, k]
-        if peak + d <= u * room[THROUGH, k]:
-            sums[CARRIED, k] += u * room[MEMORY, k]
-            sums[STIFFNESS, k] += room[FADE, k] * room[MEMORY, k]
-            room[U, k] = u * room[THROUGH, k]
-            room[FADE, k] *= room[THROUGH, k]
-        elif u == before + d and lowest + d + reaches[k] * steepest > 0:
+        d, u = depth[k], workspace[U, k]
+        if peak + d <= u * workspace[THROUGH, k]:
+            sums[CARRIED, k] += u * workspace[MEMORY, k]
+            sums[STIFFNESS, k] += workspace[FADE, k] * workspace[MEMORY, k]
+            workspace[U, k] = u * workspace[THROUGH, k]
+            workspace[FADE, k] *= workspace[THROUGH, k]
+        elif u == before + d and lowest + d + deborah[k] * steepest > 0:
             sums[CARRIED, k] += heights + BLOCK * d
             sums[STIFFNESS, k] += BLOCK
             sums[DRAG, k] += (1 - decay[k]) * (work + d * rises) + decay[k] * squares
-            room[U, k] = last + d
-            room[FADE, k] = 1.0
+            workspace[U, k] = last + d
+            workspace[FADE, k] = 1.0
         else:
             queue[queued] = k
             queued += 1
@@ -105,30 +105,30 @@ def _pass_block(
 
 
 @njit(nogil=True, cache=True)
-def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, room: FloatArray) -> None:
+def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
     """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4
     for i in range(0, whole, 4):
         h0, h1, h2, h3 = height[i], height[i + 1], height[i + 2], height[i + 3]
         t0, t1, t2, t3 = rise[i], rise[i + 1], rise[i + 2], rise[i + 3]
         for k in range(depth.size):
-            u0, a0, x0 = _step(h0, t0, decay[k], depth[k], room[U, k], room[FADE, k])
+            u0, a0, x0 = _step(h0, t0, decay[k], depth[k], workspace[U, k], workspace[FADE, k])
             u1, a1, x1 = _step(h1, t1, decay[k], depth[k], u0, a0)
             u2, a2, x2 = _step(h2, t2, decay[k], depth[k], u1, a1)
             u3, a3, x3 = _step(h3, t3, decay[k], depth[k], u2, a2)
-            room[U, k] = u3
-            room[FADE, k] = a3
-            room[LOAD, k] += (u0 + u1) + (u2 + u3)
-            room[RATE, k] += (a0 + a1) + (a2 + a3)
-            room[LOSS, k] += (x0 + x1) + (x2 + x3)
+            workspace[U, k] = u3
+            workspace[FADE, k] = a3
+            workspace[LOAD, k] += (u0 + u1) + (u2 + u3)
+            workspace[RATE, k] += (a0 + a1) + (a2 + a3)
+            workspace[LOSS, k] += (x0 + x1) + (x2 + x3)
     for i in range(whole, height.size):
         for k in range(depth.size):
-            u0, a0, x0 = _step(height[i], rise[i], decay[k], depth[k], room[U, k], room[FADE, k])
-            room[U, k] = u0
-            room[FADE, k] = a0
-            room[LOAD, k] += u0
-            room[RATE, k] += a0
-            room[LOSS, k] += x0
+            u0, a0, x0 = _step(height[i], rise[i], decay[k], depth[k], workspace[U, k], workspace[FADE, k])
+            workspace[U, k] = u0
+            workspace[FADE, k] = a0
+            workspace[LOAD, k] += u0
+            workspace[RATE, k] += a0
+            workspace[LOSS, k] += x0
 
 
 @njit(nogil=True, cache=True)
@@ -137,24 +137,24 @@ def _walk_some(
     rise: FloatArray,
     decay: FloatArray,
     depth: FloatArray,
-    room: FloatArray,
+    workspace: FloatArray,
     sums: FloatArray,
     queue: NDArray[np.int64],
     near: FloatArray,
 ) -> None:
-    """Take the cases of a queue from node to node, together in `near`, which has two rows more than `room`."""
+    """Take the cases of a queue from node to node, together in `near`, which has two rows more than `workspace`."""
     for q in range(queue.size):
         k = queue[q]
-        near[U, q], near[FADE, q] = room[U, k], room[FADE, k]
-        near[ROOM, q], near[ROOM + 1, q] = decay[k], depth[k]
+        near[U, q], near[FADE, q] = workspace[U, k], workspace[FADE, k]
+        near[ROWS, q], near[ROWS + 1, q] = decay[k], depth[k]
         near[LOAD, q] = near[RATE, q] = near[LOSS, q] = 0.0
     # full vectors are quicker than the rest of one
     full = -(-queue.size // LANES) * LANES
     near[:, queue.size : full] = 0.0
-    _walk(height, rise, near[ROOM, :full], near[ROOM + 1, :full], near)
+    _walk(height, rise, near[ROWS, :full], near[ROWS + 1, :full], near)
     for q in range(queue.size):
         k = queue[q]
-        room[U, k], room[FADE, k] = near[U, q], near[FADE, q]
+        workspace[U, k], workspace[FADE, k] = near[U, q], near[FADE, q]
         sums[CARRIED, k] += near[LOAD, q]
         sums[STIFFNESS, k] += near[RATE, q]
         sums[DRAG, k] += near[LOSS, q]
@@ -166,10 +166,10 @@ def _sweep(
     rise: FloatArray,
     blocks: FloatArray,
     periodic: bool,
-    reaches: FloatArray,
+    deborah: FloatArray,
     decay: FloatArray,
     depth: FloatArray,
-    room: FloatArray,
+    workspace: FloatArray,
     near: FloatArray,
     queue: NDArray[np.int64],
     sums: FloatArray,
@@ -186,28 +186,28 @@ def _sweep(
         From `_blocks`.
     periodic : bool
         Whether the line closes on itself; its highest node then comes last.
-    reaches, decay, depth : array, shape (cases,)
+    deborah, decay, depth : array, shape (cases,)
         v tau in cells, lambda, and the penetration of the highest node.
-    room, near, queue : array, shape (ROOM, cases), (ROOM + 2, cases + LANES), (cases,)
-        Room; `U` and `FADE` of `room` end as u and its derivative at the end of the line.
+    workspace, near, queue : array, shape (ROWS, cases), (ROWS + 2, cases + LANES), (cases,)
+        Workspace; `U` and `FADE` of `workspace` end as u and its derivative at the end of the line.
     sums : array, shape (SUMS, cases)
         Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
     """
     for k in range(depth.size):
-        room[U, k] = depth[k] if periodic else 0.0
-        room[FADE, k] = 1.0 if periodic else 0.0
-        lost = -math.expm1(-BLOCK * math.log1p(1 / reaches[k]))
-        room[THROUGH, k], room[MEMORY, k] = 1 - lost, reaches[k] * lost
+        workspace[U, k] = depth[k] if periodic else 0.0
+        workspace[FADE, k] = 1.0 if periodic else 0.0
+        lost = -math.expm1(-BLOCK * math.log1p(1 / deborah[k]))
+        workspace[THROUGH, k], workspace[MEMORY, k] = 1 - lost, deborah[k] * lost
         sums[CARRIED, k] = sums[STIFFNESS, k] = sums[DRAG, k] = 0.0
     for j in range(blocks.shape[0]):
         first, end = j * BLOCK, (j + 1) * BLOCK
-        queued = _pass_block(blocks[j], height[end - 1], reaches, decay, depth, room, sums, queue)
+        queued = _pass_block(blocks[j], height[end - 1], deborah, decay, depth, workspace, sums, queue)
         if queued:
-            _walk_some(height[first:end], rise[first:end], decay, depth, room, sums, queue[:queued], near)
+            _walk_some(height[first:end], rise[first:end], decay, depth, workspace, sums, queue[:queued], near)
     first = blocks.shape[0] * BLOCK
     for k in range(depth.size):
         queue[k] = k
-    _walk_some(height[first:], rise[first:], decay, depth, room, sums, queue[: depth.size], near)
+    _walk_some(height[first:], rise[first:], decay, depth, workspace, sums, queue[: depth.size], near)
 
 
 @njit(nogil=True, cache=True)
@@ -215,7 +215,7 @@ def _newton(
     height: FloatArray,
     rise: FloatArray,
     periodic: bool,
-    reaches: FloatArray,
+    deborahs: FloatArray,
     loads: FloatArray,
     tolerance: float,
     depths: FloatArray,
@@ -229,31 +229,33 @@ def _newton(
     """
     cases = loads.size
     active = np.arange(cases)
-    depth, load, reach = depths.copy(), loads.copy(), reaches.copy()
-    decay = reaches / (1 + reaches)
+    depth, load, deborah = depths.copy(), loads.copy(), deborahs.copy()
+    decay = deborahs / (1 + deborahs)
     blocks = _blocks(height, rise, periodic)
-    room, near, sums = np.empty((ROOM, cases)), np.empty((ROOM + 2, cases + LANES)), np.empty((SUMS, cases))
+    workspace, near, sums = np.empty((ROWS, cases)), np.empty((ROWS + 2, cases + LANES)), np.empty((SUMS, cases))
     queue, before = np.empty(cases, np.int64), np.full((2, cases), np.nan)
     drags[:] = np.nan
     ends = 0.0 if periodic else 1.0
     count = cases
     for _ in range(ITERATIONS):
-        _sweep(height, rise, blocks, periodic, reach[:count], decay[:count], depth[:count], room, near, queue, sums)
+        _sweep(
+            height, rise, blocks, periodic, deborah[:count], decay[:count], depth[:count], workspace, near, queue, sums
+        )
         kept = 0
         for k in range(count):
             case = active[k]
             # behind a line that does not close, u and its derivative fade away undisturbed
-            carried = sums[CARRIED, k] + ends * reach[k] * room[U, k]
-            step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * reach[k] * room[FADE, k])
-            drag = sums[DRAG, k] * (1 + reach[k])
+            carried = sums[CARRIED, k] + ends * deborah[k] * workspace[U, k]
+            step = (load[k] - carried) / (sums[STIFFNESS, k] + ends * deborah[k] * workspace[FADE, k])
+            drag = sums[DRAG, k] * (1 + deborah[k])
             earlier = before[0, k] - depth[k]
             if abs(step) <= EXACT_STEP * depth[k] or abs(step * earlier) <= tolerance * depth[k] ** 2:
                 change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
                 depths[case] = depth[k] + step
                 drags[case] = drag + change
-                outside[case] = not periodic and (room[FADE, k] == 1 or height[0] + depth[k] > 0)
+                outside[case] = not periodic and (workspace[FADE, k] == 1 or height[0] + depth[k] > 0)
                 continue
-            active[kept], decay[kept], load[kept], reach[kept] = case, decay[k], load[k], reach[k]
+            active[kept], decay[kept], load[kept], deborah[kept] = case, decay[k], load[k], deborah[k]
             before[0, kept], before[1, kept] = depth[k], drag
             depth[kept] = max(depth[k] + step, 0.25 * depth[k])
             kept += 1
@@ -266,14 +268,14 @@ def _newton(
 def contact(
     height: FloatArray,
     periodic: bool,
-    reaches: FloatArray,
+    deborah: FloatArray,
     depths: FloatArray,
     touched: FloatArray,
     slope: FloatArray,
 ) -> None:
     """Write the number of nodes in contact and the rms rise over them, for line and cases as in :func:`solve`."""
     for k in range(depths.size):
-        decay, count, square = reaches[k] / (1 + reaches[k]), 0, 0.0
+        decay, count, square = deborah[k] / (1 + deborah[k]), 0, 0.0
         u = depths[k] if periodic else 0.0
         for i in range(height.size):
             w = height[i] + depths[k]
@@ -289,7 +291,7 @@ def contact(
 
 
 def solve(
-    height: FloatArray, periodic: bool, reaches: FloatArray, loads: FloatArray
+    height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.
 
@@ -302,7 +304,7 @@ def solve(
         Heights from the highest node, which comes last if the line is periodic.
     periodic : bool
         Whether the line closes on itself; if not, elements enter undeformed at the first node.
-    reaches, loads : array, shape (cases,)
+    deborah, loads : array, shape (cases,)
         v tau in cells, and F_N / (4 G dx) in the unit of height; both positive and finite.
     """
     strides = [1]
@@ -316,5 +318,5 @@ def solve(
         coarse = np.ascontiguousarray(height[top % stride :: stride])
         rise = coarse - np.roll(coarse, 1)
         tolerance = CONVERGED if stride == 1 else COARSE
-        _newton(coarse, rise, periodic, reaches / stride, loads / stride, tolerance, depths, drags, outside)
+        _newton(coarse, rise, periodic, deborah / stride, loads / stride, tolerance, depths, drags, outside)
     return depths, drags, outside

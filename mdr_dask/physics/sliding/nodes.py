@@ -75,30 +75,35 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     n = height.size // stride
     h, s = np.empty(n + BEFORE + AFTER), np.empty(n + BEFORE + AFTER)
     top = height[first]
-    source = first
-    for i in range(BEFORE, n + BEFORE):
-        h[i] = height[source] - top
-        s[i] = slope[source] / n
-        source += stride
-        source = source if source < height.size else source - height.size
+    turned = min(-(-(height.size - first) // stride), n)  # nodes up to the end of the line as it is given
+    for i in range(turned):
+        h[BEFORE + i] = height[first + i * stride] - top
+        s[BEFORE + i] = slope[first + i * stride] / n
+    first -= height.size
+    for i in range(turned, n):
+        h[BEFORE + i] = height[first + i * stride] - top
+        s[BEFORE + i] = slope[first + i * stride] / n
     _close(h)
     if not resolved:
         for i in range(BEFORE, n + BEFORE):
             s[i] = 0.5 * (h[i + 1] - h[i - 1])
     _close(s)
-    blocks = np.empty((n // BLOCK, KNOWN))
+    blocks, terms, above, parts = np.empty((n // BLOCK, KNOWN)), np.empty(BLOCK + 1), np.empty(BLOCK), np.empty(BLOCK)
     for j in range(blocks.shape[0]):
-        last = BEFORE + (j + 1) * BLOCK
+        begin, last = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
+        # cell by cell, so that these are vector instructions, and then their sums
+        for k in range(BLOCK + 1):
+            terms[k] = end_term(h, s, begin + k)
+        for k in range(BLOCK):
+            i = begin + k
+            above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
+            parts[k] = 0.5 * (h[i] + h[i + 1]) + (s[i] - s[i + 1]) / 12
+            terms[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + terms[k] - terms[k + 1]
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
-        term = end_term(h, s, last - BLOCK)
-        for i in range(last - BLOCK, last):
-            fall = s[i] - s[i + 1]
-            above = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
-            peak, lowest, steepest = max(peak, above), min(lowest, h[i]), min(steepest, s[i])
-            heights += 0.5 * (h[i] + h[i + 1]) + fall / 12
-            next_term = end_term(h, s, i + 1)
-            squares += 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + term - next_term
-            term = next_term
+        for k in range(BLOCK):
+            peak, lowest, steepest = max(peak, above[k]), min(lowest, h[begin + k]), min(steepest, s[begin + k])
+            heights += parts[k]
+            squares += terms[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
     return Nodes(h, s, blocks, top)

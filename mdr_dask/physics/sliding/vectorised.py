@@ -85,10 +85,11 @@ class Sampled:
 
     def steady(self) -> Steady:
         """Return the states."""
-        status = np.where(np.isfinite(self.drag) & (self.drag > 0), Outcome.CONVERGED, Outcome.DEPTH_NOT_FOUND)
+        found = np.isfinite(self.drag) & (self.drag > 0)
+        status = np.where(found, np.int8(Outcome.CONVERGED), np.int8(Outcome.DEPTH_NOT_FOUND))
         columns = np.array([self.drag, self.depth, self.contact_fraction, self.contact_slope])
-        drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
-        return Steady(drag, depth, fraction, slope, status.astype(np.int8))
+        drag, depth, fraction, slope = np.where(found, columns, np.nan)
+        return Steady(drag, depth, fraction, slope, status)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
@@ -202,7 +203,7 @@ def begin(
     coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True)
-    return line, coarse, _settled(line, 1, cases, coarse.depth, rates, trusted)
+    return line, coarse, _settled(line, summit(line), 1, cases, coarse.depth, rates, trusted)
 
 
 def settle(
@@ -230,13 +231,15 @@ def settle(
     """
     coarse, fine = grids
     ahead = SETTINGS.ahead * (fine.depth - coarse.depth)
-    top = line.top + summit(line)
+    rise = summit(line)
+    top = line.top + rise
     depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
-    return _settled(line, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
+    return _settled(line, rise, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
 
 
 def _settled(
     line: Nodes,
+    rise: float,
     refinement: int,
     cases: tuple[FloatArray, FloatArray],
     depths: FloatArray,
@@ -244,7 +247,6 @@ def _settled(
     trusted: float,
 ) -> Sampled:
     """Return the steady states on a grid, searched for from some depths of the mean line on."""
-    rise = summit(line)
     top, results = line.top + rise, np.empty((depths.size, RESULTS))
     depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
     bounds = SETTINGS.answer_step, trusted

@@ -236,33 +236,32 @@ def _pass_block(
     peak, lowest, steepest = block[PEAK], block[LOWEST], block[STEEPEST]
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
+    for k in range(count):
+        d, r, was = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[CONTACT * LANES + k] > 0
+        u, fade, through = workspace[U * LANES + k], workspace[FADE * LANES + k], workspace[THROUGH * LANES + k]
+        kept, lost = u * through, 1 - through
+        memory = r * lost
+        flies = (not was) & (peak + d <= kept)
+        stays = was & (lowest + d + r * steepest > 0)
+        load, rate, loss = workspace[LOAD * LANES + k], workspace[RATE * LANES + k], workspace[LOSS * LANES + k]
+        length, stretch = workspace[LENGTH * LANES + k], workspace[STRETCH * LANES + k]
+        flown_load = load + u * memory if flies else load
+        flown_rate = rate + fade * memory if flies else rate
+        flown_loss = loss + 0.5 * u * u * lost * (1 + through) if flies else loss
+        kept = kept if kept > SMALL else 0.0
+        flown, faded = kept if flies else u, fade * through if flies else fade
+        workspace[LOAD * LANES + k] = load + (heights + cells * d) if stays else flown_load
+        workspace[RATE * LANES + k] = rate + cells if stays else flown_rate
+        workspace[LOSS * LANES + k] = loss + r * squares if stays else flown_loss
+        workspace[LENGTH * LANES + k] = length + cells if stays else length
+        workspace[STRETCH * LANES + k] = stretch + squares if stays else stretch
+        workspace[U * LANES + k] = last + d if stays else flown
+        workspace[FADE * LANES + k] = 1.0 if stays else faded
+        workspace[CALM * LANES + k] = 1.0 if stays | flies else 0.0
     queued = 0
     for k in range(count):
-        d, r, u, touching = (
-            workspace[DEPTH * LANES + k],
-            workspace[DEBORAH * LANES + k],
-            workspace[U * LANES + k],
-            workspace[CONTACT * LANES + k] > 0,
-        )
-        through = workspace[THROUGH * LANES + k]
-        if not touching and peak + d <= u * through:
-            memory = r * (1 - through)
-            workspace[LOAD * LANES + k] += u * memory
-            workspace[RATE * LANES + k] += workspace[FADE * LANES + k] * memory
-            workspace[LOSS * LANES + k] += 0.5 * u * u * (1 - through) * (1 + through)
-            workspace[U * LANES + k] = u * through if u * through > SMALL else 0.0
-            workspace[FADE * LANES + k] *= through
-        elif touching and lowest + d + r * steepest > 0:
-            workspace[LOAD * LANES + k] += heights + cells * d
-            workspace[RATE * LANES + k] += cells
-            workspace[LOSS * LANES + k] += r * squares
-            workspace[LENGTH * LANES + k] += cells
-            workspace[STRETCH * LANES + k] += squares
-            workspace[U * LANES + k] = last + d
-            workspace[FADE * LANES + k] = 1.0
-        else:
-            queue[queued] = k
-            queued += 1
+        queue[queued] = k
+        queued += 0 if workspace[CALM * LANES + k] > 0 else 1
     return queued
 
 

@@ -223,11 +223,13 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, fl
         Heights and derivatives by position over the length of the line.
     """
     n = height.size
-    best, best_place, highest = 0, 0.0, -np.inf
+    best, best_place, highest, node, rise = 0, 0.0, -np.inf, np.max(height), STEEPEST_RISE / n
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
-        after, enter, leave = height[following], slope[i] / n, slope[following] / n
-        place = 0.0
+        after = height[following]
+        if max(height[i], after) + rise * max(slope[i] - slope[following], 0.0) < node:
+            continue
+        enter, leave, place = slope[i] / n, slope[following] / n, 0.0
         if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
             place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)

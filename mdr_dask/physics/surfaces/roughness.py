@@ -79,23 +79,23 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
 
 
-def turns(seed: int, realisation: int, modes: int) -> ComplexArray:
+def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     """Return exp(i phi_k) of the phases of a realisation, shape (modes,), kept for the next line of it."""
     # rounded up, so that lines of many cut-offs share them
-    return _turns(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
+    return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
 
-@lru_cache(maxsize=4)
-def _turns(seed: int, realisation: int, modes: int) -> ComplexArray:
-    turned = np.empty((modes, 2))
-    _turn(_generator(seed, realisation).random(modes), turned)
-    turned.flags.writeable = False
-    pairs: ComplexArray = turned.view(np.complex128)[:, 0]
+@lru_cache(maxsize=8)  # powers of two: lines of a hundred times the points share them
+def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
+    factors = np.empty((modes, 2))
+    _turn(_generator(seed, realisation).random(modes), factors)
+    factors.flags.writeable = False
+    pairs: ComplexArray = factors.view(np.complex128)[:, 0]
     return pairs
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _turn(share: FloatArray, turned: FloatArray) -> None:
+def _turn(share: FloatArray, factors: FloatArray) -> None:
     """Write cosine and sine of shares 0..1 of a turn, to rounding: series about the nearest quarter, vectorised."""
     for k in range(share.size):
         quarter = np.floor(4 * share[k] + 0.5)
@@ -109,8 +109,8 @@ def _turn(share: FloatArray, turned: FloatArray) -> None:
         sine *= x
         swapped = quarter == 1 or quarter == 3
         one, other = (sine, cosine) if swapped else (cosine, sine)
-        turned[k, 0] = -one if quarter == 1 or quarter == 2 else one
-        turned[k, 1] = -other if quarter == 2 or quarter == 3 else other
+        factors[k, 0] = -one if quarter == 1 or quarter == 2 else one
+        factors[k, 1] = -other if quarter == 2 or quarter == 3 else other
 
 
 def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int = 0) -> FloatArray:
@@ -130,12 +130,12 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     ValueError
         If the grid does not resolve the shortest wavelength.
     """
-    return turned_line(amplitude, np.exp(1j * phase), nodes, derivative)
+    return line_of_factors(amplitude, np.exp(1j * phase), nodes, derivative)
 
 
-def turned_line(amplitude: FloatArray, turned: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
-    """Return the line of :func:`line` from exp(i phi_k), as :func:`turns` gives them."""
-    coefficients = 0.5 * amplitude * turned
+def line_of_factors(amplitude: FloatArray, factors: ComplexArray, nodes: int, derivative: int = 0) -> FloatArray:
+    """Return the line of :func:`line` from exp(i phi_k), as :func:`phase_factors` gives them."""
+    coefficients = 0.5 * amplitude * factors
     if derivative:
         coefficients *= (2j * np.pi * np.arange(1, amplitude.size + 1)) ** derivative
     return series(coefficients, nodes)

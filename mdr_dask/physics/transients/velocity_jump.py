@@ -25,15 +25,15 @@ class Settings(NamedTuple):
     Parameters
     ----------
     first_step : float
-        Of the time in which 1 / q_max is passed, and of tau, at 24 steps a decade.
+        Of the time in which 1 / q_max is passed, and of tau, at 24 steps per decade.
     miss : float
-        Of the change of depth: what a step may differ from a parabola through the ones before, at 24 steps a decade.
+        Of the change of depth: what a step may differ from a parabola through the ones before, at 24 steps per decade.
     negligible : float
         Of the mean displacement: changes of depth that need no finer steps.
     newton : float
-        Of the change of depth: the step of Newton whose square is left out, at 8 steps a decade or fewer.
+        Of the change of depth: the step of Newton whose square is left out, at 8 steps per decade or fewer.
     equilibrium : float
-        Of depth and drag, where the march ends, at 24 steps a decade.
+        Of depth and drag, where the march ends, at 24 steps per decade.
     share : float
         Of the accuracy: how near to its end friction is left.
     long, stray, leap : float

@@ -155,7 +155,7 @@ def test_light_and_slow_planes_know_their_error(accuracy):
 def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
     # all grids agreed on friction 23 % too small, and 4 % too large
     deborah, loads = np.array([velocity * 1e-3 / 0.02]), np.array([force / (4 * 1e7 * 0.02 * 0.5e-6)])
-    turned = roughness.turns(31337, 0, points // 2)
+    turned = roughness.phase_factors(31337, 0, points // 2)
     surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * turned, points), None)
     exact = truth(surface, deborah, loads)
     for accuracy in (0.05, 0.01, 0.002):

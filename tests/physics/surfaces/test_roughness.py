@@ -49,10 +49,10 @@ def test_rolloff_makes_the_spectrum_flat():
 
 
 def test_turns_are_those_of_the_phases():
-    turned, phase = roughness.turns(7, 3, 1000), roughness.phases(7, 3, 1000)
+    turned, phase = roughness.phase_factors(7, 3, 1000), roughness.phases(7, 3, 1000)
     assert np.abs(turned - np.exp(1j * phase)).max() < 2e-15  # rounding
-    assert np.array_equal(roughness.turns(7, 3, 300), turned[:300])
+    assert np.array_equal(roughness.phase_factors(7, 3, 300), turned[:300])
     amplitude = roughness.amplitudes(1000, 0.5)
     assert np.allclose(
-        roughness.turned_line(amplitude, turned, 2000), roughness.line(amplitude, phase, 2000), atol=1e-13
+        roughness.line_of_factors(amplitude, turned, 2000), roughness.line(amplitude, phase, 2000), atol=1e-13
     )

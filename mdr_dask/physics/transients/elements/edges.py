@@ -165,7 +165,7 @@ def balance(
     touching: BoolArray,
     edges: Edges,
     rate: float,
-    reach: float,
+    deborah: float,
     load: float,
     first: int,
     force: FloatArray,
@@ -173,13 +173,13 @@ def balance(
 ) -> tuple[float, float, float]:
     """Return the rate at which the load is carried, drag and fraction in contact.
 
-    The force of an element pressed to the line is `pulls` and `weight` times ``rate + reach * slope``: with a dashpot
-    its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, reach 0.
+    The force of an element pressed to the line is `pulls` and `weight` times ``rate + deborah * slope``: with a dashpot
+    its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, deborah 0.
     """
     carried, drag, length = 0.0, 0.0, 0.0
     for turn in range(60):
         for j in range(gaps.size):
-            force[j] = pulls[j] + weight * (rate + reach * slope[j])
+            force[j] = pulls[j] + weight * (rate + deborah * slope[j])
             power[j] = force[j] * slope[j]
         carried, drag, length = _forces(gaps, force, power, slope, touching, edges, False, first)
         if length <= 0 or abs(carried - load) <= 1e-11 * load or turn == 59:

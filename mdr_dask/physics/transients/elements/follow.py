@@ -102,11 +102,11 @@ def _copy(state: State) -> State:
     )
 
 
-def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tuple[State, float, Outcome]:
+def steady_start(line: Line, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
     One element is carried around the line until it comes back as it was, in steps of half a cell by the method of
-    :func:`follow_line`; the depth is the root of a mean displacement that increases with it. At ``reach = 0`` the
+    :func:`follow_line`; the depth is the root of a mean displacement that increases with it. At ``deborah = 0`` the
     elements have rested under the load for ever.
 
     Returns
@@ -117,11 +117,11 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
     """
     n, arms = line.height.size - 1, solid.times.size
     state = untouched(n, arms)
-    carrier = _halved(line) if reach > 0 else line
+    carrier = _halved(line) if deborah > 0 else line
     low = -float(carrier.height[:-1].max())
 
     def excess(depth: float) -> float:
-        carried = _sliding(carrier, solid, state, reach, depth) if reach > 0 else _resting(line, state, depth)
+        carried = _sliding(carrier, solid, state, deborah, depth) if deborah > 0 else _resting(line, state, depth)
         return carried / load - 1
 
     width = load
@@ -133,7 +133,7 @@ def steady_start(line: Line, solid: Foundation, reach: float, load: float) -> tu
     if not abs(excess(depth)) < NEARLY:
         return state, depth, Outcome.DEPTH_NOT_FOUND
     outside = not line.periodic and bool(state.touching[0] or state.touching[-1])
-    note_edges(solid, line, state, depth, reach, load)
+    note_edges(solid, line, state, depth, deborah, load)
     return state, depth, Outcome.OUTSIDE_LINE if outside else Outcome.CONVERGED
 
 
@@ -158,15 +158,15 @@ def _resting(line: Line, state: State, depth: float) -> float:
     return float(state.displacement.mean())
 
 
-def _sliding(line: Line, solid: Foundation, state: State, reach: float, depth: float) -> float:
+def _sliding(line: Line, solid: Foundation, state: State, deborah: float, depth: float) -> float:
     """Fill all elements in the steady state at a depth; return the load that makes their mean what it is."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
-    good, last = orbit(solid, line, reach, depth, state, TURNS)
+    good, last = orbit(solid, line, deborah, depth, state, TURNS)
     if not good:
         return np.nan
-    step, modes = 1 / (n * reach), np.empty(solid.rates.size)
+    step, modes = 1 / (n * deborah), np.empty(solid.rates.size)
     mean = float(state.displacement.mean()) + (0.0 if line.periodic else last / n)
     without = mean_after(solid, state, 0.0, 0.0, step, modes)
     return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
@@ -177,7 +177,7 @@ def follow_line(
     solid: Foundation,
     moments: FloatArray,
     travels: FloatArray,
-    reaches: FloatArray,
+    deborahs: FloatArray,
     loads: FloatArray,
     state: State,
     depth: float,
@@ -195,7 +195,7 @@ def follow_line(
     solid : Foundation
     moments : array, shape (m,)
         Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
-    travels, reaches : array, shape (m,)
+    travels, deborahs : array, shape (m,)
         Distance travelled over L, and its derivative, of either sign.
     loads : array, shape (m,)
         F_N / (4 G_inf L), positive; linear between the moments.
@@ -208,7 +208,7 @@ def follow_line(
     """
     now = _copy(state)
     out = np.full((ROWS, moments.size), np.nan)
-    status = follow_elements(solid, line, moments, travels, reaches, loads, now, depth, out)
+    status = follow_elements(solid, line, moments, travels, deborahs, loads, now, depth, out)
     drag, depths, rate, contact, stored, work, lost = out
     return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, Outcome(status), now)
 
@@ -218,7 +218,7 @@ def follow(
     slope: FloatArray,
     moments: FloatArray,
     travels: FloatArray,
-    reaches: FloatArray,
+    deborahs: FloatArray,
     loads: FloatArray,
     displacement: FloatArray,
     depth: float,
@@ -229,7 +229,7 @@ def follow(
     ----------
     height, slope : array, shape (n,)
         Profile of unit length, as in :func:`mdr_dask.physics.transients.patches.cubic_profile`.
-    moments, travels, reaches, loads
+    moments, travels, deborahs, loads
         As in :func:`follow_line`.
     displacement : array, shape (n,)
         Of every element at the first moment; the profile stands over element j at ``x_j + travel``.
@@ -243,4 +243,4 @@ def follow(
     touching = np.abs(w - displacement) < TOUCHING * (abs(depth) + np.abs(under) + displacement)
     u = np.where(touching, w, displacement)
     state = untouched(u.size, 0)._replace(displacement=u, free=u.copy(), touching=touching)
-    return follow_line(line, KELVIN, moments, travels, reaches, loads, state, depth)
+    return follow_line(line, KELVIN, moments, travels, deborahs, loads, state, depth)

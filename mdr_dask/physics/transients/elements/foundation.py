@@ -78,7 +78,7 @@ KELVIN = foundation([], [], 1.0)
 
 
 class Scratch(NamedTuple):
-    """Room for one element: modes, decay over part of a step, fading of the arms over it, and arms, shape (1, arms)."""
+    """Workspace of one element: modes, decay over part of a step, fading over it, and arms, shape (1, arms)."""
 
     modes: FloatArray
     decay: FloatArray
@@ -88,7 +88,7 @@ class Scratch(NamedTuple):
 
 @njit(nogil=True, cache=True)
 def scratch_for(solid: Foundation) -> Scratch:
-    """Return room for one element."""
+    """Return the workspace of one element."""
     modes, arms = solid.rates.size, solid.times.size
     return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
 
@@ -190,7 +190,7 @@ def release(
     i: int,
     step: float,
     fades: FloatArray,
-    room: FloatArray,
+    workspace: FloatArray,
 ) -> tuple[float, float]:
     """Return the part of a step after which an element pressed from w0 to w1 is let go, and where; 1 if it is not.
 
@@ -200,9 +200,9 @@ def release(
     if begin <= 0:
         return 0.0, w0
     for m in range(solid.times.size):
-        room[0, m] = arms[i, m]
-    press(solid, w0, w1, room, 0, step, fades)
-    end = pull(solid, w1, room, 0) + solid.viscosity * rise1
+        workspace[0, m] = arms[i, m]
+    press(solid, w0, w1, workspace, 0, step, fades)
+    end = pull(solid, w1, workspace, 0) + solid.viscosity * rise1
     if end >= 0:
         return 1.0, w1
     part, change = begin / (begin - end), w1 - w0

@@ -119,7 +119,7 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     return lost / n
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Arrays of one step: heights and slopes over the elements at its end and start, where each would be at the end
     without contact, when and where it is let go, gaps and forces, and decay over the whole step.
     """
@@ -142,9 +142,9 @@ class Room(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def _room_for(solid: Foundation, n: int) -> Room:
+def _workspace_for(solid: Foundation, n: int) -> Workspace:
     rows = np.empty((11, n))
-    return Room(
+    return Workspace(
         rows[0],
         rows[1],
         rows[2],
@@ -165,52 +165,59 @@ def _room_for(solid: Foundation, n: int) -> Room:
 
 @njit(nogil=True, cache=True)
 def _let_go(
-    solid: Foundation, state: State, room: Room, depth: float, fall: float, reach0: float, reach1: float, step: float
+    solid: Foundation,
+    state: State,
+    workspace: Workspace,
+    depth: float,
+    fall: float,
+    deborah0: float,
+    deborah1: float,
+    step: float,
 ) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping = solid.times.size == 0, solid.viscosity
-    for j in range(room.under.size):
+    for j in range(workspace.under.size):
         if not state.touching[j]:
             continue
-        u, w1 = state.displacement[j], depth + room.under[j]
-        rise0, rise1 = fall + reach0 * room.old_slope[j], fall + reach1 * room.slope[j]
+        u, w1 = state.displacement[j], depth + workspace.under[j]
+        rise0, rise1 = fall + deborah0 * workspace.old_slope[j], fall + deborah1 * workspace.slope[j]
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
-            room.parts[j], room.leaves[j], room.after[j] = 1.0, w1, u * room.decay[0]
+            workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
-        arms, scratch = state.arms, room.scratch
-        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, room.fades, scratch.arms)
-        if part < 1 or room.parts[j] < 1:
+        arms, scratch = state.arms, workspace.scratch
+        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, workspace.fades, scratch.arms)
+        if part < 1 or workspace.parts[j] < 1:
             pressed = part if part < 1 else 0.0
-            room.after[j] = flight(solid, u, arms, j, pressed, leaves, step, room.decay, scratch)
-        room.parts[j], room.leaves[j] = part, leaves
+            workspace.after[j] = flight(solid, u, arms, j, pressed, leaves, step, workspace.decay, scratch)
+        workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
 @njit(nogil=True, cache=True)
 def _move(
-    solid: Foundation, state: State, room: Room, old_depth: float, depth: float, step: float
+    solid: Foundation, state: State, workspace: Workspace, old_depth: float, depth: float, step: float
 ) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
-    n, plain, damping = room.under.size, solid.times.size == 0, solid.viscosity
-    u, touching, after = state.displacement, state.touching, room.after
+    n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
+    u, touching, after = state.displacement, state.touching, workspace.after
     work, lost = 0.0, 0.0
     for j in range(n):
-        w0, w1, was = old_depth + room.old_under[j], depth + room.under[j], touching[j]
+        w0, w1, was = old_depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
         if not was:
             state.free[j] = after[j]
             for m in range(solid.times.size):
-                state.free_arms[j, m] = room.after_arms[j, m]
+                state.free_arms[j, m] = workspace.after_arms[j, m]
         elif plain:
-            state.free[j] *= room.decay[0]
+            state.free[j] *= workspace.decay[0]
         elif damping > 0:
-            state.free[j] = fly(solid, state.free[j], state.free_arms, j, room.decay, room.scratch.modes)
+            state.free[j] = fly(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.scratch.modes)
         if not was and w1 <= after[j]:
             if plain:
                 lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
             else:
-                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], room.after_arms, j)
+                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], workspace.after_arms, j)
             u[j] = after[j]
             for m in range(solid.times.size):
-                state.arms[j, m] = room.after_arms[j, m]
+                state.arms[j, m] = workspace.after_arms[j, m]
             continue
         if was and plain and w1 > after[j]:
             gone = damping * (w1 - u[j]) ** 2 / step
@@ -224,15 +231,15 @@ def _move(
             state.arms,
             j,
             was,
-            room.parts[j],
-            room.leaves[j],
+            workspace.parts[j],
+            workspace.leaves[j],
             after[j],
             w0,
             w1,
             step,
-            room.decay,
-            room.fades,
-            room.scratch,
+            workspace.decay,
+            workspace.fades,
+            workspace.scratch,
         )
         if not touching[j]:
             state.free[j] = u[j]
@@ -245,34 +252,36 @@ def _move(
 def _step(
     solid: Foundation,
     state: State,
-    room: Room,
+    workspace: Workspace,
     mean: float,
     old_depth: float,
     guess: float,
-    reach0: float,
-    reach1: float,
+    deborah0: float,
+    deborah1: float,
     step: float,
 ) -> tuple[float, float, float, bool]:
     """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
     plain = solid.times.size == 0
-    for j in range(room.under.size):
-        room.parts[j] = 1.0 if state.touching[j] else 0.0
+    for j in range(workspace.under.size):
+        workspace.parts[j] = 1.0 if state.touching[j] else 0.0
         if plain:
-            room.after[j] = state.displacement[j] * room.decay[0]
+            workspace.after[j] = state.displacement[j] * workspace.decay[0]
             continue
         for m in range(solid.times.size):
-            room.after_arms[j, m] = state.arms[j, m]
-        room.after[j] = fly(solid, state.displacement[j], room.after_arms, j, room.decay, room.scratch.modes)
+            workspace.after_arms[j, m] = state.arms[j, m]
+        workspace.after[j] = fly(
+            solid, state.displacement[j], workspace.after_arms, j, workspace.decay, workspace.scratch.modes
+        )
     depth = guess
     for _ in range(CORRECTIONS):
-        depth, good = depth_for(room.under, room.after, mean, depth)
+        depth, good = depth_for(workspace.under, workspace.after, mean, depth)
         if not good:
             return depth, 0.0, 0.0, False
-        _let_go(solid, state, room, depth, (depth - old_depth) / step, reach0, reach1, step)
-    depth, good = depth_for(room.under, room.after, mean, depth)
+        _let_go(solid, state, workspace, depth, (depth - old_depth) / step, deborah0, deborah1, step)
+    depth, good = depth_for(workspace.under, workspace.after, mean, depth)
     if not good:
         return depth, 0.0, 0.0, False
-    work, lost = _move(solid, state, room, old_depth, depth, step)
+    work, lost = _move(solid, state, workspace, old_depth, depth, step)
     return depth, work, lost, True
 
 
@@ -292,10 +301,10 @@ def _state_energy(solid: Foundation, state: State) -> float:
 def forces_now(
     solid: Foundation,
     state: State,
-    room: Room,
+    workspace: Workspace,
     depth: float,
     rate: float,
-    reach: float,
+    deborah: float,
     load: float,
     first: int,
 ) -> tuple[float, float, float, float]:
@@ -305,21 +314,21 @@ def forces_now(
     than a sum over a line with kinks.
     """
     plain = solid.times.size == 0
-    for j in range(room.under.size):
-        w = depth + room.under[j]
-        room.pulls[j] = w if plain else pull(solid, w, state.arms, j)
-        room.gaps[j] = w - state.free[j] if solid.viscosity > 0 else room.pulls[j]
-    edges, force, power = state.edges, room.force, room.power
+    for j in range(workspace.under.size):
+        w = depth + workspace.under[j]
+        workspace.pulls[j] = w if plain else pull(solid, w, state.arms, j)
+        workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
+    edges, force, power = state.edges, workspace.force, workspace.power
     if solid.viscosity > 0:
         rate, drag, length = balance(
             solid.viscosity,
-            room.gaps,
-            room.pulls,
-            room.slope,
+            workspace.gaps,
+            workspace.pulls,
+            workspace.slope,
             state.touching,
             edges,
             rate,
-            reach,
+            deborah,
             load,
             first,
             force,
@@ -328,7 +337,18 @@ def forces_now(
         return depth, rate, drag, length
     glass = 1 + solid.moduli.sum()
     more, drag, length = balance(
-        glass, room.gaps, room.pulls, room.slope, state.touching, edges, 0.0, 0.0, load, first, force, power
+        glass,
+        workspace.gaps,
+        workspace.pulls,
+        workspace.slope,
+        state.touching,
+        edges,
+        0.0,
+        0.0,
+        load,
+        first,
+        force,
+        power,
     )
     return depth + more, rate, drag, length
 
@@ -339,7 +359,7 @@ def follow_elements(
     line: Line,
     moments: FloatArray,
     travels: FloatArray,
-    reaches: FloatArray,
+    deborahs: FloatArray,
     loads: FloatArray,
     state: State,
     depth: float,
@@ -347,27 +367,27 @@ def follow_elements(
 ) -> int:
     """March all elements through the moments and write `out`, shape (ROWS, moments)."""
     n = line.height.size - 1
-    room, modes = _room_for(solid, n), np.empty(solid.rates.size)
-    shift = under_elements(line, travels[0], room.under, room.slope)
+    workspace, modes = _workspace_for(solid, n), np.empty(solid.rates.size)
+    shift = under_elements(line, travels[0], workspace.under, workspace.slope)
     rate, work, lost = 0.0, 0.0, 0.0
     if solid.viscosity == 0:
-        depth, work, good = _instant(solid, state, room.under, loads[0], depth)
+        depth, work, good = _instant(solid, state, workspace.under, loads[0], depth)
         if not good:
             return Outcome.DEPTH_NOT_FOUND
     for now in range(moments.size):
         if now > 0:
             step = moments[now] - moments[now - 1]
-            room.old_under[:] = room.under
-            room.old_slope[:] = room.slope
+            workspace.old_under[:] = workspace.under
+            workspace.old_slope[:] = workspace.slope
             old_depth, old_shift = depth, shift
-            shift = under_elements(line, travels[now], room.under, room.slope)
+            shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
                 lost += _forget(solid, state, old_shift, shift)
-            fading(solid, step, room.decay, room.fades)
+            fading(solid, step, workspace.decay, workspace.fades)
             mean = mean_after(solid, state, loads[now - 1], loads[now], step, modes)
             guess = depth + rate * step
             depth, done, gone, good = _step(
-                solid, state, room, mean, old_depth, guess, reaches[now - 1], reaches[now], step
+                solid, state, workspace, mean, old_depth, guess, deborahs[now - 1], deborahs[now], step
             )
             if not good:
                 return Outcome.DEPTH_NOT_FOUND
@@ -377,14 +397,14 @@ def follow_elements(
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return Outcome.OUTSIDE_LINE
-        exact, rate, drag, length = forces_now(solid, state, room, depth, rate, reaches[now], loads[now], first)
+        exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, deborahs[now], loads[now], first)
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
     return Outcome.CONVERGED
 
 
 @njit(nogil=True, cache=True)
-def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
+def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
     """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
 
     The line may have a multiple of the nodes that there are elements.
@@ -393,7 +413,7 @@ def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: Stat
     """
     n, scratch = line.height.size - 1, scratch_for(solid)
     every = n // state.displacement.size
-    step = 1 / (n * reach)
+    step = 1 / (n * deborah)
     decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
     fading(solid, step, decay, fades)
     arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
@@ -415,7 +435,7 @@ def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: Stat
                 state.arms[j, :] = arms[0]
                 state.free_arms[j, :] = free_arms[0]
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            rise0, rise1 = reach * line.slope[i], reach * line.slope[i + 1]
+            rise0, rise1 = deborah * line.slope[i], deborah * line.slope[i + 1]
             part, leaves = 0.0, u
             if touching:
                 part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
@@ -433,8 +453,8 @@ def orbit(solid: Foundation, line: Line, reach: float, depth: float, state: Stat
 
 
 @njit(nogil=True, cache=True)
-def note_edges(solid: Foundation, line: Line, state: State, depth: float, reach: float, load: float) -> None:
+def note_edges(solid: Foundation, line: Line, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
-    room = _room_for(solid, line.height.size - 1)
-    under_elements(line, 0.0, room.under, room.slope)
-    forces_now(solid, state, room, depth, 0.0, reach, load, -1 if line.periodic else 0)
+    workspace = _workspace_for(solid, line.height.size - 1)
+    under_elements(line, 0.0, workspace.under, workspace.slope)
+    forces_now(solid, state, workspace, depth, 0.0, deborah, load, -1 if line.periodic else 0)
