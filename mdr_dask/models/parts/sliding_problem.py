@@ -10,15 +10,29 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, canonical
+from mdr_dask.models.base import Block, Status, canonical
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Generated, Measured, Roughness, Smooth
 from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.physics.outcome import Outcome
 
 if TYPE_CHECKING:
     from mdr_dask.physics.sliding.problem import Arms
     from mdr_dask.physics.surfaces.shapes import Shape
+
+STATUS = np.array(
+    [
+        Status.DONE
+        if outcome == Outcome.CONVERGED
+        else Status.FAILED
+        if outcome.is_impossible
+        else Status.NOT_CONVERGED
+        for outcome in Outcome
+    ],
+    dtype=np.int8,
+)
+"""What a store calls each outcome of a solver."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.material import fit_error
-from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
@@ -144,17 +144,6 @@ class _Group:
 
 
 CONVERGED = np.int8(Outcome.CONVERGED)  # many times faster to compare with than the name
-STATUS = np.array(
-    [
-        Status.DONE
-        if outcome == Outcome.CONVERGED
-        else Status.FAILED
-        if outcome.is_impossible
-        else Status.NOT_CONVERGED
-        for outcome in Outcome
-    ],
-    dtype=np.int8,
-)
 
 
 def distinct(block: Block[SlidingFriction]) -> int:

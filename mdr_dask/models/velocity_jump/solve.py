@@ -14,7 +14,7 @@ from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
-from mdr_dask.models.parts.sliding_problem import Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -241,19 +241,6 @@ def _check_rough(roughness: Roughness) -> None:
         height = line_of(roughness.profile).height
         if not height.std() > FLAT * float(np.max(np.abs(height), initial=0.0)):
             raise DataError(f"expected a rough line, got {roughness.profile.file.name}, which is flat")
-
-
-STATUS = np.array(
-    [
-        Status.DONE
-        if outcome == Outcome.CONVERGED
-        else Status.FAILED
-        if outcome.is_impossible
-        else Status.NOT_CONVERGED
-        for outcome in Outcome
-    ],
-    dtype=np.int8,
-)
 
 
 def distinct(block: Block[VelocityJump]) -> int:
