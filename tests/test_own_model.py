@@ -113,3 +113,19 @@ def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
 
     monkeypatch.setattr(fit, "entry_points", lambda group: [Offered()])
     assert fit.available("wear_rate") == {"archard": law}
+
+
+def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written_too(example, capsys):
+    traced = MODULE.replace(
+        "has_error=True),)", 'has_error=True), Output("trace", "m", "depth along the track", ("place",)))'
+    ).replace(
+        "    seconds=", '    coordinates=lambda _: {"place": Coordinate(np.arange(3.0), "1", "place")},\n    seconds='
+    )
+    broken = traced.replace("    coefficient = case", '    raise ValueError("no pin")\n    coefficient = case')
+    imports = "import numpy as np\nfrom mdr_dask.models.base import Coordinate\n"
+    (example / "wear_rate.py").write_text(imports + broken)
+    assert main(["run", "pin.yaml", "--quiet"]) == 1
+    assert "0 done, 200 failed" in capsys.readouterr().out
+    assert xr.open_zarr("results/pin.zarr").trace.shape == (5, 2, 20, 3)
+    assert main(["status", "results/pin.zarr", "--failures"]) == 0
+    assert "200 x failed: ValueError: no pin" in capsys.readouterr().out

@@ -203,7 +203,7 @@ CLAIMS = (
         "3.2.2",
         "3.5 million simulations in 50 h",
         RUN.format("prl2013"),
-        told(Verdict.HOLDS, "3.52 million in 54 s (two cores)"),
+        told(Verdict.HOLDS, "3.52 million in 54 s (version 0.1, two cores)"),
         "On the same grid and with the same time steps.",
     ),
     Claim(
@@ -297,7 +297,10 @@ CLAIMS = (
         "(3.24)-(3.35), (3.37)-(3.39), fig. 3.14",
         "Rough indenters at low speed follow mu = sqrt 2 slope xi",
         FIT.format("scirep2014_cone", "indenter"),
-        told(Verdict.WITHIN, "within 5 % where the roughness is small beside the depth; up to 100-fold outside"),
+        told(
+            Verdict.WITHIN,
+            "within 5 % where the roughness is small beside the depth; up to 100-fold outside (version 0.1)",
+        ),
         "Steep cones and barely touching bodies leave the law; the figure marks them.",
     ),
     Claim(

@@ -20,8 +20,13 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
     ----------
     solve : callable, (parameters, random generator) -> mapping of output to number or array
         Takes the parameters of one case, in SI, and a stream of random numbers of its realisation, the same for all
-        cases. Returns every output of the model that has no error of its own, and those errors as ``<output>_error``.
-        What it raises is the reason why the case failed.
+        cases. Returns every output of the model by name, and the error of an output that has one as
+        ``<output>_error``. What it raises is the reason why the case failed.
+
+    Notes
+    -----
+    Where no case of a block succeeds, the last reason is raised: the runner then takes the cases one by one, and knows
+    the shapes of outputs that have dimensions of their own.
     """
 
     def compute(block: Block[Any]) -> Result:
@@ -34,6 +39,8 @@ def per_case(solve: Solve) -> Callable[[Block[Any]], Result]:
                 try:
                     found[case, number] = solve(block.case(case), _stream(block.seed, realisation))
                 except Exception as error:
+                    if not found and (case, number) == (block.cases - 1, len(block.realisations) - 1):
+                        raise
                     status[case, number] = Status.FAILED
                     messages[case, number] = f"{type(error).__name__}: {error}"
         values = {name: _gathered(name, found, shape) for name in block.outputs}
