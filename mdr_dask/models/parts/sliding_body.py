@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
-from mdr_dask.models.parts.material import Material
-from mdr_dask.models.parts.measured_line import ProfileFile
+from mdr_dask.models.parts.material import Material, frequencies
+from mdr_dask.models.parts.measured_line import ProfileFile, line_of
+from mdr_dask.units import shown
 
 
 class SlidingBody(Parameters):
@@ -46,3 +51,38 @@ class SlidingBody(Parameters):
         if (self.profile is None and not generated) or (self.profile is not None and partly):
             raise ValueError("expected length with rms_roughness, or profile")
         return self
+
+    def wavelengths(self) -> tuple[float, float]:
+        """Return the shortest and the longest wavelength of the line, m."""
+        if self.profile is not None:
+            line = line_of(self.profile)
+            return 2 * line.length / line.height.size, line.length
+        assert self.length is not None
+        return 2 * self.length / self.points, min(self.length, self.longest_wavelength or self.length)
+
+
+def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
+    """Say how the frequencies of a study, q v, meet those that a law or a table tells, at every temperature."""
+    velocities = [one.velocity for one in sets]
+    waves = [one.wavelengths() for one in sets]
+    low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
+    high = 2 * math.pi * max(velocities) / min(shortest for shortest, _ in waves)
+    told = []
+    for material in dict.fromkeys(one.material for one in sets if one.material is not None):
+        known = frequencies(material)
+        if known is None:
+            continue
+        at = "" if material.temperature is None else f" at {shown(material.temperature, 'K')}"
+        ends = f"q v of {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
+        told.append(f"{ends}: {_met((low, high), known)}")
+    return tuple(told)
+
+
+def _met(asked: tuple[float, float], known: tuple[float, float]) -> str:
+    """Return in words how much of the decades asked for the data tell."""
+    (low, high), (first, last) = np.log10(asked), np.log10(known)
+    beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
+    if high <= first or low >= last:
+        return "outside the data, the solid is extrapolated at every velocity"
+    far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if decades > 0.05]
+    return f"extrapolated {' and '.join(far)}" if far else "inside"
