@@ -138,7 +138,7 @@ def to_si(value: str, unit: str) -> float:
     if not math.isfinite(float(number)):
         raise ValueError(f"expected a finite number, got {value!r}")
     try:
-        factor, offset = _conversion(given, unit) if given else (1.0, 0.0)
+        factor, offset = conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
         raise ValueError(f"{error}, got {value!r}") from None
     si = _times(number, factor) + offset
@@ -152,6 +152,36 @@ def expected(unit: str) -> str:
     spaced = unit.replace("*", " ").replace("**", "^")
     name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
     return f"{name} (such as {example!r})" if example else name
+
+
+#: Prefixes of what is shown, with the powers of ten that they stand for.
+_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
+
+
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """Return a quantity as a reader writes it: ``0.5 mm/s`` of 5e-4 m/s, ``-20 degC`` of 253.15 K.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit.
+    unit : str
+        The SI unit, ``"1"`` for a pure number.
+    digits : int
+        Most digits.
+    """
+    if unit == "K":
+        return f"{value - 273.15:.{digits}g} degC" if abs(value - 273.15) > 1e-9 else "0 degC"
+    if unit in ("1", ""):
+        return f"{value:.{digits}g}"
+    if unit == "rad":
+        return f"{math.degrees(value):.{digits}g} deg"
+    if value == 0 or not math.isfinite(value) or not _LEADING.match(unit):
+        return f"{value:.{digits}g} {unit}"
+    rounded = float(f"{value:.{digits}g}")
+    power = min(max(3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12), -12), 12)
+    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
 
 
 def example_unit(unit: str) -> str:
@@ -188,7 +218,14 @@ def registry() -> UnitRegistry[Any]:
 
 
 @lru_cache(maxsize=1024)
-def _conversion(given: str, unit: str) -> tuple[float, float]:
+def conversion(given: str, unit: str) -> tuple[float, float]:
+    """Return factor and zero of a unit: a number of `given` times the factor, plus the zero, is one of `unit`.
+
+    Raises
+    ------
+    ValueError
+        If the unit is unknown or of another dimension.
+    """
     from pint.errors import DimensionalityError, UndefinedUnitError
 
     units = registry()

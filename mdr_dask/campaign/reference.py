@@ -48,8 +48,8 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values; not for a parameter that is itself a list |
-| `{values: [...]}` | the same, and inside structured parameters the only way to write it |
+| `[1 N, 3 N, 10 N]` | these values, inside structured parameters too; not for a parameter that is itself a list |
+| `{values: [...]}` | the same |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
 | `[{shape: cone, angle: 10 deg}, {shape: plane}]` | whole structured values, named in the store as they are written |

@@ -202,6 +202,15 @@ class FrettingWear(Parameters):
             raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
         return self
 
+    def notes(self) -> tuple[str, ...]:
+        """Say what a simplified rule leaves out."""
+        if self.wear_rule != "fast":
+            return ()
+        return (
+            "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance "
+            "from the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
+        )
+
     def _check_dimensional(self) -> None:
         missing = [name for name in self._needed() if getattr(self, name) is None]
         size = _SIZES.get(self.indenter.shape)
@@ -266,16 +275,6 @@ def units(parameters: FrettingWear) -> dict[str, str]:
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 
-def notes(parameters: FrettingWear) -> tuple[str, ...]:
-    """Say what a simplified rule leaves out."""
-    if parameters.wear_rule != "fast":
-        return ()
-    return (
-        "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance from "
-        "the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
-    )
-
-
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
@@ -293,5 +292,4 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
-    notes=notes,
 )

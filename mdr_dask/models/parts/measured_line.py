@@ -13,7 +13,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, quantity
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import to_si
+from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
@@ -44,6 +44,22 @@ class ProfileFile(NamedByFile):
             except DataError as problem:
                 raise ValueError(str(problem)) from None
         return self
+
+    def notes(self) -> tuple[str, ...]:
+        """Return points, length, rms height and rms slope of the line."""
+        return (_statistics(self),)
+
+
+@lru_cache(maxsize=16)
+def _statistics(profile: ProfileFile) -> str:
+    from mdr_dask.physics.surfaces.waves import waves_of
+
+    line = line_of(profile)
+    height, slope = float(line.height.std()), waves_of(line.height).rms_slope() / line.length
+    return (
+        f"profile {profile.file.name}: {line.height.size} points, {shown(line.length, 'm')} long, "
+        f"rms height {shown(height, 'm')}, rms slope {slope:.3g}"
+    )
 
 
 @lru_cache(maxsize=16)

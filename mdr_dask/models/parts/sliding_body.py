@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
-from mdr_dask.models.parts.material import Material
-from mdr_dask.models.parts.surface import Surface, without_exponent
+from mdr_dask.models.parts.material import Material, frequencies
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
+from mdr_dask.units import shown
 
 #: What a generated line has and a measured surface brings with it.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
@@ -71,3 +75,42 @@ class SlidingBody(Parameters):
         if self.surface.profile is None and self.length is None:
             return "expected length, of the line that stands for the surface"
         return ""
+
+    def wavelengths(self) -> tuple[float, float]:
+        """Return the shortest and the longest wavelength of the line, m."""
+        if self.surface is not None and self.surface.profile is not None:
+            line = line_of(self.surface.profile)
+            return 2 * line.length / line.height.size, line.length
+        assert self.length is not None
+        ends = [(self.longest_wavelength or self.length, 0.0)]
+        if self.surface is not None:
+            ends = [spectrum.wavelengths for spectrum in spectra_of(self.surface)]
+        shortest = max(2 * self.length / self.points, min(short for _, short in ends))
+        return shortest, min(self.length, max(long for long, _ in ends))
+
+
+def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
+    """Say how the frequencies of a study, q v, meet those that a law or a table tells, at every temperature."""
+    velocities = [one.velocity for one in sets]
+    waves = [one.wavelengths() for one in sets]
+    low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
+    high = 2 * math.pi * max(velocities) / min(shortest for shortest, _ in waves)
+    told = []
+    for material in dict.fromkeys(one.material for one in sets if one.material is not None):
+        known = frequencies(material)
+        if known is None:
+            continue
+        at = "" if material.temperature is None else f" at {shown(material.temperature, 'K')}"
+        ends = f"q v of {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
+        told.append(f"{ends}: {_met((low, high), known)}")
+    return tuple(told)
+
+
+def _met(asked: tuple[float, float], known: tuple[float, float]) -> str:
+    """Return in words how much of the decades asked for the data tell."""
+    (low, high), (first, last) = np.log10(asked), np.log10(known)
+    beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
+    if high <= first or low >= last:
+        return "outside the data, the solid is extrapolated at every velocity"
+    far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if decades > 0.05]
+    return f"extrapolated {' and '.join(far)}" if far else "inside"

@@ -13,6 +13,7 @@ from mdr_dask.models.base import DataFile, NamedFile, Parameters, quantity
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
+from mdr_dask.units import shown
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
@@ -74,12 +75,24 @@ class Surface(Parameters):
                 raise ValueError(str(problem)) from None
         return self
 
+    def notes(self) -> tuple[str, ...]:
+        """Return range, rms height and rms gradient of the spectra."""
+        return () if self.profile is not None else tuple(map(_statistics, self.measured.files, spectra_of(self)))
+
     @property
     def measured(self) -> Files:
         """What the spectrum comes from."""
         found: Files | None = self.spectrum
         assert found is not None
         return found
+
+
+def _statistics(file: DataFile, spectrum: Spectrum) -> str:
+    longest, shortest = spectrum.wavelengths
+    return (
+        f"surface {file.name}: waves of {shown(shortest, 'm')} to {shown(longest, 'm')}, "
+        f"rms height {shown(spectrum.rms_height(), 'm')}, rms gradient {spectrum.rms_gradient():.3g}"
+    )
 
 
 def without_exponent(value: Any, surface: str) -> Any:

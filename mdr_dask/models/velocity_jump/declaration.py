@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol
 from mdr_dask.models.parts.material import solid_of
-from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.sliding_body import SlidingBody, frequency_notes
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid
@@ -84,7 +84,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=4,
+    version=5,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,
@@ -92,4 +92,5 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
+    notes=frequency_notes,
 )
