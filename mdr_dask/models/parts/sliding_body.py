@@ -18,26 +18,30 @@ from mdr_dask.units import shown
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
-    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
+    length: float | None = quantity(
+        "m", "length L of the line, and period of its roughness", usual="10 mm", default=None, gt=0
+    )
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
     hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, ge=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
+        "m", "wavelength above which the spectrum is constant", usual="1 mm", default=None, gt=0
     )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
+    longest_wavelength: float | None = quantity(
+        "m", "wavelength above which there is no roughness", usual="1 mm", default=None, gt=0
+    )
     profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
     shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+        "Pa", "static shear modulus G of the incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
     relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+        "s", "relaxation time tau = eta / G of the Kelvin body", usual="1 ms", default=None, gt=0
     )
     material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v", gt=0)
+    normal_force: float = quantity("N", "normal force F_N", usual="1 N", gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v", usual="100 mm/s", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
 
     @model_validator(mode="after")
