@@ -150,7 +150,8 @@ def to_si(value: str, unit: str) -> float:
 def expected(unit: str) -> str:
     """Return how a message names a quantity of a unit: ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
-    name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
+    other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
+    name, example = _MEANINGS.get(spaced) or other
     return f"{name} (such as {example!r})" if example else name
 
 

@@ -9,7 +9,7 @@ import sys
 
 import click
 
-from mdr_dask.cli.campaigns import check, models, run, schema
+from mdr_dask.cli.campaigns import check, init, models, run, schema
 from mdr_dask.cli.figures import figures
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
@@ -36,7 +36,7 @@ def cli() -> None:
     """
 
 
-for command in (models, check, run, status, show, aggregate, fit, plot, figures, master_curve, schema):
+for command in (models, init, check, run, status, show, aggregate, fit, plot, figures, master_curve, schema):
     cli.add_command(command)
 
 

@@ -15,6 +15,7 @@ from mdr_dask.cli.writing import writing
 if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign
     from mdr_dask.execute import Progress, Resources
+    from mdr_dask.models.base import Model
 
 CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -30,24 +31,57 @@ def models(name: str | None, form: str | None) -> None:
     mdr-dask models sliding_friction
     """
     from mdr_dask import models as room
-    from mdr_dask.campaign.reference import output_rows, parameter_rows
-    from mdr_dask.errors import ModelError
+    from mdr_dask.campaign.reference import output_rows, parameter_rows, ways_told
 
     if name is None:
         rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
         _print_left(rows, form)
         return
-    try:
-        model = room.load(name)
-    except ModelError as error:
-        raise click.UsageError(f"{error}; known: {', '.join(room.names())}") from None
+    model = _model(name)
     if form == "json":
-        print_json({"model": name, "parameters": parameter_rows(model), "outputs": output_rows(model)})
+        parts = {"parameters": parameter_rows(model), "together": ways_told(model), "outputs": output_rows(model)}
+        print_json({"model": name, **parts})
         return
     click.echo(f"{name}: {model.summary}\n\nparameters")
     _print_left(parameter_rows(model), None)
+    if ways_told(model):
+        click.echo("\n".join(["", "what belongs together", *ways_told(model)]))
     click.echo("\noutputs")
     _print_left(output_rows(model), None)
+
+
+def _model(name: str) -> Model[Any]:
+    """Return a model; a wrong name is a wrong call."""
+    from mdr_dask import models as room
+    from mdr_dask.errors import ModelError, did_you_mean
+
+    try:
+        return room.load(name)
+    except ModelError as error:
+        hint = did_you_mean(name, room.names()) if str(error).startswith("unknown") else ""
+        raise click.UsageError(f"{error}{hint}") from None
+
+
+@click.command()
+@click.argument("model")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a new file instead of stdout.")
+def init(model: str, output: Path | None) -> None:
+    """Write a first campaign of a model, with units, meanings and choices; it passes check as it stands.
+
+    \b
+    mdr-dask init sliding_friction -o rubber.yaml
+    """
+    from mdr_dask.campaign.draft import draft
+
+    text = draft(model, _model(model), str(output or "campaign.yaml"))
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    if output.exists():
+        raise click.UsageError(f"{output}: exists already, expected the name of a new file")
+    with writing(output):
+        output.write_text(text)
+    click.echo(f"{output}: edit it, then mdr-dask check {output}")
 
 
 def _print_left(rows: list[dict[str, str]], form: str | None) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, Ways, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -32,6 +32,9 @@ class EhlLineParameters(Parameters):
         "discretisation_error": "central_film and minimum_film come with central_film_error and minimum_film_error",
         "traction_error": "traction_coefficient comes with traction_coefficient_error",
     }
+    ways: ClassVar[tuple[Ways, ...]] = tuple(
+        ((dimensional, *companions), (number,)) for number, dimensional, companions in _PAIRS
+    )
     load_parameter: float | None = quantity(
         "1", "load parameter W = w/(E' R), E' = 2 E*", usual="2e-5", gt=0, default=None
     )
@@ -172,4 +175,5 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred("mdr_dask.models.ehl_line.solve", "distinct"),
     memory=memory,
+    compiling=7.0,
 )

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
 from mdr_dask.tables import Column, read_table
 
 
@@ -101,6 +101,9 @@ class LoadStep(Parameters):
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
 
 
+_OSCILLATION = ("shear_modulus", "friction", "amplitude")
+
+
 class FrettingWear(Parameters):
     """Parameters of fretting wear, dimensionless (no modulus) or dimensional; sliding if a `path` is given."""
 
@@ -115,6 +118,13 @@ class FrettingWear(Parameters):
         "block_normal_force": "write block_contact_force",
         "discretisation_error": "every output comes with its own error, such as wear_volume_error",
     }
+    ways: ClassVar[tuple[Ways, ...]] = (
+        (
+            ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "normal_force"),
+            ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "depth"),
+            ("stick_radius",),
+        ),
+    )
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
@@ -230,7 +240,7 @@ class FrettingWear(Parameters):
             )
 
     def _needed(self) -> tuple[str, ...]:
-        oscillating = ("shear_modulus", "friction", "amplitude") if self.path is None else ()
+        oscillating = _OSCILLATION if self.path is None else ()
         return ("contact_modulus", *oscillating, "hardness", "wear_coefficient")
 
 
@@ -298,4 +308,5 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
+    compiling=5.0,
 )

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
@@ -52,6 +52,7 @@ class MixedLubrication(Parameters):
         "load_share": "write asperity_load_share",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
+    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("profile_1", "profile_2")),)
     normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
@@ -268,4 +269,5 @@ MODEL = Model(
         "film_thickness",
     ),
     coordinates=coordinates,
+    compiling=2.0,
 )

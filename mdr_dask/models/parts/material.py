@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
@@ -41,8 +41,8 @@ class PronySeries(Parameters):
     """A spring beside any number of relaxing arms and perhaps a dashpot."""
 
     static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
-    moduli: Numbers = quantity("Pa", "shear modulus of each arm")
-    times: Numbers = quantity("s", "relaxation time of each arm")
+    moduli: Numbers = quantity("Pa", "shear modulus of each arm", usual="10 MPa")
+    times: Numbers = quantity("s", "relaxation time of each arm", usual="1 ms")
     viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
 
     @model_validator(mode="after")
@@ -70,6 +70,7 @@ LAWS = ("wlf", "arrhenius", "shift_factors")
 class Material(Parameters):
     """One linear viscoelastic material, and perhaps its temperature."""
 
+    ways: ClassVar[tuple[Ways, ...]] = (tuple((kind,) for kind in KINDS),)
     kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
     standard_solid: StandardSolid | None = Field(default=None, description="spring and one relaxing arm")
     prony: PronySeries | None = Field(default=None, description="spring and any number of relaxing arms")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material, frequencies
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
@@ -18,6 +19,10 @@ from mdr_dask.units import shown
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
+    ways: ClassVar[tuple[Ways, ...]] = (
+        (("length", "rms_roughness"), ("profile",)),
+        (("shear_modulus", "relaxation_time"), ("material",)),
+    )
     length: float | None = quantity(
         "m", "length L of the line, and period of its roughness", usual="10 mm", default=None, gt=0
     )
@@ -46,14 +51,7 @@ class SlidingBody(Parameters):
 
     @model_validator(mode="after")
     def _one_body_and_one_line(self) -> SlidingBody:
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
-        generated = self.length is not None and self.rms_roughness is not None
-        partly = self.length is not None or self.rms_roughness is not None
-        if (self.profile is None and not generated) or (self.profile is not None and partly):
-            raise ValueError("expected length with rms_roughness, or profile")
+        self.require_one_way()
         return self
 
     def wavelengths(self) -> tuple[float, float]:

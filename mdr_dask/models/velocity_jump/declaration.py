@@ -93,4 +93,5 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
     notes=frequency_notes,
+    compiling=28.0,
 )
