@@ -32,7 +32,7 @@ def cli() -> None:
     mdr-dask show results/quickstart.zarr        look at results, while it runs too
     mdr-dask plot results/quickstart.zarr        draw the figures
 
-    Completion of commands and options in bash: eval "$(_MDR_DASK_COMPLETE=bash_source mdr-dask)"; zsh and fish likewise.
+    Completion in bash: eval "$(_MDR_DASK_COMPLETE=bash_source mdr-dask)"; in zsh and fish likewise.
     Exit codes: 0 all done, 1 ran but some cases failed, 2 refused, 3 the program broke, 130 interrupted.
     """
 
