@@ -107,7 +107,7 @@ def test_one_body_and_one_line():
         SlidingFriction.model_validate(LINE | LOAD | KELVIN | {"material": {"kelvin": KELVIN}})
     with pytest.raises(ValidationError, match="expected shear_modulus with relaxation_time, or material"):
         SlidingFriction.model_validate(LINE | LOAD | {"shear_modulus": 1e6})
-    with pytest.raises(ValidationError, match="expected length with rms_roughness, or surface"):
+    with pytest.raises(ValidationError, match="expected length with rms_roughness, or length with surface"):
         SlidingFriction.model_validate(LOAD | KELVIN | {"length": 0.02})
 
 

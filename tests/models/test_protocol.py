@@ -172,5 +172,5 @@ def test_flat_measured_line_is_a_status(tmp_path: Path) -> None:
 
 
 def test_a_line_is_generated_or_measured() -> None:
-    with pytest.raises(ValidationError, match="expected length with rms_roughness, or surface"):
+    with pytest.raises(ValidationError, match="expected length with rms_roughness, or length with surface"):
         block(length=None)

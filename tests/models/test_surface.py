@@ -114,10 +114,10 @@ parameters:
     [
         ("  points: 400\n", "  hurst: 0.8\n  rms_roughness: 1 um\n", "surface takes the place of hurst, rms_roughness"),
         ("  length: 20 mm\n", "", "expected length, of the line that stands for the surface"),
-        ("  surface: {spectrum: road.csv}\n", "", "expected length with rms_roughness, or surface"),
+        ("  surface: {spectrum: road.csv}\n", "", "expected length with rms_roughness, or length with surface"),
         ("surface: {spectrum: road.csv}", "profile: road.csv", "write surface: {profile: ...}"),
         ("spectrum: road.csv", "spectrum: no.csv", "no such file"),
-        ("spectrum: road.csv", "longest_wavelength: 1 mm", "expected one of spectrum, "),
+        ("spectrum: road.csv", "longest_wavelength: 1 mm", "expected spectrum, or "),
         ("road.csv}", "road.csv, shortest_wavelength: 1 um}", "`extrapolate: true` goes on by a power law"),
         ("road.csv}", "road.csv, extrapolate: true}", "extrapolate needs longest_wavelength or shortest_wavelength"),
         ("road.csv}", "road.csv, longest_wavelength: 1 mm, shortest_wavelength: 2 mm}", "cut-offs that leave some"),

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material, frequencies
 from mdr_dask.models.parts.measured_line import line_of
@@ -24,26 +24,34 @@ class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
     gone: ClassVar[Mapping[str, str]] = {"profile": "write surface: {profile: ...}"}
-    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
+    ways: ClassVar[tuple[Ways, ...]] = (
+        (("length", "rms_roughness"), ("length", "surface"), ("surface",)),
+        (("shear_modulus", "relaxation_time"), ("material",)),
+    )
+    length: float | None = quantity(
+        "m", "length L of the line, and period of its roughness", usual="10 mm", default=None, gt=0
+    )
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, ge=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
+        "m", "wavelength above which the spectrum is constant", usual="1 mm", default=None, gt=0
     )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
+    longest_wavelength: float | None = quantity(
+        "m", "wavelength above which there is no roughness", usual="1 mm", default=None, gt=0
+    )
     surface: Surface | None = Field(default=None, description="a measured surface in place of a generated one")
     shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+        "Pa", "static shear modulus G of the incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
     relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+        "s", "relaxation time tau = eta / G of the Kelvin body", usual="1 ms", default=None, gt=0
     )
     material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v", gt=0)
+    normal_force: float = quantity("N", "normal force F_N", usual="1 N", gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v", usual="100 mm/s", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
 
     @model_validator(mode="before")
@@ -53,20 +61,16 @@ class SlidingBody(Parameters):
 
     @model_validator(mode="after")
     def _one_body_and_one_line(self) -> SlidingBody:
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
         problem = self._problem_of_line()
         if problem:
             raise ValueError(problem)
+        self.require_one_way()
         return self
 
     def _problem_of_line(self) -> str:
-        """Say why there is no line, or more than one; an empty string if there is one."""
+        """Say what stands in the way of the line that is named; an empty string if nothing does."""
         if self.surface is None:
-            complete = self.length is not None and self.rms_roughness is not None and self.hurst is not None
-            return "" if complete else "expected length with rms_roughness, or surface"
+            return "" if self.hurst is not None else "expected hurst with rms_roughness, got none"
         both = [name for name in GENERATED if getattr(self, name) is not None]
         if both:
             return f"surface takes the place of {', '.join(both)}: leave out one or the other"

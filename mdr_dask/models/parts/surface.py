@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, NamedFile, Parameters, quantity
+from mdr_dask.models.base import DataFile, NamedFile, Parameters, Ways, quantity
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
@@ -18,7 +18,6 @@ from mdr_dask.units import shown
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-KINDS = ("spectrum", "profile")
 CUT_ERROR = 0.05  # relative, of every point of a tabulated cut
 
 
@@ -45,6 +44,7 @@ class SpectrumTables(Files):
 class Surface(Parameters):
     """A measured surface, in place of a generated one."""
 
+    ways: ClassVar[tuple[Ways, ...]] = ((("spectrum",), ("profile",)),)
     spectrum: SpectrumTables | None = Field(default=None, description="table of the spectrum")
     profile: ProfileFile | None = Field(default=None, description="line that is taken as it is")
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
@@ -58,9 +58,7 @@ class Surface(Parameters):
     @model_validator(mode="after")
     def _one_kind(self, info: ValidationInfo) -> Surface:
         """Refuse a bad file where a campaign names it, before any case fails of it."""
-        kinds = [kind for kind in KINDS if getattr(self, kind) is not None]
-        if len(kinds) != 1:
-            raise ValueError(f"expected one of {', '.join(KINDS)}, got {' and '.join(kinds) or 'none'}")
+        self.require_one_way()
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
             raise ValueError("a profile is taken as it is: give its cut-offs with its file, profile: {file: ...}")
