@@ -198,6 +198,7 @@ class Estimate:
     bytes: int
     seconds: float
     notes: tuple[str, ...]
+    compiling: float = 0.0
 
     @property
     def rounds(self) -> float:
@@ -366,6 +367,7 @@ def estimate(campaign: Campaign) -> Estimate:
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        compiling=model.compiling,
     )
 
 

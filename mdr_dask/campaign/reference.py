@@ -14,7 +14,7 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.models.base import DataFile, Model, unit_of
+from mdr_dask.models.base import DataFile, Model, said, unit_of
 from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\
@@ -67,7 +67,7 @@ a name.
 | `zip` | the first values together, the second values together, ...: one dimension `case` |
 | `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
 | `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
-| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md): pairs, and pairs with one input exchanged |
+| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
@@ -89,6 +89,19 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
     return list(_rows(model.parameters, "parameter"))
 
 
+def ways_told(model: Model[Any]) -> list[str]:
+    """Return the parameters that belong together, each thing in one line: ``length with rms_roughness, or profile``."""
+    return list(_ways(model.parameters, ""))
+
+
+def _ways(parameters: type[BaseModel], before: str) -> Iterator[str]:
+    for ways in getattr(parameters, "ways", ()):
+        yield said(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
+    for name, info in parameters.model_fields.items():
+        for structure in fields.structures(info):
+            yield from _ways(structure, f"{before}{name}.")
+
+
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
     """Return output, unit, own dimensions, whether it is a default, and meaning of every output of a model."""
     return [
@@ -107,7 +120,9 @@ def output_rows(model: Model[Any]) -> list[dict[str, str]]:
 def _model(model: Model[Any]) -> str:
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     tables = [_table(parameter_rows(model)), _table(output_rows(model))]
-    return "\n".join([f"## `{model.name}`", "", summary, "", *tables])
+    together = [f"* {line}" for line in ways_told(model)]
+    together = ["What belongs together:", "", *together, ""] if together else []
+    return "\n".join([f"## `{model.name}`", "", summary, "", *together, *tables])
 
 
 def _table(rows: Iterable[dict[str, str]]) -> str:
@@ -174,16 +189,17 @@ def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True, validated_data={})
-    return "" if value is None or value == {} else _yaml(value)
+    return "" if value is None or value == {} else yaml_text(value)
 
 
-def _yaml(value: Any) -> str:
+def yaml_text(value: Any) -> str:
+    """Return a value as a campaign file has it, on one line."""
     if isinstance(value, BaseModel):
-        return _yaml(value.model_dump(exclude_none=True))
+        return yaml_text(value.model_dump(exclude_none=True))
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_yaml(inner)}" for key, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {yaml_text(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_yaml, value)) + "]"
+        return "[" + ", ".join(map(yaml_text, value)) + "]"
     if isinstance(value, bool):
         return str(value).lower()
     return plain(value) if isinstance(value, float) else str(value)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_array
 
 from mdr_dask import bootstrap
@@ -242,12 +243,12 @@ def _with_interval(variances: _Weighted, realisations: int) -> FloatArray:
         away = bootstrap.widening(realisations) * (np.nanquantile(by_lines, bootstrap.TAILS, axis=0) - value)
         spread = spread + away**2
     missed = found.missed * np.clip(1 - value, 0.0, 1.0)
-    ends: FloatArray = np.array([value, value - np.sqrt(spread[0]), value + np.sqrt(spread[1])])
-    return ends + missed * np.array([[1], [0], [2]])
+    middle = value + missed
+    return np.array([middle, value - np.sqrt(spread[0]), middle + missed + np.sqrt(spread[1])])
 
 
 def _of_means(found: _Variances) -> FloatArray:
-    return _quotient(found.parts.mean(axis=1), found.squares.mean(), found.centres.mean())
+    return _quotient(found.parts.mean(axis=1), np.mean(found.squares), np.mean(found.centres))
 
 
 def _draws(points: int) -> FloatArray:
@@ -256,9 +257,11 @@ def _draws(points: int) -> FloatArray:
     return drawn
 
 
-def _quotient(parts: FloatArray, squares: FloatArray, centres: FloatArray) -> FloatArray:
+def _quotient(parts: FloatArray, squares: ArrayLike, centres: ArrayLike) -> FloatArray:
     """Return indices from the means of parts, shape (..., indices), of squares and of centres, shape (...)."""
-    return np.asarray(parts / (np.asarray(squares) - np.asarray(centres) ** 2)[..., np.newaxis])
+    whole: FloatArray = np.asarray(squares) - np.asarray(centres) ** 2
+    indices: FloatArray = parts / whole[..., np.newaxis]
+    return indices
 
 
 def _advice(result: xr.Dataset) -> str:

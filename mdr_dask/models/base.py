@@ -30,14 +30,33 @@ class Status(IntEnum):
     NOT_NEEDED = 4
 
 
+Ways = tuple[tuple[str, ...], ...]
+
+
 class Parameters(BaseModel):
     """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
 
-    `gone` has the parameters and outputs that there once were, and what to write instead of each.
+    `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
+    parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
+    ones inside structures, that are given together.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
     gone: ClassVar[Mapping[str, str]] = {}
+    ways: ClassVar[tuple[Ways, ...]] = ()
+
+    def require_one_way(self) -> None:
+        """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
+        for ways in self.ways:
+            given = {name for way in ways for name in way if getattr(self, name) is not None}
+            if not any(given == set(way) for way in ways):
+                raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+
+
+def said(ways: Ways) -> str:
+    """Return the ways to give one thing in words: ``length with rms_roughness, or profile``."""
+    told = [f"{way[0]} with {', '.join(way[1:])}" if len(way) > 1 else way[0] for way in ways]
+    return ", or ".join(told)
 
 
 def _looks_numeric(value: Any) -> bool:

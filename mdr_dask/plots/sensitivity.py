@@ -34,7 +34,9 @@ def sensitivity(indices: xr.Dataset) -> Figure:
     axes.legend(fontsize="small")
     output = str(indices.attrs["output"]).replace("_", " ")
     cases, count = indices.attrs["cases"], indices.attrs["realisations"]
-    axes.set_title(f"{output}: Sobol indices\n{cases} cases, {count} realisations; bars: 95 % intervals", fontsize="medium")
+    axes.set_title(
+        f"{output}: Sobol indices\n{cases} cases, {count} realisations; bars: 95 % intervals", fontsize="medium"
+    )
     return figure
 
 

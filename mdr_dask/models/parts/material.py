@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
@@ -23,24 +23,26 @@ Numbers = Annotated[tuple[float, ...], Field(strict=False)]
 class Kelvin(Parameters):
     """A spring and a dashpot side by side."""
 
-    shear_modulus: float = quantity("Pa", "shear modulus G", gt=0)
-    relaxation_time: float = quantity("s", "relaxation time tau = eta / G", gt=0)
+    shear_modulus: float = quantity("Pa", "shear modulus G", usual="10 MPa", gt=0)
+    relaxation_time: float = quantity("s", "relaxation time tau = eta / G", usual="1 ms", gt=0)
 
 
 class StandardSolid(Parameters):
     """A spring beside one relaxing arm."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
-    glass_modulus: float = quantity("Pa", "shear modulus of sudden deformation, above the static one", gt=0)
-    relaxation_time: float = quantity("s", "relaxation time of the arm", gt=0)
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
+    glass_modulus: float = quantity(
+        "Pa", "shear modulus of sudden deformation, above the static one", usual="1 GPa", gt=0
+    )
+    relaxation_time: float = quantity("s", "relaxation time of the arm", usual="1 ms", gt=0)
 
 
 class PronySeries(Parameters):
     """A spring beside any number of relaxing arms and perhaps a dashpot."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
-    moduli: Numbers = quantity("Pa", "shear modulus of each arm")
-    times: Numbers = quantity("s", "relaxation time of each arm")
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
+    moduli: Numbers = quantity("Pa", "shear modulus of each arm", usual="10 MPa")
+    times: Numbers = quantity("s", "relaxation time of each arm", usual="1 ms")
     viscosity: float = quantity("Pa s", "viscosity of the dashpot", default=0.0, ge=0)
 
     @model_validator(mode="after")
@@ -53,12 +55,12 @@ class PronySeries(Parameters):
 class PowerLaw(Parameters):
     """A Prony series whose loss modulus is a power of the frequency."""
 
-    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", gt=0)
-    loss_modulus: float = quantity("Pa", "loss modulus G'' at the frequency given", gt=0)
-    frequency: float = quantity("rad/s", "angular frequency at which the loss modulus holds", gt=0)
-    exponent: float = quantity("1", "exponent beta of G'' ~ omega^beta", gt=0, lt=1)
-    lowest: float = quantity("rad/s", "lowest angular frequency of the law", gt=0)
-    highest: float = quantity("rad/s", "highest angular frequency of the law", gt=0)
+    static_modulus: float = quantity("Pa", "shear modulus of slow deformation", usual="3 MPa", gt=0)
+    loss_modulus: float = quantity("Pa", "loss modulus G'' at the frequency given", usual="1 MPa", gt=0)
+    frequency: float = quantity("rad/s", "angular frequency at which the loss modulus holds", usual="1000 rad/s", gt=0)
+    exponent: float = quantity("1", "exponent beta of G'' ~ omega^beta", usual="0.2", gt=0, lt=1)
+    lowest: float = quantity("rad/s", "lowest angular frequency of the law", usual="0.1 rad/s", gt=0)
+    highest: float = quantity("rad/s", "highest angular frequency of the law", usual="1e5 rad/s", gt=0)
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
@@ -68,6 +70,7 @@ LAWS = ("wlf", "arrhenius", "shift_factors")
 class Material(Parameters):
     """One linear viscoelastic material, and perhaps its temperature."""
 
+    ways: ClassVar[tuple[Ways, ...]] = (tuple((kind,) for kind in KINDS),)
     kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
     standard_solid: StandardSolid | None = Field(default=None, description="spring and one relaxing arm")
     prony: PronySeries | None = Field(default=None, description="spring and any number of relaxing arms")

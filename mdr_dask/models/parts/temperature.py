@@ -26,6 +26,9 @@ class Wlf(Parameters):
         """Return a_T, of the shape of the temperatures in K; ValueError where the law ends."""
         from mdr_dask.physics.solids import wlf_factor
 
+        lowest, end = float(np.min(temperature)), self.reference - self.c2
+        if lowest <= end:
+            raise ValueError(f"wlf holds above reference - c2 = {shown(end, 'K')}, got {shown(lowest, 'K')}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
 

@@ -47,4 +47,5 @@ MODEL = Model(
     distinct=deferred(SOLVE, "distinct"),
     notes=frequency_notes,
     memory=deferred(SOLVE, "memory"),
+    compiling=20.0,
 )

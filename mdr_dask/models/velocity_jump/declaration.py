@@ -21,8 +21,8 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 class VelocityJump(SlidingBody):
     """A viscoelastic body under a load on a rough line, whose velocity jumps from v_1 to v_1 + dv."""
 
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
         "1", "grid points for every Nyquist point of the transient", default=4, ge=2, le=256, multiple_of=2
     )
@@ -93,4 +93,5 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
     notes=frequency_notes,
+    compiling=28.0,
 )
