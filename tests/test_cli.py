@@ -103,14 +103,6 @@ def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
     np.testing.assert_allclose(kept["material_error"], np.hypot(0.016, 0.042) / np.sqrt(2), rtol=0.03)
 
 
-def test_time_left_goes_by_the_work_and_not_by_the_results():
-    from mdr_dask.cli.progress import describe
-
-    early = Progress(total=100, done=90, estimated=10.0, finished=2.0, wall_seconds=3.0)
-    assert describe(early) == "90 of 100 results, 0 failed, 30 a second, 12 s left"
-    assert describe(Progress(total=100)) == "0 of 100 results, 0 failed"
-
-
 def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):
     campaign.write_text(CAMPAIGN.replace("hurst: 0.7", "hurst: 1.2").replace("points: 500", "points: many"))
     assert main(["run", str(campaign)]) == 2
