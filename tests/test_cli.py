@@ -17,7 +17,7 @@ import xarray as xr
 from test_execute import digests
 
 from mdr_dask.cli import main
-from mdr_dask.cli.campaigns import _shared
+from mdr_dask.cli.running import _shared
 from mdr_dask.execute import Progress
 
 CAMPAIGN = """\
