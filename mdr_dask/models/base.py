@@ -181,6 +181,24 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Number:
+    """A dimensionless number that a user can ask for beside the outputs of a model.
+
+    Parameters
+    ----------
+    name, meaning : str
+        As in conditions and tables; the meaning in one line.
+    formula : str
+        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
+        `mdr_dask.questions.expression` reads it.
+    """
+
+    name: str
+    formula: str
+    meaning: str
+
+
+@dataclass(frozen=True)
 class Coordinate:
     """Values along a dimension of an output, with unit and meaning."""
 
@@ -308,6 +326,8 @@ class Model(Generic[P]):
         Estimated peak memory of `compute` in bytes, beyond its outputs.
     notes : callable, Parameters -> tuple of str
         What a user should know of a parameter set before it is run, such as how well a fit to their data holds.
+    numbers : tuple of Number
+        Dimensionless numbers of its cases.
     """
 
     name: str
@@ -323,6 +343,7 @@ class Model(Generic[P]):
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[P], tuple[str, ...]] = lambda _: ()
+    numbers: tuple[Number, ...] = ()
 
     @property
     def companions(self) -> dict[str, Output]:

@@ -4,10 +4,25 @@ from __future__ import annotations
 
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Number, Parameters, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material
 from mdr_dask.models.parts.measured_line import ProfileFile
+
+#: Dimensionless numbers of a Kelvin body on a generated line.
+NUMBERS = (
+    Number("deborah", "velocity * relaxation_time / length", "Deborah number v tau / L"),
+    Number(
+        "load_number",
+        "normal_force / (shear_modulus * rms_roughness * length)",
+        "load number F_N / (G h L) (thesis eq. 3.20)",
+    ),
+    Number(
+        "velocity_number",
+        "velocity * relaxation_time * rms_slope / (sqrt(2) * rms_roughness)",
+        "velocity number v tau s / (sqrt 2 h), s the rms slope (thesis eq. 3.19)",
+    ),
+)
 
 
 class SlidingBody(Parameters):

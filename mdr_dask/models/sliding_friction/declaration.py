@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mdr_dask.models.base import Model, Output, deferred, quantity
+from mdr_dask.models.base import Model, Number, Output, deferred, quantity
 from mdr_dask.models.parts.material import fit_notes
-from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody
 
 
 class SlidingFriction(SlidingBody):
@@ -47,5 +47,13 @@ MODEL = Model(
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=deferred(SOLVE, "distinct"),
     memory=deferred(SOLVE, "memory"),
+    numbers=(
+        *NUMBERS,
+        Number(
+            "scaled_friction",
+            "friction_coefficient / (sqrt(2) * rms_slope)",
+            "friction over sqrt 2 times the rms slope",
+        ),
+    ),
     notes=lambda parameters: fit_notes(parameters.material),
 )
