@@ -96,10 +96,10 @@ def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
         assert re.search(note, capsys.readouterr().out)
     assert main(["check", str(campaign), "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert re.search(note, row["notes"][0])
+    assert re.search(note, row["notes"][1])
     assert main(["run", str(campaign), "--quiet"]) == 0
     kept = xr.open_zarr("results/small.zarr")
-    assert re.search(note, kept.attrs["notes"][0])
+    assert re.search(note, kept.attrs["notes"][1])
     np.testing.assert_allclose(kept["material_error"], np.hypot(0.016, 0.042) / np.sqrt(2), rtol=0.03)
 
 

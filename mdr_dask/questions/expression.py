@@ -150,7 +150,7 @@ def _unit_at(text: str, start: int) -> str:
 
 
 def _likely_mistake(text: str) -> str:
-    unit = re.search(rf"{_NUMBER.pattern}\s*([^\W\d]\w*)", text)
+    unit = re.search(rf"(?:{_NUMBER.pattern})\s*([^\W\d]\w*)", text)
     if unit and unit[1] not in _KEYWORDS:
         return f"; unknown unit {unit[1]!r}"
     return "; == compares" if re.search(r"[^<>=!]=[^=]", text) else ""

@@ -124,13 +124,11 @@ class _Maker:
         self._outputs = [str(name) for name in shown.data_vars if raw or name not in errors]
         used = [name for name in dict.fromkeys([*self._outputs, *needed(dataset, named)]) if name != STATUS]
         wanted = outputs(dataset, used).data_vars if used else ()
-        data = select(dataset[[*wanted, STATUS]], question.selections, tell)
+        data = select(_numbered(dataset[[*wanted, STATUS]]), question.selections, tell)
         kept = Columns(data).truth(question.where) if question.where and question.group_by else None
         self._data = averaged(data, question.group_by, kept) if question.group_by else data
         own = [str(dim) for dim in self._data.sizes if raw or dim != "realisation"]
         self._dims = [dim for dim in own if dim != "state"]
-        counted = {dim: np.arange(self._data.sizes[dim]) for dim in self._dims if dim not in self._data.coords}
-        self._data = self._data.assign_coords({dim: value for dim, value in counted.items() if dim != "group"})
         self.sizes = {dim: self._data.sizes[dim] for dim in self._dims}
 
     def units(self) -> dict[str, str]:
@@ -214,6 +212,12 @@ class _Maker:
         units = {key: str(value.attrs.get("units", "1")) for key, value in flat.items()}
         size = rows.sizes["row"]
         return pd.DataFrame({key: np.broadcast_to(value.to_numpy(), size) for key, value in flat.items()}), units
+
+
+def _numbered(dataset: xr.Dataset) -> xr.Dataset:
+    """Give a dimension without values, such as the cases of a sampled study, numbers from 0."""
+    bare = [dim for dim in dataset.dims if dim not in dataset.coords]
+    return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:

@@ -9,7 +9,18 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Number, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import (
+    Block,
+    Coordinate,
+    Model,
+    NamedFile,
+    Number,
+    Output,
+    Parameters,
+    Ways,
+    deferred,
+    quantity,
+)
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
@@ -25,11 +36,11 @@ POSITIONS = np.linspace(-1.5, 1.5, 1501)
 class OilData(Parameters):
     """An oil by the numbers of its data sheet."""
 
-    temperature_1: float = quantity("K", "first temperature of the two viscosities", gt=0)
-    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", gt=0)
-    temperature_2: float = quantity("K", "second temperature of the two viscosities", gt=0)
-    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", gt=0)
-    density: float = quantity("kg/m^3", "density at density_temperature", gt=0)
+    temperature_1: float = quantity("K", "first temperature of the two viscosities", usual="40 degC", gt=0)
+    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", usual="320 mm^2/s", gt=0)
+    temperature_2: float = quantity("K", "second temperature of the two viscosities", usual="100 degC", gt=0)
+    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", usual="40 mm^2/s", gt=0)
+    density: float = quantity("kg/m^3", "density at density_temperature", usual="870 kg/m^3", gt=0)
     density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
         default="gold_mineral", description="pressure-viscosity correlation"
@@ -52,14 +63,15 @@ class MixedLubrication(Parameters):
         "load_share": "write asperity_load_share",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
-    normal_force: float = quantity("N", "normal force F_N on the rollers", gt=0)
-    rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", gt=0)
-    temperature: float = quantity("K", "temperature of rollers and oil", gt=0)
+    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("profile_1", "profile_2")),)
+    normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
+    rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
+    temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
     slide_roll_ratio: float = quantity(
         "1", "creep (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
     )
     rms_roughness: Positive | None = quantity(
-        "m", "rms height of each roller; needed unless profiles are given", default=None
+        "m", "rms height of each roller; needed unless profiles are given", usual="0.2 um", default=None
     )
     hurst: float = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
@@ -67,37 +79,52 @@ class MixedLubrication(Parameters):
         "m",
         "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
         "load on their asperities asks for it",
+        usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
-        "N", "normal force whose contact width is the longest wavelength", default=1600, gt=0
+        "N", "normal force whose contact width is the longest wavelength", usual="1600 N", default=1600, gt=0
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
-        "m", "wavelength below which there is no roughness; auto is ten spacings of the points", default="auto"
+        "m",
+        "wavelength below which there is no roughness; auto is ten spacings of the points",
+        usual="3 um",
+        default="auto",
     )
     profile_1: ProfileFile | None = Field(default=None, description="measured line of roller 1")
     profile_2: ProfileFile | None = Field(default=None, description="measured line of roller 2")
-    layer_thickness: float = quantity("m", "critical thickness h_c of the boundary layer", default=5e-9, gt=0)
-    layer_shear_strength: float = quantity("Pa", "limiting shear stress tau0 of the boundary layer", default=1e6, ge=0)
+    layer_thickness: float = quantity(
+        "m", "critical thickness h_c of the boundary layer", usual="5 nm", default=5e-9, gt=0
+    )
+    layer_shear_strength: float = quantity(
+        "Pa", "limiting shear stress tau0 of the boundary layer", usual="1 MPa", default=1e6, ge=0
+    )
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
         default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet"
     )
     pressure_viscosity: (
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
-    ) = quantity("1/Pa", "pressure-viscosity coefficient alpha, or the correlation that gives it", default="oil")
+    ) = quantity(
+        "1/Pa",
+        "pressure-viscosity coefficient alpha, or the correlation that gives it",
+        usual="20 1/GPa",
+        default="oil",
+    )
     film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"] = Field(
         default="pan_hamrock", description="formula of the film thickness, or the central film of the EHL solution"
     )
-    film_thickness: Positive | None = quantity("m", "film thickness, instead of the formula's", default=None)
+    film_thickness: Positive | None = quantity(
+        "m", "film thickness, instead of the formula's", usual="100 nm", default=None
+    )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part", description="what becomes of a cluster that the edge of the contact cuts"
     )
-    roller_radius: float = quantity("m", "radius of each roller", default=0.05, gt=0)
-    roller_width: float = quantity("m", "length L' of the contact line", default=0.01, gt=0)
-    contact_modulus: float = quantity("Pa", "contact modulus E*", default=STEEL, gt=0)
+    roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
+    roller_width: float = quantity("m", "length L' of the contact line", usual="10 mm", default=0.01, gt=0)
+    contact_modulus: float = quantity("Pa", "contact modulus E*", usual="115 GPa", default=STEEL, gt=0)
     resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
     boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
-    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", default=5e6, gt=0)
+    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", usual="5 MPa", default=5e6, gt=0)
     viscosity_law: Literal["barus", "roelands"] = Field(
         default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
@@ -262,4 +289,5 @@ MODEL = Model(
         Number("film_over_layer", "film / layer_thickness", "film over the critical thickness of the boundary layer"),
         Number("touching_share", "contact_length / (2 * contact_half_width)", "contact length over the Hertzian width"),
     ),
+    compiling=2.0,
 )

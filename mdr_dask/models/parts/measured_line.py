@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import NamedFile, Parameters, quantity
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import to_si
+from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
@@ -48,6 +48,22 @@ class ProfileFile(Parameters):
             except DataError as problem:
                 raise ValueError(str(problem)) from None
         return self
+
+    def notes(self) -> tuple[str, ...]:
+        """Return points, length, rms height and rms slope of the line."""
+        return (_statistics(self),)
+
+
+@lru_cache(maxsize=16)
+def _statistics(profile: ProfileFile) -> str:
+    from mdr_dask.physics.surfaces.waves import waves_of
+
+    line = line_of(profile)
+    height, slope = float(line.height.std()), waves_of(line.height).rms_slope() / line.length
+    return (
+        f"profile {profile.file.name}: {line.height.size} points, {shown(line.length, 'm')} long, "
+        f"rms height {shown(height, 'm')}, rms slope {slope:.3g}"
+    )
 
 
 @lru_cache(maxsize=16)
