@@ -374,18 +374,18 @@ def _shown(cell: Cell, unit: str) -> str:
 
 
 def _in_si(number: str, unit: str, wanted: str) -> float:
-    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s."""
+    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s, wave numbers 1/m."""
     number = number.replace(",", ".")
     if not unit:
         return float(number)
     if wanted == "K" and unit in _CELSIUS:
         unit = "degC"
-    if wanted != "rad/s":
+    if not wanted.startswith("rad/"):
         return to_si(f"{number} {unit}", wanted)
     try:
         return to_si(f"{number} {unit}", wanted)
     except ValueError:
-        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", "1/s")
+        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
 
 
 def _folded(name: str) -> str:

@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.reference import yaml_text
-from mdr_dask.models.base import DataFile, Model, Parameters, said, unit_of
+from mdr_dask.models.base import DataFile, Model, NamedFile, Parameters, said, unit_of
 from mdr_dask.units import is_unit, shown
 
 _HEAD = """\
@@ -143,8 +143,8 @@ def _scalar(parameters: type[BaseModel], name: str) -> str:
     usual = fields.usual(info)
     if usual:
         return f"[{usual}]" if fields.holds_list(info) else usual
-    if DataFile in kinds:
-        return _EXAMPLE_FILE
+    if DataFile in kinds or info.annotation == tuple[NamedFile, ...]:
+        return f"[{_EXAMPLE_FILE}]" if fields.holds_list(info) else _EXAMPLE_FILE
     if bool in kinds:
         return "true"
     if _choices(info):

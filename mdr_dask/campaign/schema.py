@@ -55,12 +55,14 @@ def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{
     own.pop("required", None)
     for name, value in own["properties"].items():
         own["properties"][name] = _varied(value)
-    for structure in own.get("$defs", {}).values():
+    for key, structure in own.get("$defs", {}).items():
         properties = structure.get("properties", {})
         structure["required"] = [name for name, value in properties.items() if "const" in value]
         for name, value in properties.items():
             if "const" not in value:
                 properties[name] = _varied(value)
+        if structure.pop("bare_name", False):
+            own["$defs"][key] = {"anyOf": [structure, {"type": "string"}]}
     return own
 
 

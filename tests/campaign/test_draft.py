@@ -53,7 +53,8 @@ def test_every_optional_entry_passes_when_its_mark_is_taken_off(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_way_to_give_a_thing_passes(name, tmp_path):
-    (tmp_path / "table.csv").write_text("x [m],z [m]\n" + "\n".join(f"{k * 0.1},{k % 3 * 1e-6}" for k in range(100)))
+    line = "x [m],z [m]\n" + "\n".join(f"{k * 0.1},{k % 3 * 1e-6}" for k in range(100))
+    spectrum = "q [1/mm],C2D [m^4]\n1,1e-18\n100,1e-24\n"
     model = models.load(name)
     text = draft(name, model, "first.yaml")
     for ways in model.parameters.ways:
@@ -65,7 +66,10 @@ def test_every_way_to_give_a_thing_passes(name, tmp_path):
             for field in fields:
                 mark = "" if field in kept else "# "
                 changed = re.sub(rf"^  (?:# )?{field}: ", f"  {mark}{field}: ", changed, count=1, flags=re.M)
-            loads(changed, said((way,)), str(tmp_path))
+            alone = way == ("surface",)  # a line as it is brings its length with it
+            (tmp_path / "table.csv").write_text(line if alone else spectrum)
+            kind = "{profile: {file: table.csv}}" if alone else "{spectrum: {files: [table.csv]}}"
+            loads(changed.replace("{spectrum: {files: [table.csv]}}", kind), said((way,)), str(tmp_path))
 
 
 def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
@@ -85,5 +89,5 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
 def test_models_tells_what_belongs_together(capsys):
     assert main(["models", "sliding_friction"]) == 0
     told = capsys.readouterr().out.splitlines()
-    assert "length with rms_roughness, or profile" in told
+    assert "length with rms_roughness, or length with surface, or surface" in told
     assert any(line.startswith("material.kelvin, or material.standard_solid, or ") for line in told)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,8 +21,8 @@ from mdr_dask.models.base import (
     deferred,
     quantity,
 )
-from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
-from mdr_dask.models.parts.measured_line import ProfileFile
+from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
+from mdr_dask.models.parts.surface import Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil, walther_constants
 
@@ -61,9 +61,11 @@ class MixedLubrication(Parameters):
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "load_share": "write asperity_load_share",
+        "profile_1": "write surface_1: {profile: ...}",
+        "profile_2": "write surface_2: {profile: ...}",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
-    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("profile_1", "profile_2")),)
+    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("surface_1", "surface_2")),)
     normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
@@ -71,9 +73,9 @@ class MixedLubrication(Parameters):
         "1", "creep (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
     )
     rms_roughness: Positive | None = quantity(
-        "m", "rms height of each roller; needed unless profiles are given", usual="0.2 um", default=None
+        "m", "rms height of each roller; needed unless surfaces are given", usual="0.2 um", default=None
     )
-    hurst: float = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
+    hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
@@ -91,8 +93,8 @@ class MixedLubrication(Parameters):
         usual="3 um",
         default="auto",
     )
-    profile_1: ProfileFile | None = Field(default=None, description="measured line of roller 1")
-    profile_2: ProfileFile | None = Field(default=None, description="measured line of roller 2")
+    surface_1: Surface | None = Field(default=None, description="measured surface of roller 1")
+    surface_2: Surface | None = Field(default=None, description="measured surface of roller 2")
     layer_thickness: float = quantity(
         "m", "critical thickness h_c of the boundary layer", usual="5 nm", default=5e-9, gt=0
     )
@@ -133,6 +135,11 @@ class MixedLubrication(Parameters):
         default=None, description="table of measured contact probabilities, for the fit `breakthrough`"
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_exponent_of_measured_surfaces(cls, value: Any) -> Any:
+        return without_exponent(value, "surface_1")
+
     @model_validator(mode="after")
     def _holds_together(self) -> Self:
         problem = self.problem()
@@ -147,13 +154,18 @@ class MixedLubrication(Parameters):
 
     def source(self) -> Source:
         """Return where the lines come from; equal for cases that can share them."""
-        if self.profile_1 is not None and self.profile_2 is not None:
-            return Measured(self.profile_1, self.profile_2, self.rms_roughness is not None)
+        one, two = self.surface_1, self.surface_2
+        if one is not None and two is not None and one.profile is not None and two.profile is not None:
+            return Measured(one.profile, two.profile, self.rms_roughness is not None)
         shortest = self.shortest_wavelength
         if shortest == "auto":
             shortest = 10 * self.perimeter / self.points
         modes = int(self.perimeter / shortest * (1 + 1e-12))
-        return Generated(self.points, self.hurst, self.perimeter / self.longest(), modes)
+        waves = self.points, self.perimeter / self.longest(), modes
+        if one is not None and two is not None:
+            return OfSurfaces(*waves, one, two, self.perimeter)
+        assert self.hurst is not None
+        return Generated(*waves, self.hurst)
 
     def longest(self) -> float:
         """Return the longest wavelength of the roughness in m."""
@@ -163,10 +175,9 @@ class MixedLubrication(Parameters):
 
     def problem(self) -> str:
         """Say why the case cannot be computed, in one sentence; an empty string if it can."""
-        if (self.profile_1 is None) != (self.profile_2 is None):
-            return "expected the profiles of both rollers or of none, got one"
-        if self.profile_1 is None and self.rms_roughness is None:
-            return "expected rms_roughness, or the measured profiles of both rollers, got neither"
+        problem = self._problem_of_surfaces()
+        if problem:
+            return problem
         outside = self.oil_data().outside(self.temperature)
         if outside:
             return outside
@@ -175,6 +186,19 @@ class MixedLubrication(Parameters):
             return source.problem(self.perimeter) or self._problem_of_width(source)
         except DataError as error:
             return str(error)
+
+    def _problem_of_surfaces(self) -> str:
+        one, two = self.surface_1, self.surface_2
+        if one is None and two is None:
+            missing = self.rms_roughness is None or self.hurst is None
+            return "expected rms_roughness, or surface_1 and surface_2, got neither" if missing else ""
+        if one is None or two is None:
+            return "expected the surfaces of both rollers or of none, got one"
+        if (one.profile is None) != (two.profile is None):
+            return "expected the profiles of both rollers or the spectra of both, got one of each"
+        if one.profile is None and self.rms_roughness is not None:
+            return "the surfaces take the place of rms_roughness: leave out one or the other"
+        return "" if self.hurst is None else "the surfaces take the place of hurst: leave out one or the other"
 
     def _problem_of_width(self, source: Source) -> str:
         length = source.points * source.spacing(self.perimeter)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import NamedFile, quantity
+from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
 from mdr_dask.units import shown, to_si
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv")
 
 
-class ProfileFile(Parameters):
+class ProfileFile(NamedByFile):
     """A measured line; a bare file name stands for it with all options at their defaults."""
 
     file: NamedFile = Field(
@@ -33,11 +34,6 @@ class ProfileFile(Parameters):
         "m", "wavelength below which there is no roughness", default=None, gt=0
     )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _bare_name(cls, value: Any) -> Any:
-        return {"file": value} if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,9 +12,12 @@ from pydantic import Field, model_validator
 from mdr_dask.models.base import Number, Parameters, Ways, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material, frequencies
-from mdr_dask.models.parts.measured_line import ProfileFile, line_of
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
 from mdr_dask.units import shown
 
+#: What a generated line has and a measured surface brings with it.
+GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
 #: Dimensionless numbers of a Kelvin body on a generated line.
 NUMBERS = (
     Number("deborah", "velocity * relaxation_time / length", "Deborah number v tau / L"),
@@ -34,8 +37,9 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
+    gone: ClassVar[Mapping[str, str]] = {"profile": "write surface: {profile: ...}"}
     ways: ClassVar[tuple[Ways, ...]] = (
-        (("length", "rms_roughness"), ("profile",)),
+        (("length", "rms_roughness"), ("length", "surface"), ("surface",)),
         (("shear_modulus", "relaxation_time"), ("material",)),
     )
     length: float | None = quantity(
@@ -44,7 +48,7 @@ class SlidingBody(Parameters):
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
-    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
+    hurst: float | None = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
         "m", "wavelength above which the spectrum is constant", usual="1 mm", default=None, gt=0
@@ -52,7 +56,7 @@ class SlidingBody(Parameters):
     longest_wavelength: float | None = quantity(
         "m", "wavelength above which there is no roughness", usual="1 mm", default=None, gt=0
     )
-    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
+    surface: Surface | None = Field(default=None, description="a measured surface in place of a generated one")
     shear_modulus: float | None = quantity(
         "Pa", "static shear modulus G of the incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
@@ -64,18 +68,43 @@ class SlidingBody(Parameters):
     velocity: float = quantity("m/s", "sliding velocity v", usual="100 mm/s", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_exponent_of_a_measured_surface(cls, value: Any) -> Any:
+        return without_exponent(value, "surface")
+
     @model_validator(mode="after")
     def _one_body_and_one_line(self) -> SlidingBody:
+        problem = self._problem_of_line()
+        if problem:
+            raise ValueError(problem)
         self.require_one_way()
         return self
 
+    def _problem_of_line(self) -> str:
+        """Say what stands in the way of the line that is named; an empty string if nothing does."""
+        if self.surface is None:
+            return "" if self.hurst is not None else "expected hurst with rms_roughness, got none"
+        both = [name for name in GENERATED if getattr(self, name) is not None]
+        if both:
+            return f"surface takes the place of {', '.join(both)}: leave out one or the other"
+        if self.surface.profile is not None and self.length is not None:
+            return "surface: {profile: ...} brings its length with it: leave out length"
+        if self.surface.profile is None and self.length is None:
+            return "expected length, of the line that stands for the surface"
+        return ""
+
     def wavelengths(self) -> tuple[float, float]:
         """Return the shortest and the longest wavelength of the line, m."""
-        if self.profile is not None:
-            line = line_of(self.profile)
+        if self.surface is not None and self.surface.profile is not None:
+            line = line_of(self.surface.profile)
             return 2 * line.length / line.height.size, line.length
         assert self.length is not None
-        return 2 * self.length / self.points, min(self.length, self.longest_wavelength or self.length)
+        ends = [(self.longest_wavelength or self.length, 0.0)]
+        if self.surface is not None:
+            ends = [spectrum.wavelengths for spectrum in spectra_of(self.surface)]
+        shortest = max(2 * self.length / self.points, min(short for _, short in ends))
+        return shortest, min(self.length, max(long for long, _ in ends))
 
 
 def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
