@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from mdr_dask.models.base import Model, Output, deferred, quantity
-from mdr_dask.models.parts.material import fit_notes
-from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.sliding_body import SlidingBody, frequency_notes
 
 
 class SlidingFriction(SlidingBody):
@@ -46,6 +45,7 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=deferred(SOLVE, "distinct"),
+    notes=frequency_notes,
     memory=deferred(SOLVE, "memory"),
-    notes=lambda parameters: fit_notes(parameters.material),
+    compiling=20.0,
 )
