@@ -308,6 +308,26 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     return (1.0, zero) if zero else (one, 0.0)
 
 
+#: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.
+_COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
+
+
+@lru_cache(maxsize=1024)
+def dimension_of(unit: str) -> tuple[Any, str]:
+    """Return the dimension of a unit, as pint knows it, and the coherent SI unit of that dimension.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit of the list.
+    """
+    if unit not in ("", "1") and not is_unit(unit):
+        raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
+    dimension = registry().parse_units(_spelling(unit)).dimensionality
+    coherent = " * ".join(f"{_COHERENT[name.strip('[]')]}**{power}" for name, power in dimension.items())
+    return dimension, coherent or "1"
+
+
 def _spelling(unit: str) -> str:
     unit = unit.replace("%", " percent ").strip()
     return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit

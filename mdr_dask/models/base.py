@@ -254,6 +254,24 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Number:
+    """A dimensionless number that a user can ask for beside the outputs of a model.
+
+    Parameters
+    ----------
+    name, meaning : str
+        As in conditions and tables; the meaning in one line.
+    formula : str
+        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
+        `mdr_dask.questions.expression` reads it.
+    """
+
+    name: str
+    formula: str
+    meaning: str
+
+
+@dataclass(frozen=True)
 class Coordinate:
     """Values along a dimension of an output, with unit and meaning."""
 
@@ -384,6 +402,8 @@ class Model(Generic[P]):
         What one part of a parameter set has to say by itself is told by its method `notes`.
     compiling : float
         Seconds that its kernels take to compile, the first time on a machine.
+    numbers : tuple of Number
+        Dimensionless numbers of its cases.
     """
 
     name: str
@@ -400,6 +420,7 @@ class Model(Generic[P]):
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[Sequence[P]], tuple[str, ...]] = lambda _: ()
     compiling: float = 0.0
+    numbers: tuple[Number, ...] = ()
 
     @property
     def companions(self) -> dict[str, Output]:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -178,5 +178,16 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=distinct,
     memory=memory,
+    numbers=(
+        Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),
+        Number(
+            "speed_parameter",
+            "viscosity * mean_velocity / (2 * contact_modulus * radius)",
+            "speed parameter U = eta0 u/(E' R)",
+        ),
+        Number("material_parameter", "2 * contact_modulus * pressure_viscosity", "material parameter G = alpha E'"),
+        Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M"),
+        Number("moes_lubricant", "material_parameter * (2 * speed_parameter) ** 0.25", "Moes' lubricant parameter L"),
+    ),
     compiling=7.0,
 )

@@ -9,7 +9,18 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import (
+    Block,
+    Coordinate,
+    Model,
+    NamedFile,
+    Number,
+    Output,
+    Parameters,
+    Ways,
+    deferred,
+    quantity,
+)
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
 from mdr_dask.models.parts.surface import Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
@@ -297,5 +308,14 @@ MODEL = Model(
         "film_thickness",
     ),
     coordinates=coordinates,
+    numbers=(
+        Number(
+            "load_parameter",
+            "normal_force / (roller_width * contact_modulus * roller_radius)",
+            "load parameter W = w/(E' R) of the pair, E' = 2 E* and R half the radius of a roller",
+        ),
+        Number("film_over_layer", "film / layer_thickness", "film over the critical thickness of the boundary layer"),
+        Number("touching_share", "contact_length / (2 * contact_half_width)", "contact length over the Hertzian width"),
+    ),
     compiling=2.0,
 )
