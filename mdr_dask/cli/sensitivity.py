@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from mdr_dask.cli.options import select_option, series_option, tell
+from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table, with_intervals
-from mdr_dask.cli.results import Reading, csv_option, json_option, store_argument
+from mdr_dask.cli.results import Reading, store_argument
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 
 
