@@ -111,7 +111,7 @@ def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
         def load(self):
             return (law,)
 
-    monkeypatch.setattr(fit, "entry_points", lambda group: [Offered()])
+    monkeypatch.setattr(fits, "entry_points", lambda group: [Offered()])
     assert fits.available("wear_rate") == {"archard": law}
 
 

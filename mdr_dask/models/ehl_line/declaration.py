@@ -147,10 +147,13 @@ def positions(parameters: EhlLineParameters) -> FloatArray:
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 
+distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
+
+
 def seconds(block: Block[EhlLineParameters]) -> float:
     """Return the estimated time of `compute`: a solution takes some 20 ms, more for a tighter accuracy."""
     accuracy = block.accuracy or ACCURACY
-    return 0.02 * block.cases * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
+    return 0.02 * float(distinct(block)) * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
@@ -173,7 +176,7 @@ MODEL = Model(
     seconds=seconds,
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
-    distinct=deferred("mdr_dask.models.ehl_line.solve", "distinct"),
+    distinct=distinct,
     memory=memory,
     numbers=(
         Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),

@@ -266,6 +266,9 @@ OUTPUTS = (
 )
 
 
+DRAWN = {output.name for output in OUTPUTS if output.dims}
+
+
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     """Return the angles of a trace and the places, in half widths, of the profiles."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
@@ -276,11 +279,12 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from points, cases and creep."""
+    """Estimate the time of a block from points, cases, creep, drawn places and the solutions of the film."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    lines = 0.06 * float(millions.max())
-    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
+    case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
+    films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
+    return films + len(block.realisations) * float(0.06 * millions.max() + np.sum(millions * case))
 
 
 MODEL = Model(
