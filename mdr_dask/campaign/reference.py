@@ -67,6 +67,7 @@ a name.
 | `zip` | the first values together, the second values together, ...: one dimension `case` |
 | `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
 | `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
+| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
