@@ -16,6 +16,7 @@ from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
+from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
 BROKE = 3
@@ -52,6 +53,7 @@ for command in (
     plot,
     figures,
     master_curve,
+    surface,
     schema,
 ):
     cli.add_command(command)
