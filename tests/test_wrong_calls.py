@@ -12,7 +12,7 @@ from mdr_dask.cli import main
 #: Command line, and what the error has to say; STORE is a filled store, FOREIGN a Zarr group of somebody else.
 WRONG = [
     ("check nowhere.yaml", "File 'nowhere.yaml' does not exist"),
-    ("models nobody", "unknown model 'nobody'; known: sliding_friction"),
+    ("models nobody", "unknown model 'nobody' (known: sliding_friction"),
     ("run small.yaml --threads 0", "0 is not in the range x>=1"),
     ("run small.yaml --threads 2 --workers 2", "expected one of --threads, --workers, got 2 of them"),
     (
