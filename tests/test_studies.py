@@ -82,7 +82,7 @@ def test_statistics_figures_and_master_curves_of_a_dataset_and_of_its_path(study
 
 
 def test_laws_are_fitted_to_a_dataset_and_to_its_path(tmp_path):
-    loads = "  normal_force: {geometric: [1 mN, 30 mN, 4]}\n  velocity: {geometric: [1 mm/s, 10 m/s, 9]}\n"
+    loads = "  normal_force: {geometric: [2 mN, 25 mN, 8]}\n  velocity: {geometric: [0.1 mm/s, 10 m/s, 11]}\n"
     planted = make(tmp_path, SLIDING + loads)[""]
     found = mdr_dask.fit(planted, "zone_one")
     assert found.law_holds.item().startswith("yes")
