@@ -118,9 +118,10 @@ def _other_version(work: Work) -> str:
 def _write(
     work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], record: dict[str, Any]
 ) -> None:
-    store.write_values(work.place, values)
-    store.write_record(work.place, work.attempt, record)
-    store.write_status(work.place, status)
+    with store.holding(work.place.url, work.place.runner):
+        store.write_values(work.place, values)
+        store.write_record(work.place, work.attempt, record)
+        store.write_status(work.place, status)
 
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:

@@ -66,7 +66,7 @@ def find_cells(
     return Cells(template, wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
 
 
-def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
+def tasks(url: str, groups: Iterable[Cells], runner: str) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
     laid_out = uuid.uuid4().hex
     for cells in groups:
@@ -77,7 +77,7 @@ def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
                 yield Work(
-                    place=Place(url, template.series.name, index, region, laid_out),
+                    place=Place(url, template.series.name, index, region, laid_out, runner),
                     model=template.campaign.model,
                     versions=versions(template.campaign.model),
                     block=template.block(index),

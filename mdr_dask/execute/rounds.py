@@ -56,11 +56,11 @@ def run(
         If the campaign is too large to be run.
     """
     _plan(campaign, url)  # what is refused leaves no lock behind
-    with store.lock(url):
+    with store.lock(url) as runner:
         layout, asked = _plan(campaign, url)
         store.sweep(url)
         with executor(resources) as execute:
-            return _run_rounds(url, layout, asked, execute, report, retry_failed)
+            return _run_rounds(url, runner, layout, asked, execute, report, retry_failed)
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
@@ -92,6 +92,7 @@ def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDAr
 
 def _run_rounds(
     url: str,
+    runner: str,
     layout: tuple[Template, ...],
     asked: list[NDArray[np.bool_]],
     execute: Execute,
@@ -116,14 +117,15 @@ def _run_rounds(
             if not any(mask.any() for mask in needed):
                 break
             layout = _grow(layout, count)
-        store.lay_out(url, layout)
+        with store.holding(url, runner):
+            store.lay_out(url, layout)
         groups = [
             find_cells(url, template, asked_here, needed_here, (before, count), retry_failed)
             for template, asked_here, needed_here in zip(layout, asked, needed, strict=True)
         ]
         progress = _begin_round(progress, groups)
         report(progress)
-        execute(tasks(url, groups), account)
+        execute(tasks(url, groups, runner), account)
         before = count
     return replace(progress, wall_seconds=time.monotonic() - start)
 

@@ -16,9 +16,10 @@ from mdr_dask.store.blocks import (
     write_status,
     write_values,
 )
-from mdr_dask.store.files import attributes, exists, is_study, lock, sweep
+from mdr_dask.store.files import attributes, exists, is_study, sweep
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
+from mdr_dask.store.locks import holding, lock
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "attributes",
     "datasets",
     "exists",
+    "holding",
     "is_damage",
     "is_study",
     "lay_out",

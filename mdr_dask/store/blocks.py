@@ -31,6 +31,8 @@ class Place:
         The block's place over (axes..., realisation).
     layout : str
         Differs whenever the store may have been laid out anew, so that nobody writes into a shape of yesterday.
+    runner : str
+        The token of the runner on whose behalf it is written.
     """
 
     url: str
@@ -38,6 +40,7 @@ class Place:
     index: BlockIndex
     region: tuple[slice, ...]
     layout: str
+    runner: str
 
 
 def write_values(place: Place, values: Mapping[str, NDArray[np.float64]]) -> None:

@@ -1,11 +1,9 @@
-"""Bytes by name in a local directory or at a URL, the root attributes of a study, and its lock."""
+"""Bytes by name in a local directory or at a URL, and the root attributes of a study."""
 
 from __future__ import annotations
 
 import json
-import os
-import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -15,10 +13,16 @@ import zarr
 from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
-from mdr_dask.errors import MdrDaskError, StoreBusyError, StoreError
+from mdr_dask.errors import MdrDaskError, StoreError
 
 #: How the study of a campaign without series is called where series stand beside it.
 ROOT = "-"
+
+#: Where the claims of runners lie in a store whose file system, or server, has no locks.
+CLAIMS = ".claims/"
+
+#: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
+KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 
 #: Raised when the layout changes so that older code cannot read it.
 LAYOUT = 1
@@ -74,11 +78,49 @@ def write_bytes(url: str, name: str, content: bytes) -> None:
         sync(bytes_of(url).set(name, default_buffer_prototype().buffer.from_bytes(content)))
 
 
+def create(url: str, name: str, content: bytes) -> bool:
+    """Write bytes under a name that is free, and return True; leave one that is taken, and return False."""
+    path = local(url)
+    with guarded(url, f"writing {name}"):
+        try:
+            if path is None:
+                store = bytes_of(url)
+                sync(store.fs._pipe_file(f"{store.path}/{name}", content, mode="create"))
+            else:
+                (path / name).parent.mkdir(parents=True, exist_ok=True)
+                with (path / name).open("xb") as file:
+                    file.write(content)
+        except FileExistsError:
+            return False
+    return True
+
+
+def conditional(url: str) -> bool:
+    """Say whether `create` is one act of the server, not a look before a write."""
+    if local(url) is not None:
+        return True
+    from fsspec import AbstractFileSystem
+
+    fs = bytes_of(url).fs
+    return type(getattr(fs, "sync_fs", fs)).pipe_file is not AbstractFileSystem.pipe_file
+
+
+def remove(url: str, files: Iterable[str]) -> None:
+    """Remove files by name; those that are gone are no matter."""
+
+    async def delete() -> None:
+        for name in files:
+            await bytes_of(url).delete(name)
+
+    with guarded(url, "removing files"):
+        sync(delete())
+
+
 def clear(url: str) -> None:
     """Remove what a run left that took the place and got no further."""
 
     async def remove() -> None:
-        for name in [name async for name in bytes_of(url).list_dir("") if name != "zarr.json"]:
+        for name in [name async for name in bytes_of(url).list_dir("") if name not in KEPT]:
             await bytes_of(url).delete_dir(name)
 
     with guarded(url, "clearing it"):
@@ -118,7 +160,7 @@ def exists(url: str) -> bool:
         raise StoreError(f"{url}: a file, expected the folder of a store or nothing")
     found = _root_attributes(url)
     if found is None and path is not None and path.is_dir():
-        others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial")
+        others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial" and entry.name not in KEPT)
         if others:
             raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
     return found is not None and not only_claimed(found)
@@ -178,50 +220,3 @@ def series_names(url: str) -> list[str]:
 def group_name(series: str, member: str = "") -> str:
     """Return the path of a member of a series' group, or of the group itself; arrays without series are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
-
-
-@contextmanager
-def lock(url: str) -> Iterator[None]:
-    """Hold a study for one runner; the operating system lets go of it however the runner ends.
-
-    Parameters
-    ----------
-    url : str
-        Path of the store. A store at a URL has no lock: do not start two runners on it.
-
-    Raises
-    ------
-    StoreBusyError
-        If another runner holds it; the message names that runner.
-    StoreError
-        If nothing can be written there.
-    """
-    path = local(url)
-    if path is None:
-        yield
-        return
-    from filelock import FileLock, Timeout
-
-    try:
-        path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
-        raise StoreError(f"{url}: expected a path: {error}") from None
-    holder = path.with_name(f".{path.name}.runner")
-    file = path.with_name(f".{path.name}.lock")
-    guard = FileLock(file, timeout=0)
-    with guarded(url, "making it"):
-        if not path.parent.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
-        file.touch()  # where this fails, the lock would say that somebody else holds it
-        try:
-            guard.acquire()
-        except Timeout:
-            who = holder.read_text() if holder.exists() else "another process"
-            raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it") from None
-    try:
-        with guarded(url, "making it"):
-            holder.write_text(f"process {os.getpid()} on {platform.node()}")
-        yield
-    finally:
-        holder.unlink(missing_ok=True)
-        guard.release()
