@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import time
@@ -108,6 +109,24 @@ def run_block(work: Work) -> Outcome:
     return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written)
 
 
+def finished(work: Work) -> Outcome | None:
+    """Return how a task ended that a worker finished before it died untold; None for one that is not finished.
+
+    The record of an attempt is written before the ledger, and says what the ledger then holds.
+    """
+    record = store.record(work.place, work.attempt)
+    if record is None:
+        return None
+    _, status = store.read_block(work.place, ())
+    if record.get("ledger") != _fingerprint(status):
+        return None
+    return Outcome(_counts(work, status), record["solves"], work.estimate, record["compute_seconds"], 0.0)
+
+
+def _fingerprint(status: NDArray[np.int8]) -> str:
+    return hashlib.blake2b(status.tobytes(), digest_size=16).hexdigest()
+
+
 def _other_version(work: Work) -> str:
     here, there = (
         f"mdr_dask {program} with {work.model} {model}" for program, model in (versions(work.model), work.versions)
@@ -118,7 +137,7 @@ def _other_version(work: Work) -> str:
 def _write(
     work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], record: dict[str, Any]
 ) -> None:
-    with store.holding(work.place.url, work.place.runner):
+    with store.holding(work.place.url, work.place.hold):
         store.write_values(work.place, values)
         store.write_record(work.place, work.attempt, record)
         store.write_status(work.place, status)
@@ -216,6 +235,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
         "compute_seconds": seconds,
         "finished": time.time(),
         "host": platform.node(),
+        "ledger": _fingerprint(status),
         "messages": messages,
         "process": os.getpid(),
         "solves": result.solves,

@@ -17,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
 from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store import files, locks
+from mdr_dask.store import Hold, files, locks
 from mdr_dask.task import run_block
 
 
@@ -48,12 +48,12 @@ def test_a_file_system_without_locks_is_named_and_a_claim_keeps_others_out(toy, 
     run(small(toy), url + "2")
     without_locks(monkeypatch, number)
     assert run(small(toy), url).done == 12
-    assert f"this file system has no locks ({os.strerror(number)}); a claim" in caplog.text
+    assert f"this file system has no locks ({os.strerror(number)}); claims" in caplog.text
     assert run(small(toy), url).kept == 12
     with store.lock(url), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running on this store"):
         run(small(toy), url)
     assert digests(url) == digests(url + "2")
-    assert not list(Path(url, ".claims").iterdir())
+    assert not [path for path in Path(url, ".claims").rglob("*") if path.is_file()]
 
 
 def test_a_lock_that_fails_otherwise_is_said_to_fail(toy, url, monkeypatch):
@@ -76,8 +76,8 @@ def test_of_many_that_want_a_study_at_once_one_gets_it(bucket):
     def want():
         start.wait()
         try:
-            with store.lock(bucket) as token:
-                held.append(token)
+            with store.lock(bucket) as hold:
+                held.append(hold)
                 time.sleep(0.5)
         except StoreBusyError as error:
             refused.append(str(error))
@@ -96,11 +96,14 @@ def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, buc
     caplog.set_level(logging.WARNING)
     run(small(toy), bucket)
     gone = {"owner": "a" * 32, "who": "process 1 on node7", "time": time.time() - 1.0}
-    files.write_bytes(bucket, ".claims/000004.json", json.dumps(gone).encode())
-    with store.lock(bucket) as token:
-        assert token.startswith("5-")
+    files.write_bytes(bucket, ".claims/alone/000004.json", json.dumps(gone).encode())
+    with store.lock(bucket) as hold:
+        assert hold.claim == 5
         assert "sign of life of process 1 on node7" in caplog.text
-        with pytest.raises(StoreBusyError, match="has ended or lost the store"), store.holding(bucket, "4-" + "a" * 32):
+        with (
+            pytest.raises(StoreBusyError, match="has ended or lost the store"),
+            store.holding(bucket, Hold("", "a" * 32, 4)),
+        ):
             pass
         time.sleep(0.6)  # longer than anybody may be silent: it is the signs of life that keep it
         with pytest.raises(StoreBusyError, match="is running on this store"), store.lock(bucket):
@@ -142,14 +145,14 @@ def test_a_worker_that_outlives_its_driver_writes_nothing(toy, url, monkeypatch)
 
 
 def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypatch):
-    with store.lock(url) as token:
-        survivor = next(Path(url).parent.glob(".*.runner")).read_bytes()
-    path = Path(url).with_name(f".{Path(url).name}.{token}.runner")
+    with store.lock(url) as hold:
+        path = next(Path(url).parent.glob(".*.runner"))
+        survivor = path.read_bytes()
     path.write_bytes(survivor)  # as SIGKILL leaves it
     order = []
 
     def finish():
-        with store.holding(url, token):
+        with store.holding(url, hold):
             writing.set()
             time.sleep(0.3)
             order.append("written")
@@ -165,7 +168,7 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
     monkeypatch.setattr(locks, "SILENCE", 0.1)
     path.write_bytes(survivor)
     with (
-        store.holding(url, token),
+        store.holding(url, hold),
         pytest.raises(StoreBusyError, match=r"a task of process \d+ on .* is running"),
         store.lock(url),
     ):

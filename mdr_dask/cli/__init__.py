@@ -9,11 +9,12 @@ import sys
 
 import click
 
-from mdr_dask.cli.campaigns import check, models, run, schema
+from mdr_dask.cli.campaigns import check, models, schema
 from mdr_dask.cli.figures import figures
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
+from mdr_dask.cli.running import run
 from mdr_dask.version import __version__
 
 BROKE = 3

@@ -1,4 +1,4 @@
-"""Commands around a campaign file: models, check, run, schema."""
+"""Commands around a campaign file: models, check, schema."""
 
 from __future__ import annotations
 
@@ -8,12 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.printing import print_json, print_rows
-from mdr_dask.cli.progress import reporter, seconds
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
-    from mdr_dask.campaign import Campaign
-    from mdr_dask.execute import Progress, Resources
     from mdr_dask.plan import Estimate
 
 CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
@@ -80,7 +77,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         except CampaignError as error:
             problems += list(error.args)
             continue
-        rows.append({"campaign": str(path), "model": campaign.model, **_costs(costs)})
+        rows.append({"campaign": str(path), "model": campaign.model, **cost_row(costs)})
         notes += [f"{path}: {note}" for note in costs.notes]
         if form == "json":
             rows[-1]["notes"] = list(costs.notes)
@@ -93,7 +90,8 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         raise CampaignError(*problems)
 
 
-def _costs(estimate: Estimate) -> dict[str, Any]:
+def cost_row(estimate: Estimate) -> dict[str, Any]:
+    """Return what a campaign will cost as one row of a table."""
     return {
         "cases": estimate.cases,
         "realisations": estimate.realisations,
@@ -104,124 +102,6 @@ def _costs(estimate: Estimate) -> dict[str, Any]:
         "bytes": estimate.bytes,
         "seconds": float(estimate.seconds),
     }
-
-
-@click.command()
-@click.argument("campaign", type=CAMPAIGN)
-@click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
-@click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
-@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one per core).")
-@click.option("--workers", type=click.IntRange(min=1), help="Start a local Dask cluster of so many processes.")
-@click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
-@click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
-@click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
-@click.option("--quiet", is_flag=True, help="No progress on stderr.")
-@click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
-def run(campaign: Path, dry_run: bool, quiet: bool, form: str | None, **options: Any) -> int:
-    """Run a campaign into its store: everything, or what is missing.
-
-    Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
-
-    \b
-    mdr-dask run campaigns/quickstart.yaml
-    mdr-dask run campaigns/friction_force.yaml --workers 2
-    mdr-dask run campaigns/friction_force.yaml --scheduler tcp://head:8786
-    """
-    from mdr_dask.campaign import load
-
-    study = load(campaign)
-    url = options["url"] or study.store
-    if url.startswith("memory:"):
-        raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
-    if dry_run:
-        _print_plan(study, url, form)
-        return 0
-    from mdr_dask import execute
-
-    resources = _resources(options)
-    with reporter(quiet) as report:
-        progress = execute.run(study, url, resources, report, options["retry_failed"])
-    _print_outcome(url, progress, resources, form)
-    return 1 if progress.failed else 0
-
-
-def _print_plan(study: Campaign, url: str, form: str | None) -> None:
-    from mdr_dask import store
-    from mdr_dask.plan import estimate
-
-    costs = estimate(study)
-    kept, to_do = 0, costs.results
-    if store.exists(url):
-        from mdr_dask.execute import outlook
-
-        progress = outlook(study, url)
-        kept, to_do = progress.kept, progress.to_do
-    if form == "json":
-        notes = list(costs.notes)
-        print_json(
-            {"campaign": study.name, "store": url, **_costs(costs), "kept": kept, "to_do": to_do, "notes": notes}
-        )
-        return
-    more = costs.rounds
-    click.echo(f"{study.name} -> {url}")
-    click.echo(
-        f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
-    )
-    click.echo(f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks")
-    size, most = (f"{count * costs.bytes / 2**20:.3g}" for count in (1, more))
-    times = " to ".join(dict.fromkeys((seconds(costs.seconds), seconds(costs.seconds * more))))
-    click.echo(f"{' to '.join(dict.fromkeys((size, most)))} MiB uncompressed, about {times} on one core")
-    if more > 1:
-        click.echo("from the first round to the last one, if no case meets its tolerance before")
-    for note in costs.notes:
-        click.echo(note)
-    if kept:
-        left = seconds(costs.seconds * to_do / costs.results)
-        click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
-
-
-def _range(first: int, more: float) -> str:
-    """Return a count of the first round, and what it comes to at most."""
-    return f"{first}" if more == 1 else f"{first} to {round(first * more)}"
-
-
-def _resources(options: dict[str, Any]) -> Resources:
-    from mdr_dask.campaign.cluster import load_cluster
-    from mdr_dask.execute import Resources
-
-    chosen = [name for name in ("threads", "workers", "scheduler", "cluster") if options[name] is not None]
-    if len(chosen) > 1:
-        raise click.UsageError(f"expected one of --{', --'.join(chosen)}, got {len(chosen)} of them")
-    cluster = options["cluster"] and load_cluster(options["cluster"])
-    return Resources(options["threads"], options["workers"], options["scheduler"], cluster)
-
-
-def _print_outcome(url: str, progress: Progress, resources: Resources, form: str | None) -> None:
-    if form == "json":
-        from dataclasses import asdict
-
-        print_json({"store": url, **asdict(progress)})
-        return
-    fresh = progress.done + progress.failed
-    if not fresh and not progress.not_needed:
-        click.echo(f"{url}: all {progress.kept} results are there already; nothing to do")
-        return
-    kept = f"{progress.kept} kept, " if progress.kept else ""
-    spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
-    click.echo(f"{url}: {kept}{progress.done} done, {progress.failed} failed{spared}")
-    click.echo(
-        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {progress.blocks} blocks, "
-        f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
-        err=True,
-    )
-    if progress.failed:
-        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
-
-
-def _shared(progress: Progress) -> str:
-    """Return the share of the results that needed no solve of their own."""
-    share = 1 - progress.solves / max(progress.done + progress.failed, 1)
-    return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""
 
 
 @click.command()

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN, run
+from mdr_dask.cli.campaigns import CAMPAIGN
 from mdr_dask.cli.results import plot
+from mdr_dask.cli.running import run
 from mdr_dask.cli.writing import format_option
 
 

@@ -1,4 +1,4 @@
-"""Bytes by name in a local directory or at a URL, and the root attributes of a study."""
+"""Bytes by name in a local directory or at a URL, the root attributes of a study, and its lock."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ ROOT = "-"
 
 #: Where the claims of runners lie in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
-
 #: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 
@@ -46,6 +45,12 @@ def bytes_of(url: str) -> Any:
         raise StoreError(f"{url}: expected a path, or a URL that fsspec can open: {error}") from None
 
 
+def absolute(url: str) -> str:
+    """Return the same place for a process in another folder."""
+    path = local(url)
+    return url if path is None else str(path.absolute())
+
+
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
     """Turn what the file system or the network has to complain about into one sentence."""
@@ -60,15 +65,20 @@ def guarded(url: str, doing: str) -> Iterator[None]:
         raise StoreError(f"{url}: {doing} failed: {why}") from None
 
 
-def read_json(url: str, name: str) -> dict[str, Any] | None:
-    """Return a JSON document, or None if there is none of that name."""
+def read_bytes(url: str, name: str) -> bytes | None:
+    """Return what stands under a name, or None if nothing does."""
     path = local(url)
     with guarded(url, f"reading {name}"):
         if path is None:
             found = sync(bytes_of(url).get(name, default_buffer_prototype()))
-            content = None if found is None else found.to_bytes()
-        else:
-            content = (path / name).read_bytes() if (path / name).is_file() else None
+            return None if found is None else bytes(found.to_bytes())
+        return (path / name).read_bytes() if (path / name).is_file() else None
+
+
+def read_json(url: str, name: str) -> dict[str, Any] | None:
+    """Return a JSON document, or None if there is none of that name."""
+    content = read_bytes(url, name)
+    with guarded(url, f"reading {name}"):
         return None if content is None else json.loads(content)
 
 
