@@ -54,6 +54,7 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
     groups = room.datasets(store)
     if not (failures or messages):
         print_rows([_count(name, dataset) for name, dataset in groups.items()], {}, form or "table")
+        room.require_sound(store, list(groups))
         return
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
     if not messages:
@@ -85,7 +86,7 @@ def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
 
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     for record in sorted(room.records(store, series), key=lambda record: record["attempt"]):
-        for message in record["messages"]:
+        for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = room.ledger(store, series, dataset["status"].shape)
     return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]

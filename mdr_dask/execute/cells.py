@@ -88,6 +88,7 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
     place, laid_out = store.absolute(url), store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: gone since it was laid out")
+    begun = itertools.count(1)
     for cells in groups:
         template = cells.template
         attempts = store.attempts(url, template.series.name)
@@ -95,6 +96,8 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
             region = template.region(index)
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
+                if next(begun) % store.TOGETHER == 0:
+                    store.put_together(url, template.series.name)
                 yield Work(
                     place=Place(place, template.series.name, index, region, laid_out, hold),
                     model=template.campaign.model,

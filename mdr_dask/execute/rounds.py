@@ -96,9 +96,31 @@ def run(
     """
     _plan(campaign, url)  # what is refused leaves no lock behind
     with store.alone(url) if part is None else store.beside(url, part) as hold:
+        _require_sound(url)
         job = _Job(campaign, url, hold, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
-            return _run_rounds(job, execute)
+            progress = _run_rounds(job, execute)
+        _settle(job, progress)
+        return progress
+
+
+def _require_sound(url: str) -> None:
+    """Refuse to go on with a store that cheap checks find damaged."""
+    if store.exists(url):
+        store.require_sound(url, store.series_names(url))
+
+
+def _settle(job: _Job, progress: Progress) -> None:
+    """Leave few files, and say what the last digits of the results may depend on if it is not the same for all."""
+    names = store.series_names(job.url)
+    for name in names:
+        store.put_together(job.url, name)
+    if progress.blocks:
+        kinds = store.kinds(job.url, names)
+        if len(kinds) > 1:
+            told = "; ".join(f"{kind} ({count} blocks)" for kind, count in kinds.items())
+            sentence = f"blocks come from {len(kinds)} kinds of machine, last digits may differ: {told}"
+            job.tell(Event("kinds of machine", kinds, sentence))
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from mdr_dask.errors import StoreBusyError, StoreError
-from mdr_dask.store.files import CLAIMS, conditional, create, guarded, local, names, read_json, remove, write_bytes
+from mdr_dask.store.files import CLAIMS, conditional, create, guarded, listed, local, read_json, remove, write_bytes
 
 try:
     import fcntl
@@ -142,7 +142,7 @@ def lock_file(url: str, name: str = "") -> Path:
 
 def lock_names(url: str) -> list[str]:
     """Return the names of all locks of a study that have been held and not forgotten since."""
-    claims = {claim.removeprefix(CLAIMS).partition("/")[0] for claim in names(url, CLAIMS)}
+    claims = {claim.removeprefix(CLAIMS).partition("/")[0] for claim in listed(url, CLAIMS)}
     if local(url) is None:
         return sorted(claims)
     file = lock_file(url)
@@ -153,7 +153,7 @@ def lock_names(url: str) -> list[str]:
 
 def is_known(url: str) -> bool:
     """Say whether anybody has ever been at work on a study from here."""
-    return bool(names(url, CLAIMS)) if local(url) is None else lock_file(url).exists()
+    return bool(listed(url, CLAIMS)) if local(url) is None else lock_file(url).exists()
 
 
 def forget(url: str, name: str) -> None:
@@ -166,7 +166,7 @@ def forget(url: str, name: str) -> None:
 
 def holder(url: str, name: str = "") -> str:
     """Return who holds a lock that is held."""
-    told = [_told(url, claim).get("who", "") for claim in names(url, _claims(name))]
+    told = [_told(url, claim).get("who", "") for claim in _standing(url, name)]
     for runner in _runners(url, name) if local(url) is not None else ():
         with suppress(OSError):
             told.append(runner.read_text())
@@ -236,6 +236,10 @@ def _claim(name: str, number: int) -> str:
     return f"{_claims(name)}{number:06d}.json"
 
 
+def _standing(url: str, name: str) -> list[str]:
+    return [claim for claim in listed(url, _claims(name)) if claim.endswith(".json")]
+
+
 def _life(name: str, number: int) -> str:
     return f"{_claims(name)}{number:06d}.life"
 
@@ -266,7 +270,7 @@ def _claimed(url: str, name: str) -> Iterator[Hold]:
 
 def _stake(url: str, name: str, owner: str) -> int:
     """Make the next claim, unless the owner of the last one is alive; return its number."""
-    standing = [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in names(url, _claims(name))]
+    standing = [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
     number = max(standing, default=0) + 1
     if standing:
         _require_silence(url, name, number - 1)
