@@ -168,10 +168,7 @@ def try_harm(toy, sound: Path, work: Path, study, kind: str, harm: str, draw: ra
     wrongly = seen is not None and not _same(seen, truth)
     try:
         found = store.verify(url)
-        unfinished = (kind, harm) == (
-            "ledger",
-            "delete",
-        ) and found.notes  # nobody can tell it from a task that was killed
+        unfinished = (kind, harm) == ("ledger", "delete") and found.notes  # as if a task had been killed
         verified = bool(found.findings or unfinished)
     except StoreError:
         verified = True

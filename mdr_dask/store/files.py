@@ -105,7 +105,9 @@ def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | Non
     while window := tuple(itertools.islice(remaining, AT_ONCE)):
         with guarded(url, f"reading {window[0]} and others"):
             found = sync(gather(window))
-        yield from ((name, one and bytes(one.to_bytes())) for name, one in zip(window, found, strict=True))
+        yield from (
+            (name, None if one is None else bytes(one.to_bytes())) for name, one in zip(window, found, strict=True)
+        )
 
 
 def sizes(url: str, files: Iterable[str]) -> Iterator[tuple[str, int | None]]:
@@ -238,8 +240,8 @@ def conditional(url: str) -> bool:
         return True
     from fsspec import AbstractFileSystem
 
-    fs = bytes_of(url).fs
-    return type(getattr(fs, "sync_fs", fs)).pipe_file is not AbstractFileSystem.pipe_file
+    wrapped = getattr(bytes_of(url).fs, "sync_fs", None)
+    return wrapped is None or type(wrapped).pipe_file is not AbstractFileSystem.pipe_file
 
 
 def remove(url: str, files: Iterable[str]) -> None:
@@ -286,7 +288,7 @@ def listed(url: str, prefix: str = "") -> list[str]:
     async def collect() -> list[str]:
         return sorted([name async for name in bytes_of(url).list_prefix(prefix)])
 
-    with guarded(url, f"listing {prefix}"):
+    with guarded(url, f"listing {prefix or 'it'}"):
         return sync(collect())
 
 
