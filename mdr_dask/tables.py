@@ -232,6 +232,25 @@ def numbers(sheet: Sheet) -> FloatArray:
     )
 
 
+def described(text: str, source: str) -> str:
+    """Return the number of rows of a table, and name, unit and range of its columns, as it has them.
+
+    Raises
+    ------
+    TableError
+        If it is no table of numbers.
+    """
+    sheet = read_sheet(text, source)
+    columns = numbers(sheet).T
+    names = [cell.text for cell in sheet.names] or [f"column {place}" for place in range(1, len(columns) + 1)]
+    ranges = []
+    for name, unit, column in zip(names, sheet.units, columns, strict=True):
+        known = column[np.isfinite(column)]
+        ends = [f"{end:.4g}" for end in (known.min(), known.max())] if known.size else ["nothing"]
+        ranges.append(" ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit.strip("-1")])))
+    return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
+
+
 def _are_units(row: tuple[Cell, ...], numeric: bool) -> bool:
     """Return whether a row holds units: any words in a table of numbers, only known ones in one with words."""
     units = [cell.text.strip("[]() ") for cell in row]
@@ -355,18 +374,18 @@ def _shown(cell: Cell, unit: str) -> str:
 
 
 def _in_si(number: str, unit: str, wanted: str) -> float:
-    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s."""
+    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s, wave numbers 1/m."""
     number = number.replace(",", ".")
     if not unit:
         return float(number)
     if wanted == "K" and unit in _CELSIUS:
         unit = "degC"
-    if wanted != "rad/s":
+    if not wanted.startswith("rad/"):
         return to_si(f"{number} {unit}", wanted)
     try:
         return to_si(f"{number} {unit}", wanted)
     except ValueError:
-        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", "1/s")
+        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
 
 
 def _folded(name: str) -> str:

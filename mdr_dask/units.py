@@ -150,8 +150,77 @@ def to_si(value: str, unit: str) -> float:
 def expected(unit: str) -> str:
     """Return how a message names a quantity of a unit: ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
-    name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
+    other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
+    name, example = _MEANINGS.get(spaced) or other
     return f"{name} (such as {example!r})" if example else name
+
+
+#: Prefixes of what is shown, with the powers of ten that they stand for.
+_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
+
+
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """Return a quantity as a reader writes it: ``0.5 mm/s`` of 5e-4 m/s, ``-20 degC`` of 253.15 K.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit.
+    unit : str
+        The SI unit, ``"1"`` for a pure number.
+    digits : int
+        Most digits.
+    """
+    if unit == "K":
+        return f"{value - 273.15:.{digits}g} degC" if abs(value - 273.15) > 1e-9 else "0 degC"
+    if unit in ("1", ""):
+        return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+    if unit == "rad":
+        return f"{math.degrees(value):.{digits}g} deg"
+    if value == 0 or not math.isfinite(value) or not _LEADING.match(unit):
+        return f"{value:.{digits}g} {unit}"
+    rounded = float(f"{value:.{digits}g}")
+    power = min(max(3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12), -12), 12)
+    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
+
+
+#: Units that people forget to write, by the SI unit that is read in their place.
+_FORGOTTEN = {
+    "m": ("mm", "um", "nm", "km"),
+    "m/s": ("mm/s", "um/s", "km/h"),
+    "s": ("ms", "us", "ns", "min", "h"),
+    "N": ("mN", "uN", "kN"),
+    "N/m": ("N/mm",),
+    "Pa": ("kPa", "MPa", "GPa"),
+    "Pa*s": ("mPa s",),
+    "1/Pa": ("1/MPa", "1/GPa"),
+    "m^2/s": ("mm^2/s",),
+    "rad": ("deg",),
+    "K": ("degC",),
+    "kg/m^3": ("g/cm^3",),
+    "J/mol": ("kJ/mol",),
+    "Hz": ("kHz", "MHz"),
+}
+#: A bare number further than this from the usual value is asked about, in decades; temperatures are never far off.
+_FAR, _FAR_TEMPERATURE = 3.0, 0.3
+
+
+def is_far(value: float, unit: str, usual: str) -> bool:
+    """Return whether a number in SI lies more than three decades from a usual value such as ``10 MPa``."""
+    return value != 0 and _decades(value, to_si(usual, unit)) > (_FAR_TEMPERATURE if unit == "K" else _FAR) + 1e-9
+
+
+def likely(value: float, unit: str, usual: str) -> str:
+    """Return a bare number with the unit that was probably meant, empty if none brings it near the usual value."""
+    center = to_si(usual, unit)
+    meant = {f"{value:g} {other}": to_si(f"{value!r} {other}", unit) for other in _FORGOTTEN.get(unit, ())}
+    near = {text: _decades(size, center) for text, size in meant.items() if not is_far(size, unit, usual)}
+    return min(near, key=lambda text: near[text], default="")
+
+
+def _decades(value: float, usual: float) -> float:
+    return abs(math.log10(abs(value / usual))) if value else math.inf
 
 
 def example_unit(unit: str) -> str:

@@ -155,7 +155,9 @@ def test_a_network_that_is_gone_ends_a_run_in_one_sentence_and_the_next_one_goes
     toy, link, bucket, url, monkeypatch
 ):
     run(small(toy, 9), url)
-    begun = []
+    port, begun = link.target, []
+    monkeypatch.setattr(locks, "SILENCE", 0.5)
+    monkeypatch.setattr(locks, "BEAT", 0.2)
 
     def report(progress):
         if progress.blocks and not begun:

@@ -66,7 +66,7 @@ def test_at_a_url_the_second_runner_is_refused_and_the_claim_goes_with_the_first
     with store.lock(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
         run(small(toy), bucket)
     assert run(small(toy), bucket).done == 12
-    assert files.names(bucket, files.CLAIMS) == []
+    assert files.listed(bucket, files.CLAIMS) == []
     assert caplog.text == ""
 
 
@@ -136,12 +136,15 @@ def late_task(toy, url, monkeypatch):
 
 def test_a_worker_that_outlives_its_driver_writes_nothing(toy, url, monkeypatch):
     late = late_task(toy, url, monkeypatch)
-    grown = small(toy, 9)
-    run(grown, url)
+    run(small(toy), url)
     before = digests(url)
     with pytest.raises(StoreBusyError, match="has ended or lost the store; nothing was written"):
         run_block(late)
-    assert digests(url) == before
+    run(small(toy, 9), url)
+    grown = digests(url)
+    with pytest.raises(StoreError, match=r"nothing was written|a later shape"):
+        run_block(late)
+    assert digests(url) == grown != before
 
 
 def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypatch):

@@ -15,7 +15,10 @@ WRONG = [
     ("models nobody", "unknown model 'nobody'; known: sliding_friction"),
     ("run small.yaml --threads 0", "0 is not in the range x>=1"),
     ("run small.yaml --threads 2 --workers 2", "expected one of --threads, --workers, got 2 of them"),
-    ("run small.yaml --store .", ".: a folder that holds something else (.STORE.lock), expected a store or nothing"),
+    (
+        "run small.yaml --store .",
+        ".: a folder that holds something else (.STORE.entrance.lock), expected a store or nothing",
+    ),
     ("run small.yaml --store small.yaml", "small.yaml: a file, expected the folder of a store or nothing"),
     ("run small.yaml --store FOREIGN", "FOREIGN: Zarr, but not a study that mdr_dask made"),
     ("run small.yaml --store nobody://x", "nobody://x: expected a path, or a URL that fsspec can open: Protocol not"),
@@ -24,7 +27,10 @@ WRONG = [
     ("run other.yaml --store STORE --dry-run", "hurst: 0.7 in the store, 0.6 in the campaign"),
     ("run large.yaml", "large.yaml: one case needs about"),
     ("run small.yaml --scheduler nowhere --store STORE", "no Dask scheduler answers at 'nowhere'"),
-    ("run small.yaml --cluster small.yaml", "small.yaml:1:1: name: unknown key (known: class, arguments, scale)"),
+    (
+        "run small.yaml --cluster small.yaml",
+        "small.yaml:1:1: name: unknown key (known: class, arguments, scale, adapt)",
+    ),
     ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class: expected a class such as dask_jobqueue.SLURM"),
     ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments: expected a mapping, got 3"),
     ("run small.yaml --cluster list.yaml", "list.yaml:1:1: expected a mapping with the key class, got ['class']"),

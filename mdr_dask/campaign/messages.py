@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.errors import did_you_mean
-from mdr_dask.units import expected
+from mdr_dask.units import expected, likely
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
 Report = Callable[[Path, bool, str], None]
@@ -117,7 +117,8 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
     else:
         value = value_at(data, path)
         wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
-        report(path, False, f"expected {wanted}, got {shown(value)}{_hint(group, value)}")
+        hint = _hint(group, value) or _forgotten_unit(group, path, kind, data)
+        report(path, False, f"expected {wanted}, got {shown(value)}{hint}")
 
 
 def _entry(value: Any, what: str) -> Path:
@@ -136,6 +137,16 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
     if isinstance(value, dict) and types & {"float_type", "int_type"}:
         return " (a range is {linear: [a, b, n]} or {geometric: [a, b, n]})"
     return ""
+
+
+def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return the unit that a bare number out of bounds may lack."""
+    value, found, unit = value_at(data, path), fields.owner(kind, path, data), fields.unit_at(kind, path, data)
+    usual = fields.usual(found[0].model_fields[found[1]]) if found else ""
+    if not (usual and unit and isinstance(value, int | float)) or group[0]["type"] not in _BOUNDS:
+        return ""
+    meant = likely(value, unit, usual)
+    return f" (write {meant!r} if you mean that)" if meant else ""
 
 
 def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any) -> str:

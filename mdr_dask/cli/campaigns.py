@@ -1,4 +1,4 @@
-"""Commands around a campaign file: models, check, schema."""
+"""Commands around a campaign file: models, check, run, schema."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.printing import print_json, print_rows
+from mdr_dask.cli.printing import print_json, printable
+from mdr_dask.cli.understood import axes_rows, costs_row, study_lines
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
-    from mdr_dask.plan import Estimate
+    from mdr_dask.campaign import Campaign
+    from mdr_dask.models.base import Model
 
 CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -27,24 +29,57 @@ def models(name: str | None, form: str | None) -> None:
     mdr-dask models sliding_friction
     """
     from mdr_dask import models as room
-    from mdr_dask.campaign.reference import output_rows, parameter_rows
-    from mdr_dask.errors import ModelError
+    from mdr_dask.campaign.reference import output_rows, parameter_rows, ways_told
 
     if name is None:
         rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
         _print_left(rows, form)
         return
-    try:
-        model = room.load(name)
-    except ModelError as error:
-        raise click.UsageError(f"{error}; known: {', '.join(room.names())}") from None
+    model = _model(name)
     if form == "json":
-        print_json({"model": name, "parameters": parameter_rows(model), "outputs": output_rows(model)})
+        parts = {"parameters": parameter_rows(model), "together": ways_told(model), "outputs": output_rows(model)}
+        print_json({"model": name, **parts})
         return
     click.echo(f"{name}: {model.summary}\n\nparameters")
     _print_left(parameter_rows(model), None)
+    if ways_told(model):
+        click.echo("\n".join(["", "what belongs together", *ways_told(model)]))
     click.echo("\noutputs")
     _print_left(output_rows(model), None)
+
+
+def _model(name: str) -> Model[Any]:
+    """Return a model; a wrong name is a wrong call."""
+    from mdr_dask import models as room
+    from mdr_dask.errors import ModelError, did_you_mean
+
+    try:
+        return room.load(name)
+    except ModelError as error:
+        hint = did_you_mean(name, room.names()) if str(error).startswith("unknown") else ""
+        raise click.UsageError(f"{error}{hint}") from None
+
+
+@click.command()
+@click.argument("model")
+@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a new file instead of stdout.")
+def init(model: str, output: Path | None) -> None:
+    """Write a first campaign of a model, with units, meanings and choices; it passes check as it stands.
+
+    \b
+    mdr-dask init sliding_friction -o rubber.yaml
+    """
+    from mdr_dask.campaign.draft import draft
+
+    text = draft(model, _model(model), str(output or "campaign.yaml"))
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    if output.exists():
+        raise click.UsageError(f"{output}: exists already, expected the name of a new file")
+    with writing(output):
+        output.write_text(text)
+    click.echo(f"{output}: edit it, then mdr-dask check {output}")
 
 
 def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
@@ -60,7 +95,9 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def check(campaigns: tuple[Path, ...], form: str | None) -> None:
-    """Check campaign files and say what each will cost; all problems at once, exit code 2 if there are any.
+    """Check campaign files and say what was understood: axes, tables, sizes, times.
+
+    All problems are told at once, with exit code 2 if there are any.
 
     \b
     mdr-dask check campaigns/*.yaml
@@ -69,7 +106,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     from mdr_dask.errors import CampaignError
     from mdr_dask.plan import estimate
 
-    rows, notes, problems = [], [], []
+    rows, problems = [], []
     for path in campaigns:
         try:
             campaign = load(path)
@@ -77,31 +114,21 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         except CampaignError as error:
             problems += list(error.args)
             continue
-        rows.append({"campaign": str(path), "model": campaign.model, **cost_row(costs)})
-        notes += [f"{path}: {note}" for note in costs.notes]
-        if form == "json":
-            rows[-1]["notes"] = list(costs.notes)
-    if rows:
-        print_rows(rows, {"bytes": "B", "seconds": "s"}, form or "table")
-    if form != "json":
-        for note in notes:
-            click.echo(note)
+        row = {"campaign": str(path), "model": campaign.model, **costs_row(costs)}
+        rows.append(row | {"axes": axes_rows(campaign), "questions": list(campaign.remarks)})
+        if form != "json":
+            click.echo("\n".join([f"{path}: {campaign.model}", *study_lines(campaign, costs)]))
+            ask(campaign)
+    if rows and form == "json":
+        print_json({"units": {"bytes": "B", "seconds": "s", "compiling": "s"}, "rows": rows})
     if problems:
         raise CampaignError(*problems)
 
 
-def cost_row(estimate: Estimate) -> dict[str, Any]:
-    """Return what a campaign will cost as one row of a table."""
-    return {
-        "cases": estimate.cases,
-        "realisations": estimate.realisations,
-        "at_most": estimate.at_most,
-        "results": estimate.results,
-        "solves": estimate.solves,
-        "blocks": estimate.blocks,
-        "bytes": estimate.bytes,
-        "seconds": float(estimate.seconds),
-    }
+def ask(campaign: Campaign) -> None:
+    """Print what is asked about bare numbers."""
+    for question in campaign.remarks:
+        click.echo(printable(question), err=True)
 
 
 @click.command()

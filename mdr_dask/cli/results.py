@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdr_dask.cli import watching
 from mdr_dask.cli.options import select_option, series_option, tell, units_option
 from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_errors, with_intervals
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
@@ -41,21 +42,31 @@ limit_option = click.option(
 @store_argument
 @click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
 @click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
+@click.option("--watch", is_flag=True, help="Show it again and again, until nobody is at work any more.")
 @json_option
-def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
-    """Show the progress of a store, during a run too.
+def status(store: str, failures: bool, messages: bool, watch: bool, form: str | None) -> None:
+    """Show the progress of a store, during a run too, and who is at work on it.
 
     \b
     mdr-dask status results/quickstart.zarr
+    mdr-dask status results/quickstart.zarr --watch
     mdr-dask status results/quickstart.zarr --failures
     """
     from mdr_dask import store as room
 
-    groups = room.datasets(store)
-    if not (failures or messages):
-        print_rows([_count(name, dataset) for name, dataset in groups.items()], {}, form or "table")
-        room.require_sound(store, list(groups))
+    def count() -> list[dict[str, Any]]:
+        return [_count(name, dataset) for name, dataset in room.datasets(store).items()]
+
+    if watch:
+        if failures or messages or form:
+            raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
+        watching.watch(store, count)
         return
+    if not (failures or messages):
+        _print_counts(count(), watching.at_work(store), form)
+        room.require_sound(store, room.series_names(store))
+        return
+    groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
     if not messages:
         found = [message for message in found if message["status"] != "done"]
@@ -69,6 +80,15 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
         click.echo(printable(f"    {_shared(alike)}"))
     if not found:
         click.echo("no failures" if not messages else "no messages")
+
+
+def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | None) -> None:
+    if form == "json":
+        print_json({"units": {}, "rows": rows, "at_work": at_work})
+        return
+    print_rows(rows, {}, "table")
+    if at_work:
+        click.echo(f"at work: {', '.join(at_work)}")
 
 
 def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:

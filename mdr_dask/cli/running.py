@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN, cost_row
+from mdr_dask.cli.campaigns import CAMPAIGN, ask
 from mdr_dask.cli.log import telling
 from mdr_dask.cli.printing import print_json
 from mdr_dask.cli.progress import reporter, seconds
+from mdr_dask.cli.understood import costs_row, study_lines
 
 if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign
@@ -56,6 +57,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     url = options["url"] or study.store
     if url.startswith("memory:"):
         raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
+    ask(study)
     if dry_run:
         _print_plan(study, url, form)
         return 0
@@ -81,32 +83,12 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
         progress = outlook(study, url)
         kept, to_do = progress.kept, progress.to_do
     if form == "json":
-        notes = list(costs.notes)
-        print_json(
-            {"campaign": study.name, "store": url, **cost_row(costs), "kept": kept, "to_do": to_do, "notes": notes}
-        )
+        print_json({"campaign": study.name, "store": url, **costs_row(costs), "kept": kept, "to_do": to_do})
         return
-    more = costs.rounds
-    click.echo(f"{study.name} -> {url}")
-    click.echo(
-        f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
-    )
-    click.echo(f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks")
-    size, most = (f"{count * costs.bytes / 2**20:.3g}" for count in (1, more))
-    times = " to ".join(dict.fromkeys((seconds(costs.seconds), seconds(costs.seconds * more))))
-    click.echo(f"{' to '.join(dict.fromkeys((size, most)))} MiB uncompressed, about {times} on one core")
-    if more > 1:
-        click.echo("from the first round to the last one, if no case meets its tolerance before")
-    for note in costs.notes:
-        click.echo(note)
+    click.echo("\n".join([f"{study.name} -> {url}", *study_lines(study, costs)]))
     if kept:
         left = seconds(costs.seconds * to_do / costs.results)
         click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
-
-
-def _range(first: int, more: float) -> str:
-    """Return a count of the first round, and what it comes to at most."""
-    return f"{first}" if more == 1 else f"{first} to {round(first * more)}"
 
 
 def _resources(options: dict[str, Any]) -> Resources:

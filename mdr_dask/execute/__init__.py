@@ -1,8 +1,8 @@
 """Plan and store through Dask: resume, retries, failures, progress. The only room that knows Dask."""
 
 from mdr_dask.execute.events import Event, Tell
-from mdr_dask.execute.executors import Resources
 from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.rounds import outlook, run
 from mdr_dask.store import Part
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from importlib import import_module
 from typing import Any
 
+import dask
 from distributed import Client, LocalCluster
 from distributed.comm import get_address_host_port
 from distributed.deploy import Cluster
@@ -16,7 +18,7 @@ from distributed.security import Security
 from mdr_dask.errors import ClusterError
 from mdr_dask.execute.crew import Crew
 from mdr_dask.execute.events import Event, Tell
-from mdr_dask.execute.executors import Resources
+from mdr_dask.execute.resources import Resources
 
 #: Run in every worker process: Ctrl-C reaches them too, and it is for the driver to end them.
 IGNORE_INTERRUPTS = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
@@ -26,8 +28,12 @@ SCHEDULER_PATIENCE = 10
 DASHBOARD = "127.0.0.1:0"
 #: Seconds of work that a cluster which grows by itself should have for each of its threads: about a block.
 TARGET_DURATION = "1s"
-#: Loggers of the libraries below: what they complain about ends up in our sentences.
-LOGGERS = ("distributed", "dask_jobqueue", "asyncio", "tornado")
+#: Loggers that complain when workers cannot be started: that ends up in our sentences.
+STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
+#: Loggers whose complaints follow from what is told in one sentence anyhow.
+ECHOES = ("distributed", "asyncio")
+#: What keeps a cluster on this machine from giving up a worker whose nanny is about to start it again.
+NANNIES = {"distributed.deploy.lost-worker-timeout": "1 day"}
 
 
 class _LastWord(logging.Handler):
@@ -52,8 +58,10 @@ def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
     """
     word = _LastWord(logging.ERROR)
     with ExitStack() as stack:
-        for name in LOGGERS:
-            stack.enter_context(_taken(logging.getLogger(name), word))
+        for names, handler in ((STARTING, word), (ECHOES, logging.NullHandler())):
+            for name in names:
+                stack.enter_context(_taken(logging.getLogger(name), handler))
+        again = _nothing
         if resources.scheduler is not None:
             tell(Event("connecting", {"scheduler": resources.scheduler}))
             client, most = stack.enter_context(_connected(resources.scheduler)), 0
@@ -61,8 +69,16 @@ def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
             plan = _local(resources.workers) if resources.cluster is None else resources.cluster
             tell(Event("starting", {"cluster": plan["class"]}, f"starting {plan['class']}"))
             cluster = stack.enter_context(_started(plan))
+            if isinstance(cluster, LocalCluster):
+                stack.enter_context(dask.config.set(NANNIES))
+            elif "scale" in plan:  # jobs that have reached their wall time are not replaced otherwise
+                again = partial(cluster.scale, **plan["scale"])
             client, most = stack.enter_context(Client(cluster, set_as_default=False)), _most(plan)
-        yield Crew(client, tell, resources.patience, most, lambda: word.text)
+        yield Crew(client, tell, resources.patience, most, again, lambda: word.text)
+
+
+def _nothing() -> None:
+    """Leave a cluster to itself."""
 
 
 @contextmanager

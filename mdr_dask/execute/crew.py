@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from queue import Empty, SimpleQueue
@@ -15,8 +15,7 @@ from distributed.client import ClosedClientError
 from distributed.comm import CommClosedError
 
 from mdr_dask.errors import ClusterError
-from mdr_dask.execute.events import Event, Tell, of_block
-from mdr_dask.execute.executors import Settle
+from mdr_dask.execute.events import Event, Settle, Tell, of_block
 from mdr_dask.execute.remote import TOPIC, run_on_worker
 from mdr_dask.task import Outcome, Work, write_off
 
@@ -42,15 +41,26 @@ class Crew:
         Seconds without any worker after which to give up.
     most : int
         Threads that the cluster may grow to if it sees work for them, 0 if it does not grow by itself.
+    replace_lost : callable
+        Asks the cluster for new workers in place of lost ones.
     last_word : callable
         Returns what the cluster had to complain about last, if anything.
     """
 
-    def __init__(self, client: Client, tell: Tell, patience: float, most: int, last_word: Any) -> None:
+    def __init__(
+        self,
+        client: Client,
+        tell: Tell,
+        patience: float,
+        most: int,
+        replace_lost: Callable[[], None],
+        last_word: Callable[[], str],
+    ) -> None:
         self._client = client
         self._tell = tell
         self._patience = patience
         self._most = most
+        self._replace_lost = replace_lost
         self._last_word = last_word
         self._ended: SimpleQueue[Future] = SimpleQueue()
         self._running: dict[Future, Work] = {}
@@ -108,6 +118,7 @@ class Crew:
         """See whether the scheduler is there and has workers; give up when there has been none for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
+        self._replace_lost()
         try:
             found = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWER)
             self._threads, what = sum(found.values()), "no worker"

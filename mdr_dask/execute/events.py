@@ -31,6 +31,8 @@ class Event:
 
 #: Takes events, from any thread.
 Tell = Callable[[Event], None]
+#: Takes a task that has ended.
+Settle = Callable[[Work, Outcome], None]
 
 
 def of_block(name: str, work: Work, **facts: Any) -> Event:

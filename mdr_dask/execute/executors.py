@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import os
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from mdr_dask.execute.events import Tell, of_block
+from mdr_dask.execute.events import Settle, Tell, of_block
+from mdr_dask.execute.resources import Resources
 from mdr_dask.task import Outcome, Work, run_block
 
 if TYPE_CHECKING:
@@ -22,33 +22,6 @@ if TYPE_CHECKING:
 THREAD_WINDOW = 64
 
 
-@dataclass(frozen=True)
-class Resources:
-    """Where to run: threads of this process by default.
-
-    Parameters
-    ----------
-    threads : int or None
-        Threads of this process; None for one per core.
-    workers : int or None
-        Processes of a local cluster instead.
-    scheduler : str or None
-        Address of a running Dask scheduler instead.
-    cluster : mapping or None
-        What a cluster file says, as `mdr_dask.campaign.cluster.load_cluster` reads it: any Dask cluster instead.
-    patience : float
-        Seconds without any worker after which a run on a cluster gives up.
-    """
-
-    threads: int | None = None
-    workers: int | None = None
-    scheduler: str | None = None
-    cluster: Mapping[str, Any] | None = None
-    patience: float = 600.0
-
-
-#: Takes a task that has ended.
-Settle = Callable[[Work, Outcome], None]
 #: Runs tasks and settles each that has ended, in whatever order.
 Execute = Callable[[Iterable[Work], Settle], None]
 

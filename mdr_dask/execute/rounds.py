@@ -13,8 +13,9 @@ from mdr_dask import store
 from mdr_dask.campaign import Campaign
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
-from mdr_dask.execute.executors import Execute, Resources, executor
+from mdr_dask.execute.executors import Execute, executor
 from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.resources import Resources
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
 from mdr_dask.store import Hold, Part

@@ -117,20 +117,22 @@ def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
     found = np.full(shape, Status.MISSING, dtype=np.int8)
     if document(url, series) is None:
         return found
-    with guarded(url, "reading status"):
-        status = _open(url, series)["status"]
-        found[tuple(map(slice, status.shape))] = status[...]
+    try:
+        with guarded(url, "reading status"):
+            status = _open(url, series, bytes_of(url))["status"]
+            found[tuple(map(slice, status.shape))] = status[...]
+    except StoreError as error:
+        raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
     return found
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return one output of a group as it stands now, axes in the order of the store."""
     with guarded(url, f"reading {output}"):
-        return np.asarray(_open(url, series)[output][...])
+        return np.asarray(_open(url, series, Checked(bytes_of(url), url, series))[output][...])
 
 
-def _open(url: str, series: str) -> Any:
-    store = Checked(bytes_of(url), url, series)
+def _open(url: str, series: str, store: Store) -> Any:
     document(url, series)
     return zarr.open_group(store, path=group_name(series) or None, mode="r", use_consolidated=True, zarr_format=3)
 

@@ -141,6 +141,10 @@ def _changed(url: str, series: str, chunks: Mapping[str, tuple[str, BlockIndex]]
     history = histories(records(url, series))
     ledgers = {block: group_name(series, f"status/c/{'/'.join(map(str, block))}") for _, block in chunks.values()}
     parts = dict(zip(ledgers, (content for _, content in read_many(url, ledgers.values())), strict=True))
+    for block, name in ledgers.items():
+        written = {attempt["status"] for attempt in history.get(block, ()) if "status" in attempt}
+        if written and digest(parts[block] or b"") not in written:
+            yield name
     for (chunk, (name, block)), (_, content) in zip(chunks.items(), read_many(url, chunks), strict=True):
         expected = allowed(history.get(block, ()), digest(parts[block] or b""), name)
         if expected and digest(content or b"") not in expected:

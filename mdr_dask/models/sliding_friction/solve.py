@@ -100,7 +100,7 @@ class _Group:
         except ValueError as problem:
             result.messages.update({(int(j), r): str(problem) for j in self.members})
             return 0
-        found = self._outputs(steady, errors)
+        found = self._outputs(steady, errors, realisation)
         if "material_error" in self.block.outputs:
             found["material_error"] = np.array([fit_error(materials[j]) for j in self.members])
         status = steady.status[self.which]
@@ -112,7 +112,7 @@ class _Group:
             result.messages.update({(int(j), r): sentence for j in self.members[self.which == k]})
         return int(self.loads.size)
 
-    def _outputs(self, steady: Steady, errors: Errors) -> dict[str, FloatArray]:
+    def _outputs(self, steady: Steady, errors: Errors, realisation: int) -> dict[str, FloatArray]:
         """Return the outputs of the members and their errors, in units."""
         height = self.problems.height[self.members]
         slope = height / self.problems.length[self.members]
@@ -121,7 +121,7 @@ class _Group:
         for name in self.block.outputs:
             output = name.removesuffix("_error")
             if output == "rms_slope":
-                found[name] = self.setting.roughness.slope() * slope
+                found[name] = self.setting.roughness.slope(realisation) * slope
             elif output in COLUMNS:
                 column = getattr(steady if name == output else errors, COLUMNS[output])
                 per = self.loads if output == "friction_coefficient" else 1.0

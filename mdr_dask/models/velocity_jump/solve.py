@@ -118,7 +118,7 @@ class _Group:
                 if output in result.values:
                     result.values[output][members[good], r] = (values.T * unit).T[good]
         if "rms_slope" in result.values:
-            result.values["rms_slope"][members[good], r] = (self.setting.roughness.slope() * steep)[good]
+            result.values["rms_slope"][members[good], r] = (self.setting.roughness.slope(realisation) * steep)[good]
         for k, sentence in self._sentences(found):
             result.messages[int(members[k]), r] = sentence
         return solves
