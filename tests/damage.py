@@ -150,8 +150,15 @@ class Trial:
     healed: bool
     sound: bool
 
+    @property
+    def faults(self) -> list[str]:
+        """What went wrong, or was not told."""
+        looks = {"verify": self.changed} | dict.fromkeys(("run", "status", "show"), self.reads_wrongly)
+        silent = [f"{look} is silent" for look, due in looks.items() if due and not getattr(self, look)]
+        return silent + ["other bytes after repair"] * (not self.healed) + ["not sound after repair"] * (not self.sound)
 
-def try_harm(toy, sound: Path, work: Path, study, kind: str, harm: str, draw: random.Random) -> Trial | None:
+
+def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: random.Random) -> Trial | None:
     """Harm one file of a copy of a sound store; look with everything there is; repair, run, compare."""
     shutil.rmtree(work, ignore_errors=True)
     shutil.copytree(sound, work)

@@ -40,7 +40,8 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
 
 def _print(store: str, found: Inspection, limit: int) -> None:
     rows = [{"kind": f.kind, "file": printable(f.name), "what": printable(f.what)} for f in found.findings]
-    print_rows(rows, {}, "table", limit)
+    if rows:
+        print_rows(rows, {}, "table", limit)
     for note in found.notes:
         click.echo(printable(note))
     bad = sum(len(group.bad_blocks) for group in found.groups)

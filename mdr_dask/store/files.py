@@ -88,7 +88,10 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
     """Return a JSON document, or None if there is none of that name."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
-        return None if content is None else json.loads(content)
+        try:
+            return None if content is None else json.loads(content)
+        except RecursionError:
+            raise ValueError("nested too deep") from None
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:

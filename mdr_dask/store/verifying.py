@@ -283,7 +283,7 @@ def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) 
 def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
     """Return what Zarr has to say of an array, or of one of its blocks, that cannot be read."""
     try:
-        array = zarr.open_array(bytes_of(url), path=path, mode="r")
+        array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
         if block is None:
             array[...]
         else:
