@@ -12,7 +12,7 @@ CAMPAIGN = """\
 name: tyre
 model: sliding_friction
 parameters:
-  profile: road.csv
+  surface: {profile: road.csv}
   material:
     dma_table: {file: rubber.csv}
     temperature: [0 degC, 20 degC, 50 degC]

@@ -15,6 +15,7 @@ from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
 from mdr_dask.cli.running import run
+from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
 from mdr_dask.version import __version__
 
@@ -39,7 +40,22 @@ def cli() -> None:
     """
 
 
-for command in (models, init, check, run, status, verify, show, aggregate, fit, plot, figures, master_curve, schema):
+for command in (
+    models,
+    init,
+    check,
+    run,
+    status,
+    verify,
+    show,
+    aggregate,
+    fit,
+    sensitivity,
+    plot,
+    figures,
+    master_curve,
+    schema,
+):
     cli.add_command(command)
 
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mdr_dask.cli.options import select_option, series_option, tell
+from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table
-from mdr_dask.cli.results import Reading, csv_option, json_option
+from mdr_dask.cli.results import Reading
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 from mdr_dask.errors import DataError
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import lru_cache, reduce
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
@@ -31,6 +32,7 @@ class Status(IntEnum):
 
 
 Ways = tuple[tuple[str, ...], ...]
+_WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
 class Parameters(BaseModel):
@@ -45,12 +47,35 @@ class Parameters(BaseModel):
     gone: ClassVar[Mapping[str, str]] = {}
     ways: ClassVar[tuple[Ways, ...]] = ()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_numbers_in_quotes(cls, data: Any) -> Any:
+        """Read a whole number in quotes as the number, for a number with a unit is a string too."""
+        if not isinstance(data, dict):
+            return data
+        quoted = {
+            key: int(data[key])
+            for key in data.keys() & _whole_fields(cls)
+            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
+        }
+        return {**data, **quoted} if quoted else data
+
     def require_one_way(self) -> None:
         """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
         for ways in self.ways:
             given = {name for way in ways for name in way if getattr(self, name) is not None}
             if not any(given == set(way) for way in ways):
                 raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+
+
+@lru_cache(maxsize=256)
+def _whole_fields(kind: type[BaseModel]) -> frozenset[str]:
+    """Return the fields of a parameter set that may hold a whole number."""
+    return frozenset(name for name, info in kind.model_fields.items() if _may_be_whole(info.annotation))
+
+
+def _may_be_whole(annotation: Any) -> bool:
+    return annotation is int or any(map(_may_be_whole, get_args(annotation)))
 
 
 def said(ways: Ways) -> str:
@@ -229,6 +254,24 @@ class Output:
 
 
 @dataclass(frozen=True)
+class Number:
+    """A dimensionless number that a user can ask for beside the outputs of a model.
+
+    Parameters
+    ----------
+    name, meaning : str
+        As in conditions and tables; the meaning in one line.
+    formula : str
+        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
+        `mdr_dask.questions.expression` reads it.
+    """
+
+    name: str
+    formula: str
+    meaning: str
+
+
+@dataclass(frozen=True)
 class Coordinate:
     """Values along a dimension of an output, with unit and meaning."""
 
@@ -359,6 +402,8 @@ class Model(Generic[P]):
         What one part of a parameter set has to say by itself is told by its method `notes`.
     compiling : float
         Seconds that its kernels take to compile, the first time on a machine.
+    numbers : tuple of Number
+        Dimensionless numbers of its cases.
     """
 
     name: str
@@ -375,6 +420,7 @@ class Model(Generic[P]):
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[Sequence[P]], tuple[str, ...]] = lambda _: ()
     compiling: float = 0.0
+    numbers: tuple[Number, ...] = ()
 
     @property
     def companions(self) -> dict[str, Output]:

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, NamedFile, Number, Output, Parameters, Ways, deferred, quantity
 from mdr_dask.tables import Column, read_table
 
 
@@ -294,7 +294,7 @@ def units(parameters: FrettingWear) -> dict[str, str]:
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=4,
+    version=5,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,
@@ -308,5 +308,13 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
+    numbers=(
+        Number("stick_share", "stick_border / contact_radius", "stick radius over the radius of the wear scar"),
+        Number(
+            "archard_share",
+            "wear_volume * hardness / (4 * wear_coefficient * normal_force * amplitude * cycles)",
+            "worn volume over that of gross slip by Archard's law",
+        ),
+    ),
     compiling=5.0,
 )
