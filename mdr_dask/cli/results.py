@@ -224,7 +224,7 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     mdr-dask fit results/friction_force.zarr
     mdr-dask fit results/friction_force.zarr zone_one --json
     """
-    from mdr_dask import fit as room
+    from mdr_dask import fits as room
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import LAW_HOLDS, Fit, fitted, law_holds
-from mdr_dask.fit.kinetic_cases import LEAST, LEVELS, Cases, law_rate
-from mdr_dask.fit.relaxation import (
+from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, law_rate
+from mdr_dask.fits.relaxation import (
     AMPLITUDE_FIELDS,
     LAWS,
     RATE_FIELDS,

@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import FitError
-from mdr_dask.fit.sensitivity import sobol_indices
+from mdr_dask.fits.sensitivity import sobol_indices
 
 INPUTS = ("x1", "x2", "x3")
 FIRST, TOTAL = np.array([0.3139, 0.4424, 0.0]), np.array([0.5576, 0.4424, 0.2437])

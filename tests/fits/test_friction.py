@@ -3,7 +3,7 @@ import pytest
 from friction_store import store
 
 from mdr_dask.errors import FitError
-from mdr_dask.fit.friction import FITS, within_indenter_law
+from mdr_dask.fits.friction import FITS, within_indenter_law
 from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit.compute for fit in FITS}

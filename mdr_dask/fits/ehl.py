@@ -9,7 +9,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import Fit, law_holds
+from mdr_dask.fits.base import Fit, law_holds
 from mdr_dask.models.ehl_line import groups as groups_of
 
 _FILMS = {"central_film": "central", "minimum_film": "minimum"}

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.mixed import FITS, estimate
+from mdr_dask.fits.mixed import FITS, estimate
 from mdr_dask.models.base import DataFile
 
 (FIT,) = FITS

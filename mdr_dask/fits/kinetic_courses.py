@@ -11,9 +11,9 @@ import xarray as xr
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import LAW_HOLDS, Fit, fitted, law_holds
-from mdr_dask.fit.kinetic_cases import LEAST, LEVELS, Cases, law_rate
-from mdr_dask.fit.kinetics import LAW, jump_law
+from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, law_rate
+from mdr_dask.fits.kinetics import LAW, jump_law
 
 Series = Mapping[str, xr.Dataset]
 _MODELS = ("velocity_jump",)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from importlib.metadata import entry_points
 
-from mdr_dask.fit.base import Fit
+from mdr_dask.fits.base import Fit
 
 #: Modules of this room that hold ``FITS``.
 SUBJECTS: tuple[str, ...] = (
@@ -25,6 +25,6 @@ GROUP = "mdr_dask.fits"
 
 def available(model: str) -> dict[str, Fit]:
     """Return the fits for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
-    own = (import_module(f"mdr_dask.fit.{subject}").FITS for subject in SUBJECTS)
+    own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
     return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask.fit.friction import FITS
+from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit for fit in FITS}

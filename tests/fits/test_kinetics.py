@@ -3,8 +3,8 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import FitError
-from mdr_dask.fit.kinetics import FITS, jump_law
-from mdr_dask.fit.relaxation import exponential, widths
+from mdr_dask.fits.kinetics import FITS, jump_law
+from mdr_dask.fits.relaxation import exponential, widths
 
 FIT = {fit.name: fit for fit in FITS}
 TIMES = np.geomspace(1e-4, 20, 60)

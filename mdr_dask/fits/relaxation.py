@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.fit.base import DOUBTFUL, WITHIN
+from mdr_dask.fits.base import DOUBTFUL, WITHIN
 
 Law = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 

@@ -14,7 +14,7 @@ from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.base import Fit
+from mdr_dask.fits.base import Fit
 from mdr_dask.physics.superposition import laws as shift_laws
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import FitError
-from mdr_dask.fit.ehl import film_exponents
+from mdr_dask.fits.ehl import film_exponents
 
 
 def power_law(W: np.ndarray, U: np.ndarray, G: np.ndarray, scatter: float = 0.0) -> xr.Dataset:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import fit
+from mdr_dask import fits
 from mdr_dask.cli import main
-from mdr_dask.fit.base import Fit, fitted, law_holds
+from mdr_dask.fits.base import Fit, fitted, law_holds
 
 STUDY = """\
 name: study
@@ -58,8 +58,8 @@ def test_a_fit_without_a_law_says_so():
 
 
 def test_names_of_fits_differ_and_every_module_has_some():
-    fits = [each for subject in fit.SUBJECTS for each in import_module(f"mdr_dask.fit.{subject}").FITS]
-    assert len({each.name for each in fits}) == len(fits) > 15
+    laws = [each for subject in fits.SUBJECTS for each in import_module(f"mdr_dask.fits.{subject}").FITS]
+    assert len({each.name for each in laws}) == len(laws) > 15
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask.fit.kinetics import FITS, jump_law
+from mdr_dask.fits.kinetics import FITS, jump_law
 
 FIT = {fit.name: fit for fit in FITS}
 TIMES = np.geomspace(1e-3, 20, 40)

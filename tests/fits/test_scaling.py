@@ -6,8 +6,8 @@ import xarray as xr
 from friction_store import store
 
 from mdr_dask.errors import FitError
-from mdr_dask.fit.friction import numbers
-from mdr_dask.fit.scaling import FITS, contact_slope_law
+from mdr_dask.fits.friction import numbers
+from mdr_dask.fits.scaling import FITS, contact_slope_law
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 

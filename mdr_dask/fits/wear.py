@@ -11,7 +11,7 @@ import xarray as xr
 from pydantic import ValidationError
 
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.base import Fit
+from mdr_dask.fits.base import Fit
 from mdr_dask.models.base import Block
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Table
 from mdr_dask.models.fretting_wear.reduction import reduce_block, table_profile

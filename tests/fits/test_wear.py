@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.wear import FITS, best_xi, wear_coefficient
+from mdr_dask.fits.wear import FITS, best_xi, wear_coefficient
 from mdr_dask.models.base import DataFile
 from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.declaration import Cone, FrettingWear, Parabola

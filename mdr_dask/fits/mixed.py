@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.base import DOUBTFUL, Fit
+from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.models.base import DataFile
 from mdr_dask.tables import Column, read_table
 

@@ -13,7 +13,7 @@ from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
@@ -25,7 +25,7 @@ MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
 FLAT = 0.05  # of the largest friction that still counts as plateau
-TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fit/test_friction_coverage.py chose them
+TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fits/test_friction_coverage.py chose them
 BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fit.base import DOUBTFUL, Fit, fitted, law_holds
-from mdr_dask.fit.friction import (
+from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, law_holds
+from mdr_dask.fits.friction import (
     MODELS,
     ZONE_ONE,
     Table,
