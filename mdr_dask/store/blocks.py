@@ -113,14 +113,18 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing."""
+    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing.
+
+    Another part may have grown it beyond the shape meanwhile.
+    """
     found = np.full(shape, Status.MISSING, dtype=np.int8)
     if document(url, series) is None:
         return found
     try:
         with guarded(url, "reading status"):
             status = _open(url, series, bytes_of(url))["status"]
-            found[tuple(map(slice, status.shape))] = status[...]
+            common = tuple(map(slice, np.minimum(shape, status.shape)))
+            found[common] = status[common]
     except StoreError as error:
         raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
     return found
