@@ -16,6 +16,7 @@ from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
+from mdr_dask.cli.storage import verify
 from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
@@ -46,6 +47,7 @@ for command in (
     check,
     run,
     status,
+    verify,
     show,
     aggregate,
     fit,
