@@ -12,7 +12,7 @@ from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ CASE = (
 )
 #: Axes that get the colours, the first that varies.
 BY = ("normal_force", "hurst", "shear_modulus", "rms_roughness", "points")
+LAW = "law (eq. 3.18)"
 FIT: dict[str, Fit] = {fit.name: fit for fit in FITS}
 
 
@@ -71,7 +72,7 @@ def _in_numbers(data: xr.Dataset) -> _Shown:
     return _Shown(factor, number / data["velocity"], x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
 
 
-def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, curves.Mean]:
+def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, drawing.Mean]:
     """Return where the points of a curve lie and their means."""
     shown = how(data)
     return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
@@ -102,7 +103,7 @@ def _against_velocity(
         families.append(one)
         told += [f"{name}: {each}" if name else each for each in one.left_out]
         for curve in one.curves:
-            curves.draw(axes, curve, *_mean_of(curve.data, how))
+            drawing.curve(axes, curve, *_mean_of(curve.data, how))
             if law and one.joined and is_plane(curve.data):
                 _draw_law(axes, curve)
         shown = how(one.curves[0].data)
@@ -111,7 +112,7 @@ def _against_velocity(
         if "y" not in scales:
             axes.set_ylim(bottom=0)
         if law and one.joined and is_plane(data):
-            axes.plot([], [], "k-", lw=0.8, label="law (eq. 3.18)")
+            axes.plot([], [], "k-", lw=0.8, label=LAW)
         curves.finish(figure, axes, one)
     _titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
     style.leave_out(figure, told)
@@ -131,12 +132,12 @@ def _titles(
             axes.set_title(text, fontsize="small", wrap=True)
 
 
-def _draw_law(axes: Axes, curve: curves.Curve) -> None:
+def _draw_law(axes: Axes, curve: drawing.Curve) -> None:
     """Draw the interpolation law of one case through the range of its velocities."""
     _, force, velocity = numbers(curve.data)
     fine = np.geomspace(float(velocity.min()), float(velocity.max()), 200)
     law = laws.interpolation(_number(force), fine, _number(laws.alpha(curve.data["hurst"])), laws.BETA)
-    axes.plot(fine, law, "-", lw=0.8, alpha=0.6, color=curve.colour)
+    drawing.law(axes, fine, law, "-", name=LAW, of=curve.data, lw=0.8, alpha=0.6, color=curve.colour)
 
 
 def _number(value: Any) -> float:
@@ -175,17 +176,17 @@ def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _draw_regions(axes: Axes, curve: curves.Curve) -> None:
+def _draw_regions(axes: Axes, curve: drawing.Curve) -> None:
     data = curve.data
     velocity, value = _mean_of(data, _in_units)
-    curves.draw(axes, curve._replace(label="simulated"), velocity, value)
+    drawing.curve(axes, curve._replace(label="simulated"), velocity, value)
     _, force, number = numbers(data)
     scale = _number(number / data["velocity"])
     exponent = _number(laws.alpha(data["hurst"]))
     speeds = np.asarray(velocity.values)
     fine = np.geomspace(speeds.min(), speeds.max(), 300)
     law = np.sqrt(2) * laws.interpolation(_number(force), fine * scale, exponent, laws.BETA)
-    axes.plot(fine, law, "k--", lw=1, label="law (eq. 3.18)")
+    drawing.law(axes, fine, law, "k--", of=data, lw=1, label=LAW)
     edges = [edge / scale for edge in laws.regions(_number(force), exponent, laws.BETA)]
     edges.append(_fall(speeds, value.value.values))
     bounds = [speeds.min(), *edges, speeds.max()]
@@ -224,9 +225,9 @@ def _has_hurst(data: xr.Dataset) -> bool:
     return "hurst" in data.coords and data["hurst"].dims in ((), ("hurst",))
 
 
-def constants(found: xr.Dataset, name: str) -> curves.Mean:
+def constants(found: xr.Dataset, name: str) -> drawing.Mean:
     """Return fitted constants with their intervals."""
-    return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
+    return drawing.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
 
 
 class _Panel(NamedTuple):
@@ -253,8 +254,8 @@ def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, ro
                 text = ", ".join(part for part in ("" if alone else key, curve.label) if part)
                 colour = curve.colour if alone else style.COLOURS[number % len(style.COLOURS)]
                 drawn = curve._replace(label=text, colour=colour, line="", marker=style.MARKERS[number % 4])
-                curves.draw(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
-        axes.plot(fine, row.law(fine), "k-", lw=1, label=row.law_label)
+                drawing.curve(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
+        drawing.law(axes, fine, row.law(fine), "k-", lw=1, label=row.law_label)
         axes.set(xlabel=style.label("hurst"), ylabel=row.label, ylim=(0, None))
         curves.finish(figure, axes, next(iter(families.values())) if len(families) == 1 else curves.NO_FAMILY)
     fixed = curves.fixed_by_all(held)
@@ -310,19 +311,18 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
         known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
         within = known & (one["within"] > 0)
         inside += int(within.sum())
-        axes.plot(
-            one["xi"][known & ~within], one["value"][known & ~within], ".", ms=2, color="0.8", zorder=1, gid=style.DATA
-        )
-        value = curves.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
-        curves.scatter(axes, one["xi"][within], value, colour, "o", name or "simulated")
+        away = known & ~within
+        drawing.plain(axes, one["xi"][away], one["value"][away], ".", ms=2, color="0.6", zorder=1)
+        value = drawing.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
+        drawing.points(axes, one["xi"][within], value, colour, "o", name or "simulated")
     spans = [one["xi"][np.isfinite(one["xi"]) & (one["xi"] > 0)] for one in points.values()]
     span = np.concatenate(spans)
     if not span.size:
         raise DataError("expected friction of a rough indenter, got no case that succeeded")
-    axes.plot([], [], ".", color="0.8", label="outside the law: steep or barely touching body, region IV")
+    axes.plot([], [], ".", color="0.6", label="outside the law: steep or barely touching body, region IV")
     fine = np.geomspace(span.min(), span.max(), 300)
-    axes.plot(fine, laws.indenter(fine), "k-", lw=1, label=r"law (eq. 3.40), $\alpha$ = 1.5")
-    axes.plot(fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
+    drawing.law(axes, fine, laws.indenter(fine), "k-", lw=1, label=r"law (eq. 3.40), $\alpha$ = 1.5")
+    drawing.law(axes, fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
     axes.set(xlabel=r"$\xi = 8 G a \tau v \nabla z / (\sqrt{2} F_N)$", ylabel=r"$\mu$ / ($\sqrt{2}$ rms slope)")
     style.logarithmic(axes, "xy")
     style.legend(axes)
@@ -362,27 +362,27 @@ def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
 GROWTH = ("contact_fraction", "contact_slope")
 
 
-def _draw_contact(axes: Axes, curve: curves.Curve, output: str, joined: bool) -> None:
+def _draw_contact(axes: Axes, curve: drawing.Curve, output: str, joined: bool) -> None:
     """Draw length or slope of the contact of one family's curve against the force number."""
     data = curve.data
     keys = ("normal_force", "shear_modulus", "rms_roughness", "length")
     force = laws.force_number(*(data[key] for key in keys))
     is_length = output == GROWTH[0]
     value = curves.measured(data, output, 1.0 if is_length else 1 / spectral_slope(data))
-    curves.draw(axes, curve, force, value)
+    drawing.curve(axes, curve, force, value)
     axes.set_xlabel("force number $F_N / (G h L)$")
     axes.set_ylabel("contact length / L" if is_length else "rms slope in contact / rms slope")
     if is_length and joined:
         _draw_growth(axes, curve, np.asarray(force.values), np.asarray(value.value.values))
 
 
-def _draw_growth(axes: Axes, curve: curves.Curve, force: Any, fraction: Any) -> None:
+def _draw_growth(axes: Axes, curve: drawing.Curve, force: Any, fraction: Any) -> None:
     """Draw the power law of eq. 3.12 through the lightest load that is known."""
     known = np.flatnonzero(np.isfinite(fraction) & (fraction > 0))
     if known.size:
         first = known[np.argmin(force[known])]
         law = fraction[first] * (force / force[first]) ** (1 / (1 + _number(curve.data["hurst"])))
-        axes.plot(force, np.minimum(law, 1), "--", lw=0.8, color=curve.colour)
+        drawing.law(axes, force, np.minimum(law, 1), "--", name="eq. 3.12", of=curve.data, lw=0.8, color=curve.colour)
 
 
 def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -402,10 +402,9 @@ def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError("expected friction of a rough plane, got no case that succeeded")
     by, values = (style.label("hurst"), hurst) if np.ptp(hurst) > 0 else (r"force number $F_N / (G h L)$", force)
     how, norm = style.shades(values[known])
-    drawn = axes.scatter(x[known], y[known], c=values[known], s=8, cmap=how, norm=norm)
-    drawn.set_gid(style.DATA)
+    drawn = drawing.dots(axes, x[known], y[known], values[known], s=8, cmap=how, norm=norm)
     fine = np.geomspace(x[known].min(), x[known].max(), 300)
-    axes.plot(fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label="interpolation law (eq. 3.18)")
+    drawing.law(axes, fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label=LAW)
     off = y[known] / (1 + x[known] ** -2.0) ** -0.5
     axes.set_xlabel(r"velocity number / crossover: $v \tau \nabla z / (\sqrt{2} h) / f(F_N / G h L)$")
     axes.set_ylabel(r"$\mu$ / ($\sqrt{2}$ rms slope)")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -59,9 +59,10 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
         upper, lower = one["upper_profile"].values * 1e6, one["lower_profile"].values * 1e6
         place = one["position"].values
         colours = style.scale(2)
-        panel.plot(place, upper, lw=0.8, color=colours[0], label="elastic roller, held off by the film", gid=style.DATA)
-        panel.plot(place, lower, lw=0.8, color=colours[1], label="rough counter body", gid=style.DATA)
-        panel.fill_between(place, lower, upper, where=lower > upper, color="k", label="overlap")
+        label = "elastic roller, held off by the film"
+        drawing.plain(panel, place, upper, label=label, of=case, lw=0.8, color=colours[0])
+        drawing.plain(panel, place, lower, label="rough counter body", of=case, lw=0.8, color=colours[1])
+        panel.fill_between(place, lower, upper, where=lower > upper, color="k", label="overlap", gid=style.GUIDE)
         for edge in (-1, 1):
             panel.axvline(edge, color="0.7", lw=0.8, ls=":")
         panel.set_title(f"$h_0$ = {float(one['film']) * 1e6:.2f} µm")
@@ -80,7 +81,7 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     for panel, (_, case) in zip(panels, cases, strict=True):
         trace = case["contact_length_trace"].isel(realisation=0)
         time = case["angle"].values / float(case["rotation_speed"]) * 1e3
-        panel.plot(time, trace.values * 1e6, lw=0.5, color=style.COLOURS[0], gid=style.DATA)
+        drawing.plain(panel, time, trace.values * 1e6, of=case, lw=0.5, color=style.COLOURS[0])
         share = float((trace > 0).where(trace.notnull()).mean())
         panel.set_title(f"layer broken during {share:.1%} of this turn")
         panel.set_ylabel("contact\nlength [µm]")
@@ -96,11 +97,11 @@ class _Row(NamedTuple):
 
     outputs: tuple[str, ...]
     label: str
-    value: Callable[[xr.Dataset], curves.Mean]
+    value: Callable[[xr.Dataset], drawing.Mean]
     logarithmic: bool = False
 
 
-def _scaled(output: str, factor: float = 1.0) -> Callable[[xr.Dataset], curves.Mean]:
+def _scaled(output: str, factor: float = 1.0) -> Callable[[xr.Dataset], drawing.Mean]:
     return lambda data: curves.measured(data, output, factor)
 
 
@@ -112,7 +113,7 @@ def _draw_row(axes: Axes, family: curves.Family, row: _Row, along: str, bars: bo
     across, drawn = [], []
     for curve in family.curves:
         x, value = np.atleast_1d(style.shown(along, curve.data[along])), row.value(curve.data)
-        curves.draw(axes, curve, x, value, bars=bars)
+        drawing.curve(axes, curve, x, value, bars=bars)
         across += x.tolist()
         drawn += np.ravel(value.value).tolist()
     axes.set_ylabel(row.label)
@@ -180,7 +181,7 @@ def draw_sensitivity(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _width(data: xr.Dataset) -> curves.Mean:
+def _width(data: xr.Dataset) -> drawing.Mean:
     """Return the width in intimate contact in per cent of the contact."""
     factor = 100 / (2 * data["contact_half_width"])
     return curves.measured(data, "contact_length", factor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,8 +16,12 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
 
+    from mdr_dask.plots.table import Drawn
+
 #: Okabe and Ito's colours, told apart by colour-blind readers; more curves than these have a colour bar.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Of fitted laws and the bands that they are known within.
+FITTED = COLOURS[1]
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 #: Panels of one figure that can still be read.
@@ -25,8 +30,8 @@ MOST_PANELS = 6
 PANEL = (6.4, 4.4)
 SMALL_PRINT = 12
 DPI = 150
-#: What data carry as their gid, so that they can be told from laws and guides.
-DATA, BAND = "data", "band"
+#: What everything drawn carries as its gid: data and their bars, laws, and guides, which stand in no table.
+DATA, BAND, LAW, GUIDE = "data", "band", "law", "guide"
 
 
 class Quantity(NamedTuple):
@@ -115,13 +120,18 @@ def named(name: str, value: xr.DataArray) -> str:
     return f"{symbol} = {text} {how.unit}".strip()
 
 
-def panels(count: int, columns: int = 3, size: tuple[float, float] = PANEL, **shared: Any) -> tuple[Figure, list[Axes]]:
+def plain(text: str) -> str:
+    """Return a label without mathtext, in one line: ``F_N = 1 N``."""
+    return re.sub(r"[$\\]", "", text.replace("\\,", " ")).replace("#", "no. ").replace("\n", " ").strip()
+
+
+def panels(count: int, columns: int = 3, size: tuple[float, float] = PANEL, **shared: Any) -> tuple[Drawn, list[Axes]]:
     """Return a figure and as many panels as asked for, in rows."""
-    from matplotlib.figure import Figure
+    from mdr_dask.plots.table import Drawn
 
     columns = max(1, min(columns, count))
     rows = -(-count // columns)
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    figure = Drawn(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
     grid = list(figure.subplots(rows, columns, squeeze=False, **shared).ravel())
     for unused in grid[count:]:
         unused.remove()
