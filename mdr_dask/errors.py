@@ -46,7 +46,8 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}
-    near = get_close_matches(str(word).casefold(), list(folded), n=1)
+    typed = str(word).casefold()
+    near = get_close_matches(typed, list(folded), n=1) or [name for name in folded if len(typed) > 3 and typed in name]
     if near:
         return f" (did you mean {folded[near[0]]!r}?)"
     return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""

@@ -138,7 +138,7 @@ def to_si(value: str, unit: str) -> float:
     if not math.isfinite(float(number)):
         raise ValueError(f"expected a finite number, got {value!r}")
     try:
-        factor, offset = _conversion(given, unit) if given else (1.0, 0.0)
+        factor, offset = conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
         raise ValueError(f"{error}, got {value!r}") from None
     si = _times(number, factor) + offset
@@ -188,7 +188,14 @@ def registry() -> UnitRegistry[Any]:
 
 
 @lru_cache(maxsize=1024)
-def _conversion(given: str, unit: str) -> tuple[float, float]:
+def conversion(given: str, unit: str) -> tuple[float, float]:
+    """Return factor and zero of a unit: a number of `given` times the factor, plus the zero, is one of `unit`.
+
+    Raises
+    ------
+    ValueError
+        If the unit is unknown or of another dimension.
+    """
     from pint.errors import DimensionalityError, UndefinedUnitError
 
     units = registry()

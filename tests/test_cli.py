@@ -140,7 +140,7 @@ def test_wrong_options_are_named(campaign, filled, capsys):
 
 def test_show_selects_with_units_and_prints_csv_and_json(filled, capsys):
     arguments = ["show", filled, "friction_coefficient", "--select", "normal_force=100 mN"]
-    assert main([*arguments, "--select", "velocity=5 mm/s:1 km/s", "--csv"]) == 0
+    assert main([*arguments, "--select", "velocity=5 mm/s..1 km/s", "--csv"]) == 0
     rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
     assert [float(row["velocity [m/s]"]) for row in rows] == pytest.approx([0.01, 0.1, 1.0])
     assert main([*arguments, "--json", "--statistic", "mean"]) == 0

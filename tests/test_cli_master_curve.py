@@ -122,10 +122,12 @@ def test_vertical_factors_of_two_groups_are_printed_and_drawn(tmp_path, capsys):
 def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
     path = tmp_path / "table.csv"
     table_of_two_groups(path)
-    assert main(["master-curve", str(path), "--select", "temperature=299", "--select", "velocity=0:0.05", "--csv"]) == 0
+    assert (
+        main(["master-curve", str(path), "--select", "temperature=299", "--select", "velocity=0..0.05", "--csv"]) == 0
+    )
     printed = capsys.readouterr().out.splitlines()
     assert [line.split(",")[0] for line in printed[1:]] == ["0.001", "0.01"]
     assert main(["master-curve", str(path), "--select", "humidity=1"]) == 2
-    assert "with one of force, velocity, temperature, mu" in capsys.readouterr().err
+    assert "(known: force, velocity, temperature, mu)" in capsys.readouterr().err
     assert main(["master-curve", str(path), "--series", "one"]) == 2
     assert "a table has no series, got --series one" in capsys.readouterr().err

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mdr_dask.cli import selection
+from mdr_dask.cli.options import select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table
-from mdr_dask.cli.results import Reading, csv_option, json_option, select_option, series_option
+from mdr_dask.cli.results import Reading, csv_option, json_option
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 from mdr_dask.errors import DataError
 
@@ -115,6 +115,7 @@ def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
     from mdr_dask.fit.master_curve import friction_of_roughness, read_table
+    from mdr_dask.questions import selection
 
     path = Path("/dev/stdin" if source == "-" else source)
     if path.is_file() or path.is_fifo() or source == "-":
@@ -125,8 +126,8 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
         raise DataError(f"{source}: no such table or store")
     groups = store.datasets(source)
     if series is None and len(groups) > 1:
-        return selection.select(friction_of_roughness(groups), selections)
-    return selection.select(selection.group(groups, series), selections)
+        return selection.select(friction_of_roughness(groups), selections, tell)
+    return selection.select(selection.group(groups, series), selections, tell)
 
 
 def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
@@ -134,9 +135,11 @@ def _rows(frame: pd.DataFrame, selections: tuple[str, ...]) -> pd.DataFrame:
     import numpy as np
     import xarray as xr
 
+    from mdr_dask.questions import selection
+
     units = frame.attrs.get("units", {})
     columns = {name: (name, np.unique(frame[name]), {"units": units.get(name, "1")}) for name in frame.columns}
-    kept = selection.select(xr.Dataset(coords=columns), selections)
+    kept = selection.select(xr.Dataset(coords=columns), selections, tell)
     within = [frame[name].isin(kept[name].to_numpy()) for name in frame.columns]
     return frame[np.logical_and.reduce(within)]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli import selection
+from mdr_dask.cli.options import select_option, series_option, tell, units_option
 from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_errors, with_intervals
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
@@ -30,10 +30,6 @@ class Reading(click.Command):
 STATISTICS = ("mean", "standard_deviation", "standard_error", "grid_error", "quantile", "interval", "count")
 
 store_argument = click.argument("store")
-series_option = click.option("--series", help="Name of the series, where the campaign has any.")
-select_option = click.option(
-    "--select", "selections", multiple=True, metavar="NAME=VALUE", help="Nearest value or range A:B of an axis; repeat."
-)
 json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
 csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
 limit_option = click.option(
@@ -118,6 +114,7 @@ def _brief(value: Any) -> str:
 @select_option
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Over realisations; repeat.")
 @click.option("--realisations", "raw", is_flag=True, help="Show every realisation, not a statistic.")
+@units_option
 @limit_option
 @json_option
 @csv_option
@@ -128,6 +125,7 @@ def show(
     selections: tuple[str, ...],
     statistic: tuple[str, ...],
     raw: bool,
+    units: dict[str, str],
     limit: int,
     form: str | None,
 ) -> None:
@@ -137,18 +135,21 @@ def show(
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
-    mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s:1 m/s' --csv
+    mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s..1 m/s' --units velocity=km/h --csv
     """
     from mdr_dask import store as room
     from mdr_dask.aggregation import aggregate as reduce
+    from mdr_dask.questions import selection
+    from mdr_dask.questions.units import in_units
 
     dataset = selection.group(room.datasets(store), series)
-    wanted = selection.select(selection.outputs(dataset, outputs), selections)
+    wanted = selection.select(selection.outputs(dataset, outputs), selections, tell)
     shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error", "grid_error"))
-    rows, units = table(shown)
+    shown = in_units(shown, units)
+    rows, of_columns = table(shown)
     if not (raw or statistic or form):
-        rows, units = with_errors(rows, units)
-    print_rows(rows, units, form or "table", limit)
+        rows, of_columns = with_errors(rows, of_columns)
+    print_rows(rows, of_columns, form or "table", limit)
 
 
 @click.command(cls=Reading)
@@ -169,6 +170,7 @@ def aggregate(
     """
     from mdr_dask import store as room
     from mdr_dask.aggregation import aggregate as reduce
+    from mdr_dask.questions import selection
 
     if output is not None:
         _check_target(output)
@@ -217,6 +219,7 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     """
     from mdr_dask import fit as room
     from mdr_dask import store as stores
+    from mdr_dask.questions import selection
 
     model = stores.attributes(store)["model"]
     known = room.available(model)
@@ -284,6 +287,7 @@ def plot(
     from mdr_dask import store as stores
     from mdr_dask.errors import DataError, FitError
     from mdr_dask.plots import style
+    from mdr_dask.questions import selection
 
     model = stores.attributes(store)["model"]
     known = room.available(model)
@@ -294,7 +298,7 @@ def plot(
     folder, file = _places(output, alone=len(names) == 1 and not everything)
     groups = stores.datasets(store)
     groups = {name: selection.group(groups, name) for name in series} if series else groups
-    groups = selection.select_all(groups, selections)
+    groups = selection.select_all(groups, selections, tell)
     for name in names or tuple(known):
         path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
         try:

@@ -1,0 +1,217 @@
+"""Parts of a study as a user types them: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.units import to_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FORM = "NAME=VALUE, NAME=VALUE,VALUE or NAME=FROM..TO"
+#: Values that agree to this part are the same: six digits of a number on a screen choose it again.
+SAME = 1e-5
+
+Tell = Callable[[str], object]
+
+
+def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings.warn) -> xr.Dataset:
+    """Keep a part of a group of a study.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        A group of a study, or what was made of one.
+    selections : sequence of str
+        Each names an axis, a column of a sampled study, ``case`` or ``realisation``, and behind ``=`` values and
+        ranges, separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``radius=..2``. Ends of a range
+        belong to it; a bare number is SI. A number between two values of the axis takes the nearest.
+    tell : callable, str -> object
+        Told when a value is taken that is not the one asked for.
+
+    Returns
+    -------
+    Dataset
+        With all its dimensions; a parameter that the study holds fixed changes nothing.
+
+    Raises
+    ------
+    DataError
+        If there is no such name, or nothing there.
+    """
+    for text in selections:
+        name, wanted = _parsed(text)
+        axis = _axis(dataset, name)
+        kept = np.flatnonzero(_chosen(axis, name, wanted, tell))
+        if axis.dims[0] in dataset.dims:
+            dataset = dataset.isel({axis.dims[0]: kept})
+    return dataset
+
+
+def select_all(
+    datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
+) -> dict[str, xr.Dataset]:
+    """Apply selections to every series that varies what is selected; a series that does not stays as it is."""
+    chosen = dict(datasets)
+    for text in selections:
+        name, _ = _parsed(text)
+        varied = [key for key, data in chosen.items() if name in data.dims or (name in data.coords and data[name].ndim)]
+        for key in varied or list(chosen)[:1]:
+            chosen[key] = select(chosen[key], (text,), tell)
+    return chosen
+
+
+def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
+    """Return the group of a series; the only one if none is named."""
+    names = ", ".join(datasets)
+    if series is None:
+        if len(datasets) > 1:
+            raise DataError(f"this study has series, choose one: --series with one of {names}")
+        return next(iter(datasets.values()))
+    if series not in datasets:
+        raise DataError(f"no series {series!r}; known: {names or 'none, leave --series out'}")
+    return datasets[series]
+
+
+def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
+    """Keep the outputs named, with their errors; all that have no dimension of their own if none is."""
+    known = [str(name) for name in dataset.data_vars if name != "status"]
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known) or f"; known: {', '.join(known)}"
+            raise DataError(f"no output {name!r} in this study{hint}")
+    of_cases = set(dataset["status"].dims)
+    kept = list(names) or [name for name in known if set(dataset[name].dims) <= of_cases]
+    errors = [dataset[name].attrs.get("ancillary_variables") for name in kept]
+    return dataset[list(dict.fromkeys([*kept, *(error for error in errors if error in known)]))]
+
+
+def written(value: Any, unit: str | None) -> str:
+    """Return a value with its unit as a selection would take it."""
+    if not isinstance(value, int | float | np.number):
+        return str(value)
+    return f"{value:g}" if unit in (None, "1", "") else f"{value:g} {unit}"
+
+
+def _parsed(text: str) -> tuple[str, str]:
+    name, equals, wanted = text.partition("=")
+    name, wanted = name.strip().replace(".", "_"), wanted.strip()
+    if not (equals and name and wanted):
+        raise DataError(f"expected {FORM}, got {text!r}")
+    return name, wanted
+
+
+def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return the values that a name stands for; that of a fixed parameter lies along no dimension of the data."""
+    from xarray import DataArray
+
+    if name in dataset.dims and name not in dataset.coords:
+        return dataset[name].assign_attrs(units="1")
+    fixed = {key: coord for key, coord in dataset.coords.items() if coord.ndim == 0}
+    fixed |= {key: DataArray(word) for key, word in _words(dataset).items() if key not in dataset.coords}
+    varied = [str(key) for key, coord in dataset.coords.items() if coord.ndim == 1]
+    if name in varied:
+        return dataset[name]
+    if name in fixed:
+        only: xr.DataArray = fixed[name].expand_dims("fixed")
+        return only
+    known = [*varied, *(str(dim) for dim in dataset.dims if dim not in dataset.coords)]
+    hint = did_you_mean(name, [*known, *map(str, fixed)])
+    raise DataError(f"no axis {name!r} in this study{hint or '; known: ' + ', '.join(known)}")
+
+
+def _words(dataset: xr.Dataset) -> dict[str, str]:
+    """Return the words among the fixed parameters, nested names joined by ``_``."""
+    import pandas as pd
+
+    flat = pd.json_normalize(json.loads(dataset.attrs.get("parameters", "{}")), sep="_")
+    return {str(name): str(value) for name, (value,) in flat.items() if isinstance(value, str | bool)}
+
+
+def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:
+    """Return which values of an axis a selection asks for."""
+    values = axis.to_numpy()
+    if values.dtype.kind not in "fiu":
+        return _chosen_words([str(value) for value in values.tolist()], name, wanted)
+    unit = str(axis.attrs.get("units", "1"))
+    kept = np.zeros(values.shape, dtype=bool)
+    for least, most in _intervals(wanted, name, unit):
+        if least == most:
+            found = _nearest(values, least, name, unit, tell)
+        else:
+            slack = SAME * np.abs(values)
+            found = (values >= least - slack) & (values <= most + slack)
+        if not found.any():
+            asked = written(least, unit) if least == most else f"{written(least, unit)} .. {written(most, unit)}"
+            raise DataError(f"no {name} {asked}: {_extent(values, unit)}")
+        kept |= found
+    return kept
+
+
+def _chosen_words(labels: list[str], name: str, wanted: str) -> NDArray[np.bool_]:
+    folded = np.array([label.casefold() for label in labels])
+    words = [wanted] if wanted.casefold() in folded else [word.strip() for word in wanted.split(",")]
+    for word in words:
+        if word.casefold() not in folded:
+            only = f": it is {labels[0]!r} everywhere" if len(labels) == 1 else did_you_mean(word, labels)
+            raise DataError(f"no {name} {word!r}{only or '; known: ' + ', '.join(labels)}")
+    return np.isin(folded, [word.casefold() for word in words])
+
+
+def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
+    """Return where the value nearest to a number is, nowhere for a number beyond the axis."""
+    distance = np.abs(values - wanted)
+    slack = SAME * max(abs(wanted), np.abs(values).max())
+    if not values.min() - slack <= wanted <= values.max() + slack:
+        return np.zeros(values.shape, dtype=bool)
+    nearest = values[np.argmin(distance)]
+    if distance.min() > SAME * max(abs(wanted), abs(nearest)):
+        tell(f"{name}: {written(wanted, unit)} is no value of this axis, the nearest is {written(nearest, unit)}")
+    return np.asarray(values == nearest)
+
+
+def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
+    """Yield the ends of every range of a selection; those of a single value are the same."""
+    pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
+    numbers = [end for piece in pieces for end in piece if end]
+    bare = [_is_bare(end) for end in numbers]
+    if not all(len(piece) <= 2 and any(piece) for piece in pieces):
+        raise DataError(f"{name}: expected {FORM}, got {wanted!r}")
+    if not all(bare) and any(alone and float(end) != 0 for end, alone in zip(numbers, bare, strict=True)):
+        raise DataError(f"{name}: expected a unit at every number or at none, got {wanted!r}")
+    for piece in pieces:
+        least, most = (_number(end, name, unit) if end else None for end in (piece[0], piece[-1]))
+        yield (-np.inf if least is None else least, np.inf if most is None else most)
+
+
+def _is_bare(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(text: str, name: str, unit: str) -> float:
+    try:
+        return float(text) if _is_bare(text) else to_si(text, unit)
+    except ValueError as error:
+        hint = ", and FROM..TO for a range" if ":" in text else ""
+        raise DataError(f"{name}: {error}{hint}") from None
+
+
+def _extent(values: NDArray[Any], unit: str) -> str:
+    """Say which values an axis has."""
+    if values.size == 1:
+        return f"it is {written(values[0], unit)} everywhere"
+    if values.size <= 6:
+        return f"it has the values {', '.join(written(value, unit) for value in values)}"
+    return f"it goes from {written(values.min(), unit)} to {written(values.max(), unit)}"

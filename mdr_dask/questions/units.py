@@ -1,0 +1,74 @@
+"""Columns in the units that a user asks for: ``velocity=km/h,wear_volume=um^3``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.units import conversion
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: What stands behind the name of an output in the unit of the output.
+_OF_OUTPUTS = ("mean", "interval", "quantile")
+#: The same for differences, for which the zero of a temperature scale does not count.
+_DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
+
+
+def parse_units(texts: Sequence[str]) -> dict[str, str]:
+    """Return the units wanted by name, from texts such as ``velocity=km/h,temperature=degC``.
+
+    Raises
+    ------
+    DataError
+        If a part is no ``NAME=UNIT``.
+    """
+    wanted = {}
+    for part in (part for text in texts for part in text.split(",")):
+        name, equals, unit = (piece.strip() for piece in part.partition("="))
+        if not (equals and name and unit):
+            raise DataError(f"expected NAME=UNIT,NAME=UNIT, got {part!r}")
+        wanted[name.replace(".", "_")] = unit
+    return wanted
+
+
+def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
+    """Convert variables and coordinates; an output's statistics and errors go with it.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        With the unit of every variable in ``attrs["units"]``.
+    wanted : mapping of str to str
+        Units by the name of an axis, a parameter or an output, in any spelling that a campaign file may use.
+
+    Raises
+    ------
+    DataError
+        If nothing is called so, or the unit is unknown or of another dimension.
+    """
+    for name, unit in wanted.items():
+        own = {name, *(f"{name}_{ending}" for ending in (*_OF_OUTPUTS, *_DIFFERENCES))}
+        found = [str(each) for each in dataset.variables if each in own]
+        if not found:
+            raise DataError(f"no column {name!r} to give a unit{did_you_mean(name, _known(dataset))}")
+        dataset = dataset.assign({each: _converted(dataset[each], unit, name) for each in found})
+    return dataset
+
+
+def _known(dataset: xr.Dataset) -> list[str]:
+    endings = tuple(f"_{ending}" for ending in (*_OF_OUTPUTS, *_DIFFERENCES))
+    names = [str(each) for each in dataset.variables]
+    return [name.removesuffix("_mean") for name in names if name.endswith("_mean") or not name.endswith(endings)]
+
+
+def _converted(array: xr.DataArray, unit: str, name: str) -> xr.DataArray:
+    try:
+        factor, zero = conversion(unit, str(array.attrs.get("units", "1")))
+    except ValueError as error:
+        raise DataError(f"{name}: {error}, got {unit!r}") from None
+    if array.name != name and str(array.name).removeprefix(f"{name}_") in _DIFFERENCES:
+        zero = 0.0
+    return ((array - zero) / factor).assign_attrs(array.attrs | {"units": unit})

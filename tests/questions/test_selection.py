@@ -1,0 +1,128 @@
+"""Parts of a study: values, ranges and lists with units, and one sentence for what cannot be selected."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask.errors import DataError
+from mdr_dask.questions.selection import group, outputs, select, select_all
+
+
+def silent(sentence):
+    raise AssertionError(sentence)
+
+
+@pytest.fixture
+def study():
+    """A grid with words and numbers among its axes, and fixed parameters."""
+    shape = (4, 2, 3, 5)
+    coords = {
+        "velocity": ("velocity", [0.001, 0.01, 0.1, 1.0], {"units": "m/s"}),
+        "wear_rule": ("wear_rule", np.array(["fast", "exact"], dtype=object)),
+        "temperature": ("temperature", [273.15, 293.15, 313.15], {"units": "K"}),
+        "hurst": ((), 0.7, {"units": "1"}),
+        "indenter_radius": ((), 0.02, {"units": "m"}),
+    }
+    dims = ("velocity", "wear_rule", "temperature", "realisation")
+    force = (dims, np.arange(120.0).reshape(shape), {"units": "N"})
+    attrs = {"parameters": json.dumps({"hurst": 0.7, "indenter": {"shape": "parabola"}, "compressible": True})}
+    return xr.Dataset({"force": force, "status": (dims, np.ones(shape, np.int8))}, coords, attrs)
+
+
+@pytest.fixture
+def sampled():
+    """Ten cases that are not a grid."""
+    coords = {
+        "velocity": ("case", np.repeat([0.1, 0.2, 0.5, 0.8, 1.0], 2), {"units": "m/s"}),
+        "hurst": ("case", np.linspace(0, 0.9, 10), {"units": "1"}),
+    }
+    dims = ("case", "realisation")
+    return xr.Dataset({"force": (dims, np.zeros((10, 2))), "status": (dims, np.ones((10, 2), np.int8))}, coords)
+
+
+KEPT = [
+    ("velocity=10 mm/s", {"velocity": [1]}),
+    ("velocity=0.01", {"velocity": [1]}),
+    ("velocity=1cm/s..1m/s", {"velocity": [1, 2, 3]}),
+    ("velocity = 3.6 km/h , 1 mm/s .. 10 mm/s", {"velocity": [0, 1, 3]}),
+    ("velocity=..0.5", {"velocity": [0, 1, 2]}),
+    ("velocity=0.05..", {"velocity": [2, 3]}),
+    ("temperature=20 degC", {"temperature": [1]}),
+    ("temperature=0 degC..20.000 °C", {"temperature": [0, 1]}),
+    ("wear_rule=Exact", {"wear_rule": [1]}),
+    ("wear_rule=exact, fast", {}),
+    ("realisation=1..3", {"realisation": [1, 2, 3]}),
+    ("hurst=0.7", {}),
+    ("hurst=0.5..0.9", {}),
+    ("indenter.radius=20 mm", {}),
+    ("indenter.shape=parabola", {}),
+    ("compressible=true", {}),
+]
+
+
+@pytest.mark.parametrize(("text", "kept"), KEPT, ids=[text for text, _ in KEPT])
+def test_values_ranges_lists_and_fixed_parameters(study, text, kept):
+    xr.testing.assert_identical(select(study, [text], silent), study.isel(kept))
+
+
+def test_several_selections_hold_together(study):
+    kept = select(study, ["velocity=0.1..1", "temperature=273.15,313.15", "velocity=1"], silent)
+    xr.testing.assert_identical(kept, study.isel(velocity=[3], temperature=[0, 2]))
+
+
+def test_a_value_between_two_takes_the_nearest_and_says_so(study):
+    told = []
+    kept = select(study, ["velocity=0.2 m/s"], told.append)
+    assert kept.velocity == 0.1
+    assert told == ["velocity: 0.2 m/s is no value of this axis, the nearest is 0.1 m/s"]
+
+
+def test_cases_of_a_sampled_study_are_selected_by_number_and_by_column(sampled):
+    xr.testing.assert_identical(select(sampled, ["case=3,7..8"], silent), sampled.isel(case=[3, 7, 8]))
+    xr.testing.assert_identical(select(sampled, ["velocity=0.5"], silent), sampled.isel(case=[4, 5]))
+    xr.testing.assert_identical(select(sampled, ["hurst=0.1..0.35", "velocity=0.2"], silent), sampled.isel(case=[2, 3]))
+
+
+REFUSED = [
+    ("velocity=2 m/s", "no velocity 2 m/s: it has the values 0.001 m/s, 0.01 m/s, 0.1 m/s, 1 m/s"),
+    ("velocity=2..3", "no velocity 2 m/s .. 3 m/s: it has"),
+    ("velocity=1..10 mm/s", "velocity: expected a unit at every number or at none, got '1..10 mm/s'"),
+    ("velocity=1 N", "velocity: expected a velocity (such as '1 mm/s'), got '1 N'"),
+    ("velocity=0.01:1", "velocity: expected a velocity (such as '1 mm/s'), got '0.01:1', and FROM..TO for a range"),
+    ("velocity=1..2..3", "velocity: expected NAME=VALUE, NAME=VALUE,VALUE or NAME=FROM..TO, got '1..2..3'"),
+    ("velocity=1,,2", "velocity: expected NAME=VALUE"),
+    ("velocity", "expected NAME=VALUE, NAME=VALUE,VALUE or NAME=FROM..TO, got 'velocity'"),
+    ("velocty=1", "no axis 'velocty' in this study (did you mean 'velocity'?)"),
+    ("wear_rule=exakt", "no wear_rule 'exakt' (did you mean 'exact'?)"),
+    ("hurst=0.8", "no hurst 0.8: it is 0.7 everywhere"),
+    ("indenter.shape=cone", "no indenter_shape 'cone': it is 'parabola' everywhere"),
+    ("realisation=7", "no realisation 7: it has the values 0, 1, 2, 3, 4"),
+]
+
+
+@pytest.mark.parametrize(("text", "told"), REFUSED, ids=[text for text, _ in REFUSED])
+def test_what_is_not_there_is_one_sentence(study, text, told):
+    with pytest.raises(DataError) as refused:
+        select(study, [text], silent)
+    assert str(refused.value).startswith(told)
+
+
+def test_a_series_that_does_not_vary_what_is_selected_stays_as_it_is(study):
+    other = study.isel(velocity=0)
+    chosen = select_all({"a": study, "b": other}, ["velocity=1"], silent)
+    xr.testing.assert_identical(chosen["a"], study.isel(velocity=[3]))
+    xr.testing.assert_identical(chosen["b"], other)
+
+
+def test_groups_and_outputs_are_named(study):
+    assert group({"": study}, None) is study
+    for groups, series, told in [({"a": study, "b": study}, None, "a, b"), ({"a": study}, "c", "no series 'c'")]:
+        with pytest.raises(DataError, match=told):
+            group(groups, series)
+    errors = study.assign(force_error=study.force * 0.01)
+    errors.force.attrs["ancillary_variables"] = "force_error"
+    assert list(outputs(errors, ["force"]).data_vars) == ["force", "force_error"]
+    with pytest.raises(DataError, match="no output 'forse' in this study"):
+        outputs(study, ["forse"])
