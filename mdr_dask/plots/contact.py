@@ -104,7 +104,7 @@ def draw_contact(groups: Mapping[str, xr.Dataset]) -> Figure:
     cases = [data.isel({over: k}) for k in range(data.sizes[over])] if over else [data]
     if not cases:
         raise DataError("expected a case with a depth, got none that succeeded")
-    figure, panels = style.panels(2 * len(cases), columns=2, size=(5.6, 2.8))
+    figure, panels = drawing.panels(2 * len(cases), columns=2, size=(5.6, 2.8))
     alike = curves.fixed_by_all([curves.scalars(case) for case in cases])
     for k, case in enumerate(cases):
         contact = contact_of(case)
@@ -155,7 +155,7 @@ def draw_lines(groups: Mapping[str, xr.Dataset]) -> Figure:
     if data.sizes["realisation"] > 1:
         told.append(f"realisations but the first of {data.sizes['realisation']}")
     data, thinned = curves.thin(data.isel(realisation=0), "hurst", MOST_LINES)
-    figure, panels = style.panels(data.sizes["hurst"], columns=1, size=(7.0, 1.3), sharex=True)
+    figure, panels = drawing.panels(data.sizes["hurst"], columns=1, size=(7.0, 1.3), sharex=True)
     for k, axes in enumerate(panels):
         case = data.isel(hurst=k)
         problems, setting = _line(case)

@@ -346,17 +346,26 @@ def parameters_at(case: xr.Dataset) -> dict[str, Any]:
 
 
 def finish(figure: Figure, axes: Axes, one: Family) -> None:
-    """Draw the legend or the colour bar of a family."""
+    """Draw the legend and the colour bar of a family."""
     if one.bar is not None:
-        from matplotlib.cm import ScalarMappable
+        colour_bar(figure, [axes], *one.bar)
+    name_varying(axes, one)
+    style.legend(axes, one.heading)
 
-        name, values = one.bar
-        how, norm = style.shades(style.shown(name, values))
-        figure.colorbar(ScalarMappable(norm, how), ax=axes, label=style.label(name, values))
+
+def colour_bar(figure: Figure, axes_of: Sequence[Axes], name: str, values: xr.DataArray) -> None:
+    """Draw the colour bar of a parameter that curves differ in."""
+    from matplotlib.cm import ScalarMappable
+
+    how, norm = style.shades(style.shown(name, values))
+    figure.colorbar(ScalarMappable(norm, how), ax=list(axes_of), label=style.label(name, values))
+
+
+def name_varying(axes: Axes, one: Family) -> None:
+    """Say in the legend what changes from point to point beside the parameter of the axis."""
     if one.varying:
         symbols = ", ".join(style.quantity(name).symbol for name in one.varying)
         axes.plot([], [], " ", label=f"varying too: {symbols}")
-    style.legend(axes, one.heading)
 
 
 def results(

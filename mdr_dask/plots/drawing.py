@@ -9,13 +9,23 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.plots import style
+from mdr_dask.plots import page, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from mdr_dask.plots.table import Drawn
+
+#: Width and height of a panel in inches.
+PANEL = (6.4, 4.4)
+#: Columns of panels, and how wide and high a panel has to be, in inches.
+MOST_COLUMNS, LEAST_PANEL, LEAST_HEIGHT = 3, 2.2, 1.3
+#: Height of what stands over and under the panels of a figure whose width is asked for, in inches.
+TEXT_HEIGHT = 0.7
 #: Points of a curve from which on they have no markers.
 MANY_POINTS = 60
+#: How high in a panel cases without a value are marked.
+FOOT = 0.02
 #: What stands in the column ``what`` of data; laws have their names there.
 DATA = "data"
 
@@ -36,6 +46,27 @@ class Curve(NamedTuple):
     colour: Any
     line: str
     marker: str
+
+
+def panels(
+    count: int, columns: int | None = None, size: tuple[float, float] = PANEL, **shared: Any
+) -> tuple[Drawn, list[Axes]]:
+    """Return a figure and as many panels as asked for, in rows: of as many columns, or of as many as the page takes."""
+    from mdr_dask.plots.table import Drawn
+
+    asked = page.asked()
+    free = MOST_COLUMNS if asked.width is None else min(MOST_COLUMNS, int(asked.width / LEAST_PANEL))
+    columns = max(1, min(columns or (min(free, 2) if count == 4 else free), count))
+    rows = -(-count // columns)
+    width, height = size[0] * columns, size[1] * rows
+    if asked.width is not None:
+        height = max(LEAST_HEIGHT * rows, height * asked.width / width) + TEXT_HEIGHT
+        width, height = asked.width, asked.height or height
+    figure = Drawn(figsize=(width, height), layout="constrained")
+    grid = list(figure.subplots(rows, columns, squeeze=False, **shared).ravel())
+    for unused in grid[count:]:
+        unused.remove()
+    return figure, grid[:count]
 
 
 def _record(axes: Axes, what: str, label: str | None, of: Mapping[str, xr.DataArray], columns: dict[str, Any]) -> None:
@@ -97,6 +128,24 @@ def points(axes: Axes, x: Any, y: Mean, colour: Any, marker: str, label: str | N
         _mark(bars)
 
 
+def shaded(axes: Axes, x: Any, y: Mean, value: Any, **look: Any) -> Any:
+    """Draw points with their bars, in colours that a colour bar names; returns what it is made of."""
+    _record(axes, DATA, None, _coordinates(y.value), {"x": flat(x), **_ends("y", y), "value": flat(value)})
+    _bars(axes, flat(x), flat(y.value), _lengths(flat(y.value), flat(y.low), flat(y.high)), "0.7")
+    return axes.scatter(flat(x), flat(y.value), c=flat(value), s=14, zorder=3, gid=style.DATA, **look)
+
+
+def absent(axes: Axes, x: xr.DataArray, why: str, **look: Any) -> None:
+    """Mark at the foot of a panel where points have no value."""
+    across = flat(x)
+    known = np.isfinite(across)
+    _record(axes, why, None, {name: value[known] for name, value in _coordinates(x).items()}, {"x": across[known]})
+    place = np.full(int(known.sum()), FOOT)
+    axes.plot(
+        across[known], place, ls="", ms=5, transform=axes.get_xaxis_transform(), zorder=4, gid=style.GUIDE, **look
+    )
+
+
 def plain(
     axes: Axes, x: Any, y: Any, *form: str, label: str | None = None, of: xr.Dataset | None = None, **look: Any
 ) -> None:
@@ -148,7 +197,8 @@ def field(axes: Axes, x: xr.DataArray, y: xr.DataArray, values: Mean, **look: An
 def _edges(centres: FloatArray) -> FloatArray:
     """Return the ends of the cells around the values of an axis."""
     if centres.size == 1:
-        return centres[0] + np.array([-0.5, 0.5]) * (abs(centres[0]) or 1.0)
+        half = 0.5 * (abs(float(centres[0])) or 1.0)
+        return np.array([centres[0] - half, centres[0] + half])
     if style.is_geometric(centres):
         edges: FloatArray = np.exp(_edges_between(np.log(centres)))
         return edges

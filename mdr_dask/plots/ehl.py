@@ -53,7 +53,7 @@ def _require(values: FloatArray) -> None:
 def draw_profile(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw film and pressure against the position, one panel for each series (thesis figure B.3)."""
     found, told = curves.few(_with(groups, ("film", "pressure")))
-    figure, panels = style.panels(len(found), columns=2)
+    figure, panels = drawing.panels(len(found), columns=2)
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         family = curves.family(data, "film", "position", styled=False)
@@ -115,7 +115,7 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the films found against those of Pan and Hamrock, for every series that varies W, U or G."""
     from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
-    figure, panels = style.panels(2, sharey=True)
+    figure, panels = drawing.panels(2, sharey=True)
     told: list[str] = []
     for axes, output, formula in zip(
         panels, ("central_film", "minimum_film"), (PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM), strict=True
@@ -178,7 +178,7 @@ def draw_regimes(groups: Mapping[str, xr.Dataset]) -> Figure:
     (W, U, G, minimum), told = _moes(groups)
     M, L = moes_parameters(W, U, G)
     film = minimum / np.sqrt(2 * U)
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     how, norm = style.shades(L)
     dots = drawing.dots(axes, M, film, L, norm=norm, cmap=how, s=16, zorder=3)
     span = np.geomspace(M.min() / 2, M.max() * 2, 100)
@@ -207,7 +207,7 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
     across = np.geomspace(min(0.1, M.min() / 2), max(1e3, M.max() * 2), 300)
     up = np.geomspace(min(0.1, L[L > 0].min(initial=0.1) / 2), max(1e2, L.max() * 2), 300)
     field = regime(across, 0.5, up[:, None])  # with 2 U = 1, M is W and L is G
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     axes.set(xscale="log", yscale="log")
     shades = ListedColormap(["#dbe9f6", "#fde5c8", "#e2f0d9", "#eadcf0"])
     axes.pcolormesh(across, up, field, cmap=shades, vmin=0, vmax=3, shading="nearest", rasterized=True, gid=style.GUIDE)
@@ -230,7 +230,7 @@ def _draw_along(
 ) -> Figure:
     """Draw outputs along one parameter, a panel for each series."""
     found, told = curves.few(_with(groups, outputs, along))
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         family = curves.family(data, outputs[0], along, styled=False)

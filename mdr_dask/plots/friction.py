@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
@@ -78,7 +77,7 @@ def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any
     return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
 
 
-def _small(data: xr.Dataset) -> xr.Dataset:
+def slim(data: xr.Dataset) -> xr.Dataset:
     """Return what figures of friction need, so that nothing else is read."""
     wanted = [name for name in (MU, f"{MU}_error", "rms_slope", "status") if name in data]
     return data[wanted]
@@ -94,9 +93,9 @@ def _against_velocity(
     law: bool = False,
 ) -> Figure:
     """Draw friction against velocity, one panel for each series."""
-    found = {name: _small(data) for name, data in curves.with_outputs(groups, [MU], "velocity", *varied).items()}
+    found = {name: slim(data) for name, data in curves.with_outputs(groups, [MU], "velocity", *varied).items()}
     found, told = curves.few(found)
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         one = curves.family(data, MU, "velocity", by)
@@ -114,12 +113,12 @@ def _against_velocity(
         if law and one.joined and is_plane(data):
             axes.plot([], [], "k-", lw=0.8, label=LAW)
         curves.finish(figure, axes, one)
-    _titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
+    titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
     style.leave_out(figure, told)
     return figure
 
 
-def _titles(
+def titles(
     figure: Figure, panels: list[Axes], names: list[str], families: list[curves.Family], subject: str, bars: str
 ) -> None:
     """Write what all panels hold fixed over the figure, and over each panel its series and what it alone holds."""
@@ -159,11 +158,11 @@ def draw_forces(groups: Mapping[str, xr.Dataset]) -> Figure:
 def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against velocity for one case of each series, with the regions of the law (figure 3.7)."""
     found = curves.with_outputs(groups, [MU], "velocity", where=is_plane)
-    found = {name: _small(data) for name, data in found.items() if "velocity" in data[MU].dims}
+    found = {name: slim(data) for name, data in found.items() if "velocity" in data[MU].dims}
     if not found:
         raise DataError("expected velocity as an axis of its own: regions follow one case through the velocities")
     found, told = curves.few(found)
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         one, more = curves.hold(data, [dim for dim in curves.axes_of(data, MU) if dim != "velocity"])
@@ -171,7 +170,7 @@ def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
         families.append(curves.family(one, MU, "velocity"))
         _draw_regions(axes, families[-1].curves[0])
     bars = curves.meaning_of_bars(*found.values(), outputs=[MU])
-    _titles(figure, panels, list(found), families, "regions of friction against velocity", bars)
+    titles(figure, panels, list(found), families, "regions of friction against velocity", bars)
     style.leave_out(figure, told)
     return figure
 
@@ -214,13 +213,13 @@ def _fall(velocity: Any, mean: Any) -> float:
 
 def _fitted(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Return the constants of a law for every series that has the data for it."""
-    known = {key: _small(data) for key, data in groups.items() if MU in data and _has_hurst(data)}
+    known = {key: slim(data) for key, data in groups.items() if MU in data and has_hurst(data)}
     if not known:
         raise DataError("expected one Hurst exponent or an axis of them: each has constants of its own")
     return curves.results(FIT[name].compute, known)
 
 
-def _has_hurst(data: xr.Dataset) -> bool:
+def has_hurst(data: xr.Dataset) -> bool:
     """Return whether the Hurst exponent is fixed or an axis of its own, not drawn along with other parameters."""
     return "hurst" in data.coords and data["hurst"].dims in ((), ("hurst",))
 
@@ -242,7 +241,7 @@ class _Panel(NamedTuple):
 def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, rows: tuple[_Panel, ...]) -> Figure:
     """Draw constants of a law against the Hurst exponent, one panel for each, all series in it."""
     found = _fitted(name, groups)
-    figure, panels = style.panels(len(rows), sharex=True)
+    figure, panels = drawing.panels(len(rows), sharex=True)
     fine, told, held = np.linspace(0, 1, 101), [], []
     for axes, row in zip(panels, rows, strict=True):
         families = {key: curves.family(each, row.constant, "hurst", BY) for key, each in found.items()}
@@ -300,12 +299,12 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     points, reasons = {}, []
     for name, data in curves.with_outputs(groups, [MU]).items():
         try:
-            points[name] = _indenter_points(_small(data))
+            points[name] = _indenter_points(slim(data))
         except FitError as error:
             reasons.append(f"{name}: {error}" if name else str(error))
     if not points:
         raise FitError("; ".join(dict.fromkeys(reasons)))
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     inside = 0
     for (name, one), colour in zip(points.items(), style.scale(len(points)), strict=True):
         known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
@@ -335,122 +334,11 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw length and slope of the contact against the load, with F^(1 / (1 + H)) (eq. 3.12, 3.21)."""
-    found = curves.with_outputs(groups, GROWTH, "normal_force", where=is_plane)
-    found, told = curves.few(found, 3)
-    figure, panels = style.panels(2 * len(found), columns=2)
-    families = []
-    for k, (name, data) in enumerate(found.items()):
-        for axes, output in zip(panels[2 * k : 2 * k + 2], GROWTH, strict=True):
-            one = curves.family(data, output, "normal_force", ("hurst", "velocity"))
-            families.append(one)
-            for curve in one.curves:
-                _draw_contact(axes, curve, output, one.joined)
-            style.logarithmic(axes, "xy" if output == GROWTH[0] else "x")
-            curves.finish(figure, axes, one)
-        told += [f"{name}: {each}" if name else each for each in families[-1].left_out]
-    bars = curves.meaning_of_bars(*found.values(), outputs=GROWTH)
-    names = [name for name in found for _ in GROWTH]
-    subject = r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load"
-    grown = _said("contact_growth", "exponent", "exponent of the contact length", found)
-    _titles(figure, panels, names, families, subject, "; ".join(part for part in (bars, grown) if part))
-    style.leave_out(figure, told)
-    return figure
-
-
-GROWTH = ("contact_fraction", "contact_slope")
-
-
-def _draw_contact(axes: Axes, curve: drawing.Curve, output: str, joined: bool) -> None:
-    """Draw length or slope of the contact of one family's curve against the force number."""
-    data = curve.data
-    keys = ("normal_force", "shear_modulus", "rms_roughness", "length")
-    force = laws.force_number(*(data[key] for key in keys))
-    is_length = output == GROWTH[0]
-    value = curves.measured(data, output, 1.0 if is_length else 1 / spectral_slope(data))
-    drawing.curve(axes, curve, force, value)
-    axes.set_xlabel("force number $F_N / (G h L)$")
-    axes.set_ylabel("contact length / L" if is_length else "rms slope in contact / rms slope")
-    if is_length and joined:
-        _draw_growth(axes, curve, np.asarray(force.values), np.asarray(value.value.values))
-
-
-def _draw_growth(axes: Axes, curve: drawing.Curve, force: Any, fraction: Any) -> None:
-    """Draw the power law of eq. 3.12 through the lightest load that is known."""
-    known = np.flatnonzero(np.isfinite(fraction) & (fraction > 0))
-    if known.size:
-        first = known[np.argmin(force[known])]
-        law = fraction[first] * (force / force[first]) ** (1 / (1 + _number(curve.data["hurst"])))
-        drawing.law(axes, force, np.minimum(law, 1), "--", name="eq. 3.12", of=curve.data, lw=0.8, color=curve.colour)
-
-
-def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw all friction of planes on the scales of eq. 3.23: velocity over crossover, friction over plateau."""
-    found = curves.with_outputs(groups, [MU], where=is_plane)
-    figure, (axes,) = style.panels(1)
-    points = []
-    for data in found.values():
-        one = _small(data)
-        ratio, number, velocity = numbers(one)
-        crossover = laws.crossover(number, laws.alpha(one["hurst"]), laws.BETA)
-        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], number)
-        points.append([np.asarray(column.values, dtype=np.float64).ravel() for column in columns])
-    x, y, hurst, force = (np.concatenate(column) for column in zip(*points, strict=True))
-    known = np.isfinite(y) & (y > 0)
-    if not known.any():
-        raise DataError("expected friction of a rough plane, got no case that succeeded")
-    by, values = (style.label("hurst"), hurst) if np.ptp(hurst) > 0 else (r"force number $F_N / (G h L)$", force)
-    how, norm = style.shades(values[known])
-    drawn = drawing.dots(axes, x[known], y[known], values[known], s=8, cmap=how, norm=norm)
-    fine = np.geomspace(x[known].min(), x[known].max(), 300)
-    drawing.law(axes, fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label=LAW)
-    off = y[known] / (1 + x[known] ** -2.0) ** -0.5
-    axes.set_xlabel(r"velocity number / crossover: $v \tau \nabla z / (\sqrt{2} h) / f(F_N / G h L)$")
-    axes.set_ylabel(r"$\mu$ / ($\sqrt{2}$ rms slope)")
-    style.logarithmic(axes, "xy")
-    figure.colorbar(drawn, ax=axes, label=by)
-    style.legend(axes)
-    spread = f"{int(known.sum())} cases; half of them deviate from the law by less than {_half(off):.0%}"
-    shifted = _said("collapse", "collapsed", "share of the spread that free shifts take away", found)
-    style.title(figure, "collapse of friction on the scales of eq. 3.23", spread, shifted)
-    return figure
-
-
-def _said(name: str, constant: str, what: str, found: Mapping[str, xr.Dataset]) -> str:
-    """Return the range of a constant of the fit of the same name, and where its law holds; nothing without a fit."""
-    from mdr_dask.fit import available
-
-    try:
-        known = {key: data for key, data in found.items() if _has_hurst(data)}
-        fits = curves.results(available(MODELS[0])[name].compute, known)
-    except (FitError, DataError):
-        return ""
-    values = np.concatenate([np.ravel(each[constant].values) for each in fits.values()])
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return ""
-    ends = f"{values.min():.3g}" if values.size == 1 else f"{values.min():.3g} to {values.max():.3g}"
-    return f"fit {name}: {what} {ends}; {curves.verdict(fits.values())}"
-
-
-def _half(ratio: Any) -> float:
-    """Return the relative deviation that half of the cases stay within."""
-    return float(np.median(np.abs(ratio - 1)))
-
-
 PLOTS: tuple[Plot, ...] = (
     Plot("regions", MODELS, "friction against velocity with regions I to IV (Fig. 3.7)", draw_regions),
     Plot("velocity", MODELS, "friction against velocity and the law, e.g. for several H (Fig. 3.8)", draw_velocity),
     Plot("force", MODELS, "friction against velocity for many loads, logarithmic (Fig. 3.9)", draw_forces),
     Plot("zone_one", MODELS, "alpha and beta against the Hurst exponent (Fig. 3.10)", draw_zone_one),
     Plot("plateau", MODELS, "plateau of friction against the Hurst exponent (Fig. 3.11)", draw_plateau),
-    Plot("collapse", MODELS, "all friction of planes on the scales of the general law (eq. 3.22, 3.23)", draw_collapse),
-    Plot(
-        "contact_growth",
-        MODELS,
-        "length and slope of the contact against the load (eq. 3.12, 3.21)",
-        draw_contact_growth,
-    ),
     Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", draw_indenter),
 )

@@ -10,6 +10,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
+from mdr_dask.fit.kinetic_cases import is_jump
 from mdr_dask.plots import curves, drawing, style
 
 if TYPE_CHECKING:
@@ -41,16 +42,10 @@ def jumps(groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     DataError
         If there is none.
     """
-    found = {name: data for name, data in groups.items() if _is_jump(data)}
+    found = {name: data for name, data in groups.items() if is_jump(data)}
     if not found:
         raise DataError("expected a series with a jump of the velocity, got other histories: see the figure protocols")
     return found
-
-
-def _is_jump(data: xr.Dataset) -> bool:
-    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
-    history = curves.parameters_of(data).get("protocol") or {}
-    return not varied and history.get("shape", "jump") == "jump"
 
 
 def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, xr.Dataset], list[str]]:
@@ -78,7 +73,7 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
 
     series, told = _choose(groups, "velocity", "normal_force")
     ((name, found),) = _fitted(series, "kinetics").items()
-    figure, panels = style.panels(2, sharey=True)
+    figure, panels = drawing.panels(2, sharey=True)
     names = "before_over_slope", "jump_over_slope"
     family = curves.family(found, names[0], "velocity", ("normal_force", "hurst"))
     for axes, output, label in zip(panels, names, (BEFORE, JUMP), strict=True):
@@ -147,7 +142,7 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     ((name, found),) = _fitted(series, "kinetics").items()
     ((_, law),) = _fitted(series, "jump_law").items()
     fitted, low, high = (float(law[f"constant{end}"][-1]) for end in ("", "_low", "_high"))
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     x, y = "before_over_slope", "jump_over_slope"
     for cases in by_hurst(found):
         across = cases.constant(x)
@@ -181,7 +176,7 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError(
             "expected a rate of relaxation known to a factor of 1.6, got none: more realisations are needed"
         )
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     left = 0
     for cases in by_hurst(found):
         good = well_known(cases.column("rate_low"), cases.column("rate_high"))
@@ -237,7 +232,7 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     ((name, found),) = _fitted(series, "rate_power").items()
     if "hurst" not in found.coords:
         raise DataError("expected one Hurst exponent or an axis of them: each has a power of its own")
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     rows = (
         ("above", "power", r"$v_1\tau q_{max} > 1$"),
         ("above", "power_unweighted", r"$v_1\tau q_{max} > 1$, all times alike"),

@@ -89,7 +89,7 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time through jumps, up and down where the store has both (Fig. 4.1)."""
     name, data, told = pick(groups, OUTPUTS, "velocity_change")
     cases, more = _extreme_jumps(data)
-    figure, panels = style.panels(len(cases), size=(5.2, 4.2))
+    figure, panels = drawing.panels(len(cases), size=(5.2, 4.2))
     for axes, case in zip(panels, cases, strict=True):
         curve = drawing.Curve(case, "mean", style.COLOURS[0], "-", "")
         drawing.curve(axes, curve, *trace(_early(case)))
@@ -132,7 +132,7 @@ def draw_velocities(groups: Mapping[str, xr.Dataset]) -> Figure:
     others = [dim for dim in curves.axes_of(data, BEFORE_JUMP) if dim != over]
     near = -abs(data["hurst"] - EXPONENT) if "hurst" in others else None
     data, more = curves.hold(data, others, near)
-    figure, (left, right) = style.panels(2, size=(5.4, 4.2))
+    figure, (left, right) = drawing.panels(2, size=(5.4, 4.2))
     steady = curves.family(data, BEFORE_JUMP, "velocity")
     slope, label = over_slope(data)
     for curve in steady.curves:
@@ -169,7 +169,7 @@ def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
     found = relaxation_curves(data)
     value = curves.mean((data[TRACE] - data[AFTER]) / data["rms_slope"])
     time = np.asarray(data["relaxation_times"].values)
-    figure, panels = style.panels(2, size=(5.4, 4.2))
+    figure, panels = drawing.panels(2, size=(5.4, 4.2))
     for axes, logarithmic in zip(panels, (False, True), strict=True):
         points = drawing.Curve(data, "mean of the realisations", "k", "", "o")
         drawing.curve(axes, points, time, value, bars=True)
@@ -226,7 +226,7 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         data, thinned = curves.thin(data, over, style.MOST_PANELS)
         more += thinned
     cases = [data.isel({over: k}) for k in range(data.sizes[over])] if over else [data]
-    figure, panels = style.panels(len(cases), size=(4.6, 3.4))
+    figure, panels = drawing.panels(len(cases), size=(4.6, 3.4))
     for axes, case in zip(panels, cases, strict=True):
         slope, label = over_slope(case)
         time, value = trace(_early(case))

@@ -36,7 +36,7 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
         shown.append(second)
     rising = bool(curve["vertical_factor"].any())
     count = 2 + len(shown) * (1 + rising)
-    figure, panels = style.panels(count, columns=count, size=(4.6, 4.0))
+    figure, panels = drawing.panels(count, columns=count, size=(4.6, 4.0))
     axes = iter(panels)
     _measured(figure, next(axes), curve)
     _merged(next(axes), curve)

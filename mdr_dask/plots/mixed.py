@@ -53,7 +53,7 @@ def _case_titles(figure: Figure, subject: str, panels: Sequence[Axes], cases: Se
 def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the two surfaces in the contact at the moment of greatest contact, realisation 0 (thesis figure 5.5)."""
     cases, told = _cases(curves.with_outputs(groups, ["upper_profile", "lower_profile", "film"]), "film")
-    figure, panels = style.panels(len(cases), columns=1, size=(8.0, 2.4), sharex=True)
+    figure, panels = drawing.panels(len(cases), columns=1, size=(8.0, 2.4), sharex=True)
     for panel, (_, case) in zip(panels, cases, strict=True):
         one = case.isel(realisation=0)
         upper, lower = one["upper_profile"].values * 1e6, one["lower_profile"].values * 1e6
@@ -77,7 +77,7 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
 def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the contact length over one turn, realisation 0 (thesis figure 5.7a)."""
     cases, told = _cases(curves.with_outputs(groups, ["contact_length_trace"]), "contact_length_trace")
-    figure, panels = style.panels(len(cases), columns=1, size=(8.0, 1.9))
+    figure, panels = drawing.panels(len(cases), columns=1, size=(8.0, 1.9))
     for panel, (_, case) in zip(panels, cases, strict=True):
         trace = case["contact_length_trace"].isel(realisation=0)
         time = case["angle"].values / float(case["rotation_speed"]) * 1e3
@@ -134,7 +134,7 @@ def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:
         data, more = curves.thin(data, "rotation_speed", style.MOST_PANELS)
         told += more
     parts = [data.isel(rotation_speed=k) for k in range(data.sizes["rotation_speed"])] if by_speed else [data]
-    figure, panels = style.panels(len(parts), size=(4.4, 3.8), sharey=True)
+    figure, panels = drawing.panels(len(parts), size=(4.4, 3.8), sharey=True)
     families = []
     for panel, part in zip(panels, parts, strict=True):
         family = curves.family(part, PROBABILITY, "temperature", ("normal_force",))
@@ -165,7 +165,7 @@ def draw_sensitivity(groups: Mapping[str, xr.Dataset]) -> Figure:
     most = 2 * style.MOST_PANELS
     told = [f"{name}: {along}" for name, _, along in found[most:]]
     found = found[:most]
-    figure, panels = style.panels(len(found), columns=4, size=(4.0, 3.4), sharey=True)
+    figure, panels = drawing.panels(len(found), columns=4, size=(4.0, 3.4), sharey=True)
     held = []
     for panel, (name, data, along) in zip(panels, found, strict=True):
         family = curves.family(data, PROBABILITY, along, ("temperature", *OPERATION))
@@ -201,7 +201,7 @@ def draw_stribeck(groups: Mapping[str, xr.Dataset]) -> Figure:
     found = curves.with_outputs(groups, ["friction_coefficient"], "rotation_speed")
     found, told = curves.few(found, MOST_SERIES)
     rows = [row for row in STRIBECK if all(name in data for name in row.outputs for data in found.values())]
-    figure, panels = style.panels(len(rows) * len(found), columns=len(found), size=(6.4, 2.2), sharex="col")
+    figure, panels = drawing.panels(len(rows) * len(found), columns=len(found), size=(6.4, 2.2), sharex="col")
     families = []
     for column, (name, data) in enumerate(found.items()):
         family = curves.family(data, "friction_coefficient", "rotation_speed", OPERATION)

@@ -48,7 +48,7 @@ def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, Flo
 def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time over velocity and load, one column for each series."""
     found, told = curves.few(curves.with_outputs(groups, OUTPUTS))
-    figure, panels = style.panels(3 * len(found), columns=len(found), size=(3.4, 2.0), sharex="col")
+    figure, panels = drawing.panels(3 * len(found), columns=len(found), size=(3.4, 2.0), sharex="col")
     families = []
     for k, (name, data) in enumerate(found.items()):
         top, *below = panels[k :: len(found)]

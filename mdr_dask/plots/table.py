@@ -12,11 +12,13 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mdr_dask.plots import style
+from mdr_dask.plots import page, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: Points to an inch of a picture, and of one whose printed size was asked for.
+DPI, PRINTED_DPI = 150, 300
 #: Columns of a table before and after those of the parameters.
 FIRST = ("panel", "curve", "what")
 LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_low", "_high"))
@@ -40,8 +42,8 @@ class Drawn(Figure):
     def write_down(
         self, axes: Axes, what: str, label: str, parameters: Mapping[str, xr.DataArray], columns: Mapping[str, Any]
     ) -> None:
-        """Add points to the table; those without a value are none."""
-        drawn = next(columns[name] for name in ("value", "y", "y_low") if name in columns)
+        """Add points to the table; those without a value are none, but for the marks of cases that have none."""
+        drawn = next((columns[name] for name in ("value", "y", "y_low") if name in columns), columns["x"])
         known = np.isfinite(drawn)
         named = {f"parameter {name}" if name in (*FIRST, *LAST) else name: each for name, each in parameters.items()}
         along = {
@@ -77,14 +79,17 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
     return values if values.dtype.kind in "fiub" else np.array([style.plain(str(value)) for value in values])
 
 
-def save(figure: Figure, path: Path, provenance: Mapping[str, str]) -> None:
-    """Write a figure, and its table beside it: ``f.csv`` beside ``f.pdf``, for ``pandas.read_csv(comment="#")``."""
-    figure.savefig(path, dpi=style.DPI)
-    if isinstance(figure, Drawn):
-        with path.with_suffix(".csv").open("w", encoding="utf-8", newline="") as stream:
-            table = figure.table()
-            stream.writelines(f"# {line}\n" for line in _head(figure, table, provenance))
-            table.to_csv(stream, index=False, lineterminator="\n")
+def save_picture(figure: Figure, path: Path) -> None:
+    """Write a figure: finer where its printed size was asked for."""
+    figure.savefig(path, dpi=DPI if page.asked().width is None else PRINTED_DPI)
+
+
+def save_table(figure: Drawn, path: Path, provenance: Mapping[str, str]) -> None:
+    """Write the table of a figure, for ``pandas.read_csv(comment="#")``."""
+    table = figure.table()
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        stream.writelines(f"# {line}\n" for line in _head(figure, table, provenance))
+        table.to_csv(stream, index=False, lineterminator="\n")
 
 
 def _number(value: Any) -> str:
@@ -96,9 +101,8 @@ def _head(figure: Drawn, table: pd.DataFrame, provenance: Mapping[str, str]) -> 
     units = table.attrs["units"]
     held = {name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()}
     varied = [name for name in table if name in units]
-    title, *small_print = figure.get_suptitle().split("\n")
     lines = [f"{name}: {text}" for name, text in provenance.items()]
-    lines.append(f"title: {' '.join([title, *small_print])}")
+    lines.append(f"title: {figure.get_suptitle()}")
     lines += [f"not drawn: {style.left_out(figure)}"] * bool(style.left_out(figure))
     lines += [f"held fixed: {', '.join(f'{name} = {value}' for name, value in held.items())}"] * bool(held)
     lines += [f"units: {', '.join(f'{name} [{units[name]}]' for name in varied)}"] * bool(varied)

@@ -59,7 +59,7 @@ def draw_development(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError("expected cycles as an axis of its own: a shape develops in one case")
     others = [dim for dim in curves.axes_of(data, "worn_profile") if dim != "cycles"]
     data, told = curves.hold(data, others, _prefer(data, "exact"))
-    figure, panels = style.panels(2)
+    figure, panels = drawing.panels(2)
     for axes, (output, place) in zip(panels, PROFILES, strict=True):
         one = curves.family(data, output, place, ("cycles",))
         for curve in one.curves:
@@ -110,7 +110,7 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), style.MOST_PANELS)).round().astype(int))
     if chosen.size < len(rows):
         told.append(f"{len(rows) - chosen.size} of {len(rows)} cases ({chosen.size} drawn, spread evenly)")
-    figure, panels = style.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
+    figure, panels = drawing.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
     alike = curves.fixed_by_all([_without(curves.scalars(rows[number][1]), ("cycles", RULE)) for number in chosen])
     for k, number in enumerate(chosen):
         name, part = rows[number]
@@ -170,7 +170,7 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
     if not found:
         raise DataError("no series holds wear_volume over cycles or path")
     shown, told = curves.few({name: data for name, (data, _) in found.items()})
-    figure, panels = style.panels(len(shown))
+    figure, panels = drawing.panels(len(shown))
     families, most = [], 1
     for axes, (name, data) in zip(panels, shown.items(), strict=True):
         along = found[name][1]
@@ -221,7 +221,7 @@ def draw_fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
     error, volume_error, told = compare(groups)
     usual = float(error.xi.sel(xi=0.8, method="nearest"))
     overall = (error["rms"] ** 2).mean(["stick_radius", "cycles"]) ** 0.5
-    figure, panels = style.panels(4, columns=2)
+    figure, panels = drawing.panels(4, columns=2)
     best = error.xi.isel(xi=error["rms"].fillna(np.inf).argmin("xi"))
     maps = (
         (error["largest"].sel(xi=usual), rf"largest $|\Delta f|/d_0$ at $\xi$ = {usual:g}", "viridis"),
