@@ -251,15 +251,10 @@ def share(data):
 
 def rolling(x):
     def expected(data):
-        found = [rows(x(data), stored(data, "breakthrough_probability", 100.0))]
-        if "asperity_load_share" in data:
-            found += [
-                rows(x(data), stored(data, "friction_coefficient")),
-                rows(x(data), share(data)),
-                rows(x(data), stored(data, "film_ratio")),
-                rows(x(data), stored(data, "asperity_load_share", 100.0)),
-            ]
-        return found
+        of = {name: 100.0 for name in ("breakthrough_probability", "asperity_load_share")}
+        of |= {name: 1.0 for name in ("friction_coefficient", "film_ratio")}
+        found = [rows(x(data), stored(data, name, factor)) for name, factor in of.items() if name in data]
+        return [*found, rows(x(data), share(data))] if "contact_half_width" in data else found
 
     return expected
 

@@ -132,7 +132,9 @@ def shaded(axes: Axes, x: Any, y: Mean, value: Any, **look: Any) -> Any:
     """Draw points with their bars, in colours that a colour bar names; returns what it is made of."""
     _record(axes, DATA, None, _coordinates(y.value), {"x": flat(x), **_ends("y", y), "value": flat(value)})
     _bars(axes, flat(x), flat(y.value), _lengths(flat(y.value), flat(y.low), flat(y.high)), "0.7")
-    return axes.scatter(flat(x), flat(y.value), c=flat(value), s=14, zorder=3, gid=style.DATA, **look)
+    known = np.isfinite(flat(y.value))
+    at = flat(x)[known], flat(y.value)[known]
+    return axes.scatter(*at, c=flat(value)[known], s=14, zorder=3, gid=style.DATA, **look)
 
 
 def absent(axes: Axes, x: xr.DataArray, why: str, **look: Any) -> None:
@@ -179,7 +181,8 @@ def dots(axes: Axes, x: Any, y: Any, value: Any, ends: Mean | None = None, **loo
     """Draw points whose colour is a value; returns what a colour bar is made of."""
     columns = {"x": flat(x), "y": flat(y), **({"value": flat(value)} if ends is None else _ends("value", ends))}
     _record(axes, DATA, None, _coordinates(value), columns)
-    return axes.scatter(flat(x), flat(y), c=flat(value), gid=style.DATA, **look)
+    known = np.isfinite(flat(value))
+    return axes.scatter(flat(x)[known], flat(y)[known], c=flat(value)[known], gid=style.DATA, **look)
 
 
 def field(axes: Axes, x: xr.DataArray, y: xr.DataArray, values: Mean, **look: Any) -> Any:

@@ -92,10 +92,11 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     figure, panels = drawing.panels(len(cases), size=(5.2, 4.2))
     for axes, case in zip(panels, cases, strict=True):
         curve = drawing.Curve(case, "mean", style.COLOURS[0], "-", "")
-        drawing.curve(axes, curve, *trace(_early(case)))
+        time, course = trace(_early(case))
+        drawing.curve(axes, curve, time, course)
         slope, label = over_slope(case)
         after = float(aggregation.mean(case[AFTER] / slope))
-        drawing.law(axes, [0, LAST], [after, after], of=case, color="0.5", ls=":", label="steady at $v_2$")
+        drawing.law(axes, [0, time[-1]], [after, after], of=case, color="0.5", ls=":", label="steady at $v_2$")
         axes.set_title(f"$v_2 = {1 + float(case['velocity_change']):.3g}\\,v_1$", fontsize="small")
         axes.set(xlabel=TIME, ylabel=label)
         style.legend(axes)

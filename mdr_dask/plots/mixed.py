@@ -23,6 +23,8 @@ OPERATION = ("normal_force", "rotation_speed", "temperature")
 CASE = (*OPERATION, "rms_roughness", "slide_roll_ratio", "layer_thickness", "boundary_friction")
 PROBABILITY = "breakthrough_probability"
 MOST_SERIES = 4
+#: What a logarithmic axis shows beside the largest value: shares of asperities go to zero without an end.
+LEAST_PART = 1e-7
 
 
 def _cases(found: Mapping[str, xr.Dataset], output: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
@@ -120,7 +122,15 @@ def _draw_row(axes: Axes, family: curves.Family, row: _Row, along: str, bars: bo
     if along != "temperature" and style.is_geometric(across):
         style.logarithmic(axes, "x")
     if row.logarithmic and style.is_geometric(drawn):
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], LEAST_PART * np.nanmax(drawn)))
         style.logarithmic(axes, "y")
+
+
+def _is_cut(axes: Axes) -> bool:
+    """Return whether a panel ends above some of its data."""
+    lines = [np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines if line.get_gid() == style.DATA]
+    low = min((np.nanmin(each[each > 0], initial=np.inf) for each in lines), default=np.inf)
+    return axes.get_yscale() == "log" and low < axes.get_ylim()[0]
 
 
 def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -219,6 +229,8 @@ def draw_stribeck(groups: Mapping[str, xr.Dataset]) -> Figure:
         own = curves.fixed_text({key: value for key, value in family.held.items() if key not in alike}, CASE)
         panels[column].set_title(", ".join(part for part in (name, own) if part), fontsize="small")
     bars = curves.meaning_of_bars(*found.values(), outputs=["friction_coefficient"])
+    if any(_is_cut(axes) for axes in panels):
+        told.append(f"values below {LEAST_PART:g} of the largest of their row")
     style.title(figure, "Stribeck curve", curves.fixed_text(alike, CASE), bars)
     style.leave_out(figure, told)
     return figure

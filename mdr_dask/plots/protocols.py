@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BEFORE = 0.08  # of the time shown
+#: Width of a column alone, and beside others, in inches.
+ALONE, BESIDE = 6.4, 3.4
 
 
 def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
@@ -48,7 +50,8 @@ def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, Flo
 def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time over velocity and load, one column for each series."""
     found, told = curves.few(curves.with_outputs(groups, OUTPUTS))
-    figure, panels = drawing.panels(3 * len(found), columns=len(found), size=(3.4, 2.0), sharex="col")
+    width = ALONE if len(found) == 1 else BESIDE
+    figure, panels = drawing.panels(3 * len(found), columns=len(found), size=(width, 2.0), sharex="col")
     families = []
     for k, (name, data) in enumerate(found.items()):
         top, *below = panels[k :: len(found)]
@@ -61,8 +64,8 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
         drawing.curve(top, drawing.Curve(values, "mean", style.COLOURS[0], "-", ""), time, friction)
         after = float(aggregation.mean(values[AFTER] / slope))
         if np.isfinite(after):
-            label = "steady state at the end"
-            drawing.law(top, [0, last], [after, after], of=values, color="0.5", ls=":", lw=1, label=label)
+            steady = "steady state at the end"
+            drawing.law(top, [0, last], [after, after], of=values, color="0.5", ls=":", lw=1, label=steady)
         top.set_title(name or case.protocol.shape, fontsize="small")
         top.set_ylabel(label)
         time, speed, force = course(case, last)
