@@ -251,8 +251,8 @@ def share(data):
 
 def rolling(x):
     def expected(data):
-        of = {name: 100.0 for name in ("breakthrough_probability", "asperity_load_share")}
-        of |= {name: 1.0 for name in ("friction_coefficient", "film_ratio")}
+        of = dict.fromkeys(("breakthrough_probability", "asperity_load_share"), 100.0)
+        of |= dict.fromkeys(("friction_coefficient", "film_ratio"), 1.0)
         found = [rows(x(data), stored(data, name, factor)) for name, factor in of.items() if name in data]
         return [*found, rows(x(data), share(data))] if "contact_half_width" in data else found
 
