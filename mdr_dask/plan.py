@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import CampaignError
-from mdr_dask.models.base import Block, Coordinate, Model, Output, replaced
+from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, replaced
 
 #: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
 BLOCK_SECONDS = 1.0
@@ -29,7 +31,7 @@ SHARED_SECONDS = 30.0
 REPEATED_WORK = 1.15
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
-#: Values of an axis that are asked for notes.
+#: Most values of an axis that are asked for notes.
 NOTED = 64
 #: More cases than this are a mistake in the file, not a study.
 MOST_CASES = 10**9
@@ -90,10 +92,11 @@ class Template:
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """What the model says of the parameters, each sentence once, every axis by itself."""
-        notes, base = models.load(self.campaign.model).notes, self.series.parameters
-        sets = [replaced(base, axis.path, value) for axis in self.series.axes for value in axis.values[:NOTED]]
-        return tuple(dict.fromkeys(note for parameters in (base, *sets) for note in notes(parameters)))
+        """What parts and model say of the parameters, each sentence once, every axis by itself."""
+        base = self.series.parameters
+        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in _noted(axis))]
+        told = [note for parameters in sets for note in notes_of(parameters)]
+        return tuple(dict.fromkeys((*told, *models.load(self.campaign.model).notes(sets))))
 
     @property
     def bytes(self) -> int:
@@ -170,6 +173,12 @@ class Template:
         return self._block(region)
 
 
+def _noted(axis: Axis) -> list[Any]:
+    """Return some values of an axis, the first and the last among them."""
+    places = np.linspace(0, len(axis.values) - 1, min(len(axis.values), NOTED)).round().astype(int)
+    return [axis.values[place] for place in places]
+
+
 def _as_array(axis: Axis) -> NDArray[Any]:
     if axis.labels is None:
         return np.array(axis.values)
@@ -191,6 +200,7 @@ class Estimate:
     bytes: int
     seconds: float
     notes: tuple[str, ...]
+    compiling: float = 0.0
 
     @property
     def rounds(self) -> float:
@@ -263,10 +273,14 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine (or of the limit it was given) in bytes."""
-    from distributed.system import MEMORY_LIMIT
+    """Return the memory of this machine, or of the limit that its control group was given, in bytes."""
+    import psutil
 
-    return float(MEMORY_LIMIT)
+    limits = [psutil.virtual_memory().total]
+    for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):  # no such group, or no limit
+            limits.append(int(Path(path).read_text()))
+    return float(min(limits))
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
@@ -359,6 +373,7 @@ def estimate(campaign: Campaign) -> Estimate:
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        compiling=model.compiling,
     )
 
 

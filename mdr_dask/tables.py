@@ -202,10 +202,15 @@ def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
     headings: list[tuple[Cell, ...]] = []
     if not any(_NUMBER.match(cell.text) for cell in rows[0]):
         headings.append(rows.pop(0))
-        if rows and _are_units(rows[0], numeric):
+        if rows and _are_units(rows[0], numeric) and not _are_names_again(headings[0], rows[0]):
             headings.append(rows.pop(0))
     if not rows:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
+    words = [row for row in rows if numeric and headings and not any(map(_is_entry, row))]
+    if words:
+        raise TableError(
+            source, [row[0].problem(f"expected a line of numbers, got {row[0].text[:60]!r}, ...") for row in words]
+        )
     return Sheet(source, *_units(headings, width), tuple(rows))
 
 
@@ -223,13 +228,41 @@ def numbers(sheet: Sheet) -> FloatArray:
         cell.problem(f"expected a number, got {cell.text[:60]!r}")
         for row in sheet.rows
         for cell in row
-        if not _NUMBER.match(cell.text) and cell.text.lower() not in _MISSING
+        if not _is_entry(cell)
     ]
     if problems:
         raise TableError(sheet.source, problems)
     return np.array(
         [[float(cell.text) if _NUMBER.match(cell.text) else math.nan for cell in row] for row in sheet.rows]
     )
+
+
+def described(text: str, source: str) -> str:
+    """Return the number of rows of a table, and name, unit and range of its columns, as it has them.
+
+    Raises
+    ------
+    TableError
+        If it is no table of numbers.
+    """
+    sheet = read_sheet(text, source)
+    columns = numbers(sheet).T
+    names = [cell.text for cell in sheet.names] or [f"column {place}" for place in range(1, len(columns) + 1)]
+    ranges = []
+    for name, unit, column in zip(names, sheet.units, columns, strict=True):
+        known = column[np.isfinite(column)]
+        ends = [f"{end:.4g}" for end in (known.min(), known.max())] if known.size else ["nothing"]
+        ranges.append(" ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit.strip("-1")])))
+    return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
+
+
+def _is_entry(cell: Cell) -> bool:
+    """Return whether a cell holds a number, or says that one is missing."""
+    return bool(_NUMBER.match(cell.text)) or cell.text.lower() in _MISSING
+
+
+def _are_names_again(names: tuple[Cell, ...], row: tuple[Cell, ...]) -> bool:
+    return [cell.text for cell in names] == [cell.text for cell in row]
 
 
 def _are_units(row: tuple[Cell, ...], numeric: bool) -> bool:
@@ -355,18 +388,18 @@ def _shown(cell: Cell, unit: str) -> str:
 
 
 def _in_si(number: str, unit: str, wanted: str) -> float:
-    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s."""
+    """Convert as a campaign file does; temperatures take C, angular frequencies Hz and 1/s, wave numbers 1/m."""
     number = number.replace(",", ".")
     if not unit:
         return float(number)
     if wanted == "K" and unit in _CELSIUS:
         unit = "degC"
-    if wanted != "rad/s":
+    if not wanted.startswith("rad/"):
         return to_si(f"{number} {unit}", wanted)
     try:
         return to_si(f"{number} {unit}", wanted)
     except ValueError:
-        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", "1/s")
+        return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
 
 
 def _folded(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import time
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models, store
+from mdr_dask.compile_clock import compile_clock
 from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Block, Model, Result, Status
 from mdr_dask.store import Place
@@ -64,13 +66,17 @@ class Work:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task sends home: counts and times, never numbers of the study."""
+    """What a task sends home: counts and times, never numbers of the study.
+
+    Of the time to compute, `compile_seconds` went by while this process compiled kernels.
+    """
 
     counts: tuple[int, ...]
     solves: int
     estimate: float
     compute_seconds: float
     write_seconds: float
+    compile_seconds: float = 0.0
 
 
 def versions(model: str) -> tuple[str, int]:
@@ -92,6 +98,8 @@ def run_block(work: Work) -> Outcome:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
     _one_blas_thread()
+    clock = compile_clock() if model.compiling else None
+    compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
     if work.wanted.all():
         result = _compute(model, work.block)
@@ -103,9 +111,28 @@ def run_block(work: Work) -> Outcome:
         status[work.spared] = Status.NOT_NEEDED
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
+    compiled = clock.seconds - compiled if clock else 0.0
     _write(work, values if work.wanted.any() else {}, status, _record(work, result, status, middle - started))
     written = time.perf_counter() - middle
-    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written)
+    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written, compiled)
+
+
+def finished(work: Work) -> Outcome | None:
+    """Return how a task ended that a worker finished before it died untold; None for one that is not finished.
+
+    The record of an attempt is written before the ledger, and says what the ledger then holds.
+    """
+    record = store.record(work.place, work.attempt)
+    if record is None:
+        return None
+    _, status = store.read_block(work.place, ())
+    if record.get("ledger") != _fingerprint(status):
+        return None
+    return Outcome(_counts(work, status), record["solves"], work.estimate, record["compute_seconds"], 0.0)
+
+
+def _fingerprint(status: NDArray[np.int8]) -> str:
+    return hashlib.blake2b(status.tobytes(), digest_size=16).hexdigest()
 
 
 def _other_version(work: Work) -> str:
@@ -215,6 +242,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
         "compute_seconds": seconds,
         "finished": time.time(),
         "host": platform.node(),
+        "ledger": _fingerprint(status),
         "messages": messages,
         "process": os.getpid(),
         "solves": result.solves,

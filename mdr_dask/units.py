@@ -106,8 +106,20 @@ _MEANINGS = {
 _MOST_LETTERS = 60
 _UNTOLD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
-_NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)")
+_NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
+#: A number with a decimal comma, one with a comma that may be either, and what looks like several numbers.
+_COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
+_SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
+
+
+#: Units that a misspelt one is compared with.
+_COMMON = (
+    "m mm um nm cm km s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent "
+    "meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute hour newton "
+    "millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz gram kilogram"
+)
 
 
 def to_si(value: str, unit: str) -> float:
@@ -131,27 +143,107 @@ def to_si(value: str, unit: str) -> float:
         If it is no number with a unit, the unit is unknown or of another dimension.
     """
     match = _QUANTITY.match(value)
-    if match is None or _NOT_A_UNIT.match(match[2]) or len(match[2]) > _MOST_LETTERS or _UNTOLD_POWER.search(match[2]):
+    if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
         shown = value if len(value) <= _MOST_LETTERS else value[:_MOST_LETTERS] + "..."
-        raise ValueError(f"expected {expected(unit)}, got {shown!r}")
+        raise ValueError(f"expected {expected(unit)}, got {shown!r}{spelt(value)}")
     number, given = match.groups()
     if not math.isfinite(float(number)):
         raise ValueError(f"expected a finite number, got {value!r}")
     try:
         factor, offset = conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
-        raise ValueError(f"{error}, got {value!r}") from None
+        raise ValueError(f"{error}, got {value!r}{spelt(value)}") from None
     si = _times(number, factor) + offset
     if not math.isfinite(si):
         raise ValueError(f"expected a finite number, got {value!r}")
     return si
 
 
+def spelt(value: str) -> str:
+    """Return how a number that is none is written: with a decimal point, or several as a list or a range."""
+    if _THOUSANDS.fullmatch(value.strip()):
+        return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
+    if _COMMA.match(value):
+        return f" (write a decimal point: {value.replace(',', '.', 1)!r})"
+    if _SEVERAL.search(value.strip()):
+        return " (several values are [a, b, c], a range {linear: [a, b, n]} or {geometric: [a, b, n]})"
+    return ""
+
+
 def expected(unit: str) -> str:
     """Return how a message names a quantity of a unit: ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
-    name, example = _MEANINGS.get(spaced, (f"a quantity in {unit}", f"1 {unit}"))
+    other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
+    name, example = _MEANINGS.get(spaced) or other
     return f"{name} (such as {example!r})" if example else name
+
+
+#: Prefixes of what is shown, with the powers of ten that they stand for.
+_PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
+
+
+def shown(value: float, unit: str, digits: int = 4) -> str:
+    """Return a quantity as a reader writes it: ``0.5 mm/s`` of 5e-4 m/s, ``-20 degC`` of 253.15 K.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit.
+    unit : str
+        The SI unit, ``"1"`` for a pure number.
+    digits : int
+        Most digits.
+    """
+    if unit == "K":
+        return f"{value - 273.15:.{digits}g} degC" if abs(value - 273.15) > 1e-9 else "0 degC"
+    if unit in ("1", ""):
+        return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+    if unit == "rad":
+        return f"{math.degrees(value):.{digits}g} deg"
+    if value == 0 or not math.isfinite(value) or not _LEADING.match(unit):
+        return f"{value:.{digits}g} {unit}"
+    rounded = float(f"{value:.{digits}g}")
+    power = min(max(3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12), -12), 12)
+    return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
+
+
+#: Units that people forget to write, by the SI unit that is read in their place.
+_FORGOTTEN = {
+    "m": ("mm", "um", "nm", "km"),
+    "m/s": ("mm/s", "um/s", "km/h"),
+    "s": ("ms", "us", "ns", "min", "h"),
+    "N": ("mN", "uN", "kN"),
+    "N/m": ("N/mm",),
+    "Pa": ("kPa", "MPa", "GPa"),
+    "Pa*s": ("mPa s",),
+    "1/Pa": ("1/MPa", "1/GPa"),
+    "m^2/s": ("mm^2/s",),
+    "rad": ("deg",),
+    "K": ("degC",),
+    "kg/m^3": ("g/cm^3",),
+    "J/mol": ("kJ/mol",),
+    "Hz": ("kHz", "MHz"),
+}
+#: A bare number further than this from the usual value is asked about, in decades; temperatures are never far off.
+_FAR, _FAR_TEMPERATURE = 3.0, 0.3
+
+
+def is_far(value: float, unit: str, usual: str) -> bool:
+    """Return whether a number in SI lies more than three decades from a usual value such as ``10 MPa``."""
+    return value != 0 and _decades(value, to_si(usual, unit)) > (_FAR_TEMPERATURE if unit == "K" else _FAR) + 1e-9
+
+
+def likely(value: float, unit: str, usual: str) -> str:
+    """Return a bare number with the unit that was probably meant, empty if none brings it near the usual value."""
+    center = to_si(usual, unit)
+    meant = {f"{value:g} {other}": to_si(f"{value!r} {other}", unit) for other in _FORGOTTEN.get(unit, ())}
+    near = {text: _decades(size, center) for text, size in meant.items() if not is_far(size, unit, usual)}
+    return min(near, key=lambda text: near[text], default="")
+
+
+def _decades(value: float, usual: float) -> float:
+    return abs(math.log10(abs(value / usual))) if value else math.inf
 
 
 def example_unit(unit: str) -> str:
@@ -161,13 +253,17 @@ def example_unit(unit: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit of the list."""
-    if _NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text):
+    if not _may_be_unit(text):
         return False
     try:
         registry().parse_units(_spelling(text))
     except Exception:  # whatever its tokens happen to raise
         return False
     return True
+
+
+def _may_be_unit(text: str) -> bool:
+    return not (_NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text))
 
 
 def _times(number: str, factor: float) -> float:
@@ -212,6 +308,26 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     return (1.0, zero) if zero else (one, 0.0)
 
 
+#: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.
+_COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
+
+
+@lru_cache(maxsize=1024)
+def dimension_of(unit: str) -> tuple[Any, str]:
+    """Return the dimension of a unit, as pint knows it, and the coherent SI unit of that dimension.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit of the list.
+    """
+    if unit not in ("", "1") and not is_unit(unit):
+        raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
+    dimension = registry().parse_units(_spelling(unit)).dimensionality
+    coherent = " * ".join(f"{_COHERENT[name.strip('[]')]}**{power}" for name, power in dimension.items())
+    return dimension, coherent or "1"
+
+
 def _spelling(unit: str) -> str:
     unit = unit.replace("%", " percent ").strip()
     return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
@@ -220,6 +336,8 @@ def _spelling(unit: str) -> str:
 def _nearest(word: str) -> str:
     if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
         return ", temperatures are in 'degC', '°C' or 'K'"
-    common = "m mm um nm s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent"
-    hint = did_you_mean(word, common.split())
+    power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
+    if power and is_unit(power[1]):
+        return f" (write {power[1]}^{power[2]})"
+    hint = did_you_mean(word, _COMMON.split())
     return hint if "mean" in hint else ""

@@ -8,10 +8,10 @@ import xarray as xr
 from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
 
-from mdr_dask import aggregation, fit
+from mdr_dask import aggregation, fits
 from mdr_dask.errors import FitError
-from mdr_dask.fit.friction import indenter_xi, numbers, spectral_slope, within_indenter_law
-from mdr_dask.fit.kinetics import well_known
+from mdr_dask.fits.friction import indenter_xi, numbers, spectral_slope, within_indenter_law
+from mdr_dask.fits.kinetics import well_known
 from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.physics.lubrication import film_formulas
 from mdr_dask.physics.sliding import laws
@@ -126,7 +126,7 @@ def fitted(name):
 
     def of(data):
         try:
-            return fit.available(data.attrs["model"])[name].compute({"": data})
+            return fits.available(data.attrs["model"])[name].compute({"": data})
         except FitError:
             return None
 

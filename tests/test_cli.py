@@ -17,7 +17,7 @@ import xarray as xr
 from test_execute import digests
 
 from mdr_dask.cli import main
-from mdr_dask.cli.campaigns import _shared
+from mdr_dask.cli.running import _shared
 from mdr_dask.execute import Progress
 
 CAMPAIGN = """\
@@ -96,19 +96,11 @@ def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
         assert re.search(note, capsys.readouterr().out)
     assert main(["check", str(campaign), "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
-    assert re.search(note, row["notes"][0])
+    assert re.search(note, row["notes"][1])
     assert main(["run", str(campaign), "--quiet"]) == 0
     kept = xr.open_zarr("results/small.zarr")
-    assert re.search(note, kept.attrs["notes"][0])
+    assert re.search(note, kept.attrs["notes"][1])
     np.testing.assert_allclose(kept["material_error"], np.hypot(0.016, 0.042) / np.sqrt(2), rtol=0.03)
-
-
-def test_time_left_goes_by_the_work_and_not_by_the_results():
-    from mdr_dask.cli.progress import describe
-
-    early = Progress(total=100, done=90, estimated=10.0, finished=2.0, wall_seconds=3.0)
-    assert describe(early) == "90 of 100 results, 0 failed, 30 a second, 12 s left"
-    assert describe(Progress(total=100)) == "0 of 100 results, 0 failed"
 
 
 def test_problems_of_a_file_go_to_stderr_with_exit_code_2(campaign, capsys):

@@ -13,7 +13,7 @@ from test_execute import digests, run, values
 from mdr_dask import execute, store, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources
+from mdr_dask.execute import Resources, clusters
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_a_task_of_another_version_is_refused_before_anything_is_written(toy, ur
 
 def test_a_scheduler_that_does_not_answer_is_named(toy, url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", [1.0]))
-    monkeypatch.setattr(execute.executors, "SCHEDULER_PATIENCE", 0.2)
+    monkeypatch.setattr(clusters, "SCHEDULER_PATIENCE", 0.2)
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
         run_on(Resources(scheduler="tcp://127.0.0.1:9"), campaign, url)
     with pytest.raises(ClusterError, match="no Dask scheduler answers at 'head:node'"):

@@ -198,7 +198,7 @@ def test_a_foreign_group_is_refused(toy, url):
 
 def test_a_second_runner_is_refused_with_the_name_of_the_first(toy, url):
     campaign = toy.campaign(toy.axis("position", [1.0]))
-    with store.lock(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
+    with store.alone(url), pytest.raises(StoreBusyError, match=r"process \d+ on .* is running on this store"):
         run(campaign, url)
     assert run(campaign, url).done == 6
 

@@ -12,10 +12,13 @@ from mdr_dask.cli import main
 #: Command line, and what the error has to say; STORE is a filled store, FOREIGN a Zarr group of somebody else.
 WRONG = [
     ("check nowhere.yaml", "File 'nowhere.yaml' does not exist"),
-    ("models nobody", "unknown model 'nobody'; known: sliding_friction"),
+    ("models nobody", "unknown model 'nobody' (known: sliding_friction"),
     ("run small.yaml --threads 0", "0 is not in the range x>=1"),
     ("run small.yaml --threads 2 --workers 2", "expected one of --threads, --workers, got 2 of them"),
-    ("run small.yaml --store .", ".: a folder that holds something else (.STORE.lock), expected a store or nothing"),
+    (
+        "run small.yaml --store .",
+        ".: a folder that holds something else (.STORE.entrance.lock), expected a store or nothing",
+    ),
     ("run small.yaml --store small.yaml", "small.yaml: a file, expected the folder of a store or nothing"),
     ("run small.yaml --store FOREIGN", "FOREIGN: Zarr, but not a study that mdr_dask made"),
     ("run small.yaml --store nobody://x", "nobody://x: expected a path, or a URL that fsspec can open: Protocol not"),
@@ -24,7 +27,10 @@ WRONG = [
     ("run other.yaml --store STORE --dry-run", "hurst: 0.7 in the store, 0.6 in the campaign"),
     ("run large.yaml", "large.yaml: one case needs about"),
     ("run small.yaml --scheduler nowhere --store STORE", "no Dask scheduler answers at 'nowhere'"),
-    ("run small.yaml --cluster small.yaml", "small.yaml:1:1: name: unknown key (known: class, arguments, scale)"),
+    (
+        "run small.yaml --cluster small.yaml",
+        "small.yaml:1:1: name: unknown key (known: class, arguments, scale, adapt)",
+    ),
     ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class: expected a class such as dask_jobqueue.SLURM"),
     ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments: expected a mapping, got 3"),
     ("run small.yaml --cluster list.yaml", "list.yaml:1:1: expected a mapping with the key class, got ['class']"),
@@ -41,8 +47,17 @@ WRONG = [
     ("show STORE --select velocity=2..1", "no velocity 2 m/s .. 1 m/s: it has the values 0.001 m/s, 0.01 m/s"),
     ("show STORE --units velocity=N", "velocity: expected a velocity (such as '1 mm/s'), got 'N'"),
     ("show STORE --limit -1", "-1 is not in the range x>=0"),
-    ("aggregate STORE -o means.xls", "expected a file that ends in .zarr, .nc or .csv, got 'means.xls'"),
-    ("aggregate STORE -o STORE", "expected a place for the statistics, got the store of a study: 'STORE'"),
+    ("aggregate STORE -o means.xls", "expected a file that ends in .csv, .json, .jsonl, .parquet, .nc or .zarr, got"),
+    ("aggregate STORE -o STORE", "expected a place for the answer, got the store of a study: 'STORE'"),
+    ("show STORE -o x.csv --json", "expected one of --json and --output, got both"),
+    ("show STORE -o x.nc --sort velocity", "expected a table for rows in an order: .csv, .jsonl or .parquet"),
+    ("show STORE --where velocity>1kg", "'velocity>1kg': expected quantities of one dimension"),
+    (
+        "show STORE --where velocity=1",
+        "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7', got 'velocity=1'",
+    ),
+    ("show STORE --columns wear", "no column 'wear'; known: "),
+    ("show STORE --group-by case", "expected axes to group by, got 'case'"),
     ("aggregate STORE -o small.yaml/x.csv", "small.yaml/x.csv: Not a directory"),
     ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
     (

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+import time
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -81,9 +83,16 @@ def register(monkeypatch) -> None:
     monkeypatch.setattr(models, "NAMES", (*models.NAMES, "toy"))
 
 
-def install() -> None:
-    """Make ``model: toy`` known to this process, a worker, for good."""
-    sys.modules["mdr_dask.models.toy"] = _module()
+def install(pause: float = 0.0) -> None:
+    """Make ``model: toy`` known to this process, a worker, for good; a block may take so many seconds."""
+
+    def slow(block: Block[ToyParameters]) -> Result:
+        time.sleep(pause)
+        return compute(block)
+
+    module = _module()
+    module.MODEL = replace(MODEL, compute=slow) if pause else MODEL
+    sys.modules["mdr_dask.models.toy"] = module
     models.NAMES = (*models.NAMES, "toy")
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from mdr_dask.models.base import Block
 from mdr_dask.models.parts.indenter import Power
 from mdr_dask.models.parts.material import Material
-from mdr_dask.models.parts.measured_line import ProfileFile
+from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
@@ -84,8 +84,8 @@ def measured_case(generator, shape, path):
         comments="",
         fmt="%.17g",
     )
-    profile = ProfileFile.model_validate({"file": str(path)})
-    return SlidingFriction(profile=profile, **random_series(generator), normal_force=10 ** generator.uniform(-3, 3))
+    surface = Surface.model_validate({"profile": str(path)})
+    return SlidingFriction(surface=surface, **random_series(generator), normal_force=10 ** generator.uniform(-3, 3))
 
 
 def solve(case, realisation, accuracy=None, **changes):

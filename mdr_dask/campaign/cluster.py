@@ -9,11 +9,16 @@ from mdr_dask.campaign.document import parse, read_text
 from mdr_dask.campaign.problems import Problems, shown
 from mdr_dask.errors import did_you_mean
 
-_EXPECTED = {"class": "a class such as dask_jobqueue.SLURMCluster", "arguments": "a mapping", "scale": "a mapping"}
+_EXPECTED = {
+    "class": "a class such as dask_jobqueue.SLURMCluster",
+    "arguments": "a mapping",
+    "scale": "a mapping",
+    "adapt": "a mapping",
+}
 
 
 def load_cluster(path: FilePath) -> dict[str, Any]:
-    """Read a cluster file: the keys ``class``, and ``arguments`` and ``scale`` if there are any.
+    """Read a cluster file: the keys ``class``, and ``arguments``, ``scale`` and ``adapt`` if there are any.
 
     Raises
     ------

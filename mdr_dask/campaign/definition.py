@@ -105,6 +105,8 @@ class Campaign:
         Chunk lengths asked for by dimension; the others are chosen.
     text, source : str
         The file as written, and where it was read.
+    remarks : tuple of str
+        Questions about bare numbers that are far from usual, each with its place.
     """
 
     name: str
@@ -118,3 +120,4 @@ class Campaign:
     blocks: Mapping[str, int]
     text: str
     source: str
+    remarks: tuple[str, ...] = ()

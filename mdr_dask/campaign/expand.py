@@ -14,7 +14,8 @@ from mdr_dask.campaign.definition import Axis, Series
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
-from mdr_dask.campaign.spec import CampaignSpec, LatinHypercubeSpec, SobolSpec, TableSpec
+from mdr_dask.campaign.remarks import remarks
+from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
 from mdr_dask.campaign.variation import Origin, Variation
 from mdr_dask.models.base import Model, Parameters
 from mdr_dask.units import to_si
@@ -22,8 +23,8 @@ from mdr_dask.units import to_si
 
 def expand(
     document: Document, model: Model[Any], spec: CampaignSpec, directory: str, problems: Problems
-) -> tuple[Series, ...]:
-    """Return the series of a campaign.
+) -> tuple[tuple[Series, ...], tuple[str, ...]]:
+    """Return the series of a campaign, and what is asked about their numbers.
 
     Parameters
     ----------
@@ -39,14 +40,18 @@ def expand(
         Receives everything wrong with parameters, ranges and tables; series that cannot be built are left out.
     """
     found = []
+    asked: dict[str, None] = {}
     for name in spec.series or {"": {}}:
         paths: dict[str, Path] = {key: ("parameters", key) for key in spec.parameters}
         if spec.series:
             paths |= {key: ("series", name, key) for key in spec.series[name]}
-        series = _Expansion(document, model.parameters, spec, directory, problems, paths).series(name)
+        expansion = _Expansion(document, model.parameters, spec, directory, problems, paths)
+        series = expansion.series(name)
         if series is not None:
             found.append(series)
-    return tuple(found)
+            units = model.units(series.parameters)
+            asked |= dict.fromkeys(map(str, remarks(document, model.parameters, expansion.data, paths, units)))
+    return tuple(found), tuple(asked)
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,7 @@ class _Expansion:
 
     def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
-        drawn = isinstance(design, SobolSpec | LatinHypercubeSpec)
+        drawn = isinstance(design, Drawn)
         found = variation.find(self.document, self.parameters, self.data, self.paths, drawn, self.problems)
         origin = Origin("sampling", self.document.place(("sampling",)))
         if isinstance(design, TableSpec):
@@ -96,7 +101,7 @@ class _Expansion:
             )
         if drawn and not found:
             self._complain(origin, "expected at least one range among the parameters, got none")
-        if isinstance(design, SobolSpec | LatinHypercubeSpec) and found and all(one.spread for one in found):
+        if isinstance(design, Drawn) and found and all(one.spread for one in found):
             return sampling.drawn(design, self.spec.seed, found)
         if design == "zip":
             self._check_lengths(found)

@@ -36,6 +36,11 @@ def holds_whole_numbers(info: FieldInfo) -> bool:
     return int in kinds and float not in kinds
 
 
+def usual(info: FieldInfo) -> str:
+    """Return a common value of a field with its unit, empty if none was declared."""
+    return str(info.examples[0]) if info.examples else ""
+
+
 def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
     """Return the parameter sets that a value of this field may be."""
     return tuple(kind for kind in members(info.annotation) if isinstance(kind, type) and issubclass(kind, BaseModel))

@@ -65,7 +65,10 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     if model is None:
         problems.raise_if_any()
     assert model is not None
-    series = () if wrong & {"parameters", "series", "sampling"} else expand(document, model, spec, directory, problems)
+    series: tuple[Series, ...] = ()
+    remarks: tuple[str, ...] = ()
+    if not wrong & {"parameters", "series", "sampling"}:
+        series, remarks = expand(document, model, spec, directory, problems)
     outputs = _outputs(document, spec, model, problems)
     replication = _replication(document, spec, model, outputs, problems)
     _check_blocks(document, spec, series, problems)
@@ -82,6 +85,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
         blocks=dict(spec.store.blocks),
         text=text,
         source=source,
+        remarks=remarks,
     )
 
 

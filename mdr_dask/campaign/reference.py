@@ -14,7 +14,7 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.models.base import DataFile, Model, unit_of
+from mdr_dask.models.base import DataFile, Model, said, unit_of
 from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\
@@ -48,8 +48,8 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values; not for a parameter that is itself a list |
-| `{values: [...]}` | the same, and inside structured parameters the only way to write it |
+| `[1 N, 3 N, 10 N]` | these values, inside structured parameters too; not for a parameter that is itself a list |
+| `{values: [...]}` | the same |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
 | `[{shape: cone, angle: 10 deg}, {shape: plane}]` | whole structured values, named in the store as they are written |
@@ -67,6 +67,7 @@ a name.
 | `zip` | the first values together, the second values together, ...: one dimension `case` |
 | `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
 | `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
+| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
@@ -88,6 +89,19 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
     return list(_rows(model.parameters, "parameter"))
 
 
+def ways_told(model: Model[Any]) -> list[str]:
+    """Return the parameters that belong together, each thing in one line: ``length with rms_roughness, or profile``."""
+    return list(_ways(model.parameters, ""))
+
+
+def _ways(parameters: type[BaseModel], before: str) -> Iterator[str]:
+    for ways in getattr(parameters, "ways", ()):
+        yield said(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
+    for name, info in parameters.model_fields.items():
+        for structure in fields.structures(info):
+            yield from _ways(structure, f"{before}{name}.")
+
+
 def output_rows(model: Model[Any]) -> list[dict[str, str]]:
     """Return output, unit, own dimensions, whether it is a default, and meaning of every output of a model."""
     return [
@@ -103,10 +117,17 @@ def output_rows(model: Model[Any]) -> list[dict[str, str]]:
     ]
 
 
+def number_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return name, formula and meaning of every dimensionless number of a model."""
+    return [{"number": number.name, "formula": number.formula, "meaning": number.meaning} for number in model.numbers]
+
+
 def _model(model: Model[Any]) -> str:
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
-    tables = [_table(parameter_rows(model)), _table(output_rows(model))]
-    return "\n".join([f"## `{model.name}`", "", summary, "", *tables])
+    tables = [_table(rows) for rows in (parameter_rows(model), output_rows(model), number_rows(model)) if rows]
+    together = [f"* {line}" for line in ways_told(model)]
+    together = ["What belongs together:", "", *together, ""] if together else []
+    return "\n".join([f"## `{model.name}`", "", summary, "", *together, *tables])
 
 
 def _table(rows: Iterable[dict[str, str]]) -> str:
@@ -173,16 +194,17 @@ def _default(info: FieldInfo) -> str:
     if info.is_required():
         return "required"
     value = info.get_default(call_default_factory=True, validated_data={})
-    return "" if value is None or value == {} else _yaml(value)
+    return "" if value is None or value == {} else yaml_text(value)
 
 
-def _yaml(value: Any) -> str:
+def yaml_text(value: Any) -> str:
+    """Return a value as a campaign file has it, on one line."""
     if isinstance(value, BaseModel):
-        return _yaml(value.model_dump(exclude_none=True))
+        return yaml_text(value.model_dump(exclude_none=True))
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{key}: {_yaml(inner)}" for key, inner in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {yaml_text(inner)}" for key, inner in value.items()) + "}"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_yaml, value)) + "]"
+        return "[" + ", ".join(map(yaml_text, value)) + "]"
     if isinstance(value, bool):
         return str(value).lower()
     return plain(value) if isinstance(value, float) else str(value)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from mdr_dask import models
-from mdr_dask.campaign.fields import holds_list
 from mdr_dask.campaign.spec import CampaignSpec
 from mdr_dask.models.base import Model, Parameters
 
@@ -55,13 +54,15 @@ def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)
     for name, value in own["properties"].items():
-        own["properties"][name] = _varied(value, lists=not holds_list(parameters.model_fields[name]))
-    for structure in own.get("$defs", {}).values():
+        own["properties"][name] = _varied(value)
+    for key, structure in own.get("$defs", {}).items():
         properties = structure.get("properties", {})
         structure["required"] = [name for name, value in properties.items() if "const" in value]
         for name, value in properties.items():
             if "const" not in value:
-                properties[name] = _varied(value, lists=False)
+                properties[name] = _varied(value)
+        if structure.pop("bare_name", False):
+            own["$defs"][key] = {"anyOf": [structure, {"type": "string"}]}
     return own
 
 
@@ -80,10 +81,11 @@ def _choice(model: Model[Any]) -> Schema:
     }
 
 
-def _varied(value: Schema, lists: bool) -> Schema:
+def _varied(value: Schema) -> Schema:
+    is_list = "array" in (kind.get("type") for kind in (value, *value.get("anyOf", ())))
     outside: Schema = {key: value.pop(key) for key in ("description", "default") if key in value}
     branches = [value, {"$ref": "#/$defs/linear"}, {"$ref": "#/$defs/geometric"}, {"$ref": "#/$defs/values"}]
-    if lists:
+    if not is_list:
         branches.append({"type": "array", "items": value, "minItems": 1})
     return {**outside, "anyOf": branches}
 

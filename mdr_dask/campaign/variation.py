@@ -100,7 +100,7 @@ def find(
         Receives malformed ranges and empty lists; what varies so has neither items nor an interval.
     """
     search = _Search(document, parameters, data, drawn, problems)
-    return tuple(found for name, value in data.items() for found in search.top(name, value, paths[name]))
+    return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
 
 
 class _MalformedError(Exception):
@@ -115,17 +115,14 @@ class _Search:
     drawn: bool
     problems: Problems
 
-    def top(self, name: str, value: Any, at: Path) -> Iterator[Variation]:
-        """Yield what varies in one parameter of the model; at this level a plain list varies too."""
-        info = self._field((name,))
-        if isinstance(value, list) and info is not None and not fields.holds_list(info):
-            yield self._variation((name,), at, lambda: self._listed(value, at, at))
-        else:
-            yield from self._below((name,), value, at)
-
-    def _below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
+    def below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
+        """Yield what varies in one parameter, or in those inside it."""
         info = self._field(path)
-        if info is None or not isinstance(value, dict):
+        if info is None:
+            return
+        if isinstance(value, list) and not fields.holds_list(info):
+            yield self._variation(path, at, lambda: self._listed(value, at, at))
+        if not isinstance(value, dict):
             return
         structures = fields.structures(info)
         kinds = [key for key in value if key in RANGES and not any(key in kind.model_fields for kind in structures)]
@@ -133,7 +130,7 @@ class _Search:
             yield self._variation(path, at, lambda: self._range(path, value, at))
         else:
             for key, inner in value.items():
-                yield from self._below((*path, key), inner, (*at, key))
+                yield from self.below((*path, key), inner, (*at, key))
 
     def _variation(self, path: tuple[str, ...], at: Path, read: Callable[[], Spread | list[Item]]) -> Variation:
         origin = self._origin(at, at)

@@ -9,34 +9,51 @@ import sys
 
 import click
 
-from mdr_dask.cli.campaigns import check, models, run, schema
+from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures, plot
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, show, status
+from mdr_dask.cli.running import run
+from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
 
 
-@click.group(context_settings={"auto_envvar_prefix": "MDR_DASK", "help_option_names": ["-h", "--help"]})
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mdr-dask")
 def cli() -> None:
     """Parameter studies for tribology with the method of dimensionality reduction.
 
     \b
+    mdr-dask init sliding_friction -o mine.yaml  a first campaign to edit
     mdr-dask check campaigns/quickstart.yaml     is the file right, and what will it cost?
     mdr-dask run campaigns/quickstart.yaml       run it, or what is missing of it
     mdr-dask show results/quickstart.zarr        look at results, while it runs too
     mdr-dask plot results/quickstart.zarr        draw the figures
 
-    Every option can also be set as an environment variable MDR_DASK_<COMMAND>_<OPTION>.
+    Completion in bash: eval "$(_MDR_DASK_COMPLETE=bash_source mdr-dask)"; in zsh and fish likewise.
     Exit codes: 0 all done, 1 ran but some cases failed, 2 refused, 3 the program broke, 130 interrupted.
     """
 
 
-for command in (models, check, run, status, show, aggregate, fit, plot, figures, master_curve, schema):
+for command in (
+    models,
+    init,
+    check,
+    run,
+    status,
+    show,
+    aggregate,
+    fit,
+    sensitivity,
+    plot,
+    figures,
+    master_curve,
+    schema,
+):
     cli.add_command(command)
 
 

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN, run
+from mdr_dask.cli.campaigns import CAMPAIGN
 from mdr_dask.cli.options import select_option, tell, units_option
 from mdr_dask.cli.results import list_names, require_known
+from mdr_dask.cli.running import run
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
 
 if TYPE_CHECKING:

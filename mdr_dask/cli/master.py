@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from mdr_dask.cli.options import select_option, series_option, tell
+from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table
-from mdr_dask.cli.results import Reading, csv_option, json_option
+from mdr_dask.cli.results import Reading
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 from mdr_dask.errors import DataError
 from mdr_dask.version import __version__
@@ -82,8 +82,8 @@ def master_curve(
     """
     require_suffix(keep, KEPT)
     require_suffix(figure, FIGURES)
-    from mdr_dask.fit.master_curve import master_curve as superpose
-    from mdr_dask.fit.master_curve import rereferenced
+    from mdr_dask.fits.master_curve import master_curve as superpose
+    from mdr_dask.fits.master_curve import rereferenced
 
     kept = _kept(source)
     if kept is None:
@@ -115,7 +115,7 @@ def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
-    from mdr_dask.fit.master_curve import friction_of_roughness, read_table
+    from mdr_dask.fits.master_curve import friction_of_roughness, read_table
     from mdr_dask.questions import selection
 
     path = Path("/dev/stdin" if source == "-" else source)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,61 +14,87 @@ import click
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
 
-#: Seconds between two plain lines.
-PAUSE = 5.0
+#: Seconds between two plain lines, and between two looks at the clock of a live one.
+PAUSE, LIVE_PAUSE = 5.0, 0.5
+
+Draw = Callable[["Progress | None", float], None]
 
 
 @contextmanager
 def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Yield the function that shows the progress it is called with."""
+    """Yield the function that takes the progress of a run; it is shown now and then, whether it is called or not."""
     if quiet:
         yield lambda _: None
     elif sys.stderr.isatty():
-        with _live() as show:
+        with _live() as draw, _beating(draw, LIVE_PAUSE) as show:
             yield show
     else:
-        yield _plain()
+        with _beating(_print_line, PAUSE) as show:
+            yield show
 
 
 @contextmanager
-def _live() -> Iterator[Callable[[Progress], None]]:
+def _beating(draw: Draw, pause: float) -> Iterator[Callable[[Progress], None]]:
+    """Draw the latest progress, and the time since the start, at every beat."""
+    started, ended = time.monotonic(), threading.Event()
+    latest: list[Progress] = []
+
+    def beat() -> None:
+        while not ended.wait(pause):
+            draw(latest[-1] if latest else None, time.monotonic() - started)
+
+    def show(progress: Progress) -> None:
+        latest[:] = [progress]
+
+    thread = threading.Thread(target=beat, daemon=True)
+    thread.start()
+    try:
+        yield show
+    finally:
+        ended.set()
+        thread.join()
+
+
+@contextmanager
+def _live() -> Iterator[Draw]:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
 
-    columns = (BarColumn(bar_width=30), TextColumn("{task.description}"))
+    columns = (BarColumn(bar_width=20), TextColumn("{task.description}"))
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=None)
+        task = bar.add_task(describe(None, 0.0), total=None)
 
-        def show(progress: Progress) -> None:
-            settled = progress.total - progress.to_do
-            bar.update(task, total=max(progress.total, 1), completed=settled, description=describe(progress))
+        def draw(progress: Progress | None, elapsed: float) -> None:
+            total = max(progress.total, 1) if progress else None
+            settled = progress.total - progress.to_do if progress else 0
+            bar.update(task, total=total, completed=settled, description=describe(progress, elapsed))
 
-        yield show
-
-
-def _plain() -> Callable[[Progress], None]:
-    last = time.monotonic()
-
-    def show(progress: Progress) -> None:
-        nonlocal last
-        if time.monotonic() - last >= PAUSE:
-            last = time.monotonic()
-            click.echo(describe(progress), err=True)
-
-    return show
+        yield draw
 
 
-def describe(progress: Progress) -> str:
-    """Return done, failed and open results, rate and time left in one line."""
+def _print_line(progress: Progress | None, elapsed: float) -> None:
+    click.echo(describe(progress, elapsed), err=True)
+
+
+def describe(progress: Progress | None, elapsed: float) -> str:
+    """Return share, time and time left of a run, and its results, in one line; what matters most comes first."""
+    if progress is None:
+        return f"preparing, {seconds(round(elapsed))}"
     settled = progress.total - progress.to_do
-    parts = [f"{settled} of {progress.total} results", f"{progress.failed} failed"]
-    fresh = progress.done + progress.failed
-    if fresh and progress.wall_seconds > 0:
-        rate = fresh / progress.wall_seconds
-        left = progress.seconds_left
-        parts += [f"{rate:.3g} a second", f"{seconds(progress.to_do / rate if left is None else left)} left"]
-    return ", ".join(parts)
+    parts = [f"{100 * settled // max(progress.total, 1)} %", seconds(round(elapsed))]
+    if _compiles():
+        parts.append("compiling ...")
+    elif progress.to_do and progress.seconds_left is not None:
+        parts.append(f"about {seconds(progress.seconds_left)} left")
+    return ", ".join([*parts, f"{settled} of {progress.total} results", f"{progress.failed} failed"])
+
+
+def _compiles() -> bool:
+    """Return whether kernels are compiled in this process now."""
+    from mdr_dask.compile_clock import compile_clock
+
+    return "numba" in sys.modules and compile_clock().is_running
 
 
 def seconds(duration: float) -> str:
@@ -75,6 +102,8 @@ def seconds(duration: float) -> str:
     if duration < 60:
         return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
     minutes, rest = divmod(round(duration), 60)
-    if minutes < 60:
+    if minutes < 10:
         return f"{minutes} min {rest} s"
+    if minutes < 60:
+        return f"{minutes} min"
     return f"{minutes // 60} h {minutes % 60} min"

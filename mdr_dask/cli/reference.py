@@ -22,8 +22,8 @@ def commands_page() -> str:
         arguments = [argument for argument in command.params if isinstance(argument, click.Argument)]
         usage = [f"[{a.name}]" if not a.required else str(a.name).upper() for a in arguments]
         parts += ["", f"Usage: `mdr-dask {' '.join([name, *usage, '[options]'])}`", ""]
-        parts += ["| option | environment | meaning |", "|---|---|---|"] if options else []
-        parts += [_row(name, option) for option in options]
+        parts += ["| option | meaning |", "|---|---|"] if options else []
+        parts += [_row(option) for option in options]
     return "\n".join(parts) + "\n"
 
 
@@ -37,12 +37,11 @@ def _text(help_text: str) -> list[str]:
     return lines[:-1]
 
 
-def _row(command: str, option: click.Option) -> str:
+def _row(option: click.Option) -> str:
     names = ", ".join(f"`{name}`" for name in option.opts)
     kind = "" if option.is_flag or option.flag_value is not None else f" {option.make_metavar(click.Context(cli))}"
-    variable = f"`MDR_DASK_{command.upper()}_{(option.name or '').upper()}`"
     meaning = (option.help or "").replace("|", "\\|")
-    return f"| {names}{kind} | {variable} | {meaning} |"
+    return f"| {names}{kind} | {meaning} |"
 
 
 if __name__ == "__main__":

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.options import select_option, series_option, tell, units_option
-from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_errors, with_intervals
-from mdr_dask.cli.writing import require_suffix, writing
+from mdr_dask.cli import watching
+from mdr_dask.cli.answers import check_target, print_answer, write_answer
+from mdr_dask.cli.options import (
+    csv_option,
+    json_option,
+    limit_option,
+    question_options,
+    series_option,
+    tell,
+)
+from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_intervals
+from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,31 +39,36 @@ class Reading(click.Command):
 STATISTICS = ("mean", "standard_deviation", "standard_error", "grid_error", "quantile", "interval", "count")
 
 store_argument = click.argument("store")
-json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
-csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
-limit_option = click.option(
-    "--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most rows of a table; 0 for all."
-)
 
 
 @click.command(cls=Reading)
 @store_argument
 @click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
 @click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
+@click.option("--watch", is_flag=True, help="Show it again and again, until nobody is at work any more.")
 @json_option
-def status(store: str, failures: bool, messages: bool, form: str | None) -> None:
-    """Show the progress of a store, during a run too.
+def status(store: str, failures: bool, messages: bool, watch: bool, form: str | None) -> None:
+    """Show the progress of a store, during a run too, and who is at work on it.
 
     \b
     mdr-dask status results/quickstart.zarr
+    mdr-dask status results/quickstart.zarr --watch
     mdr-dask status results/quickstart.zarr --failures
     """
     from mdr_dask import store as room
 
-    groups = room.datasets(store)
-    if not (failures or messages):
-        print_rows([_count(name, dataset) for name, dataset in groups.items()], {}, form or "table")
+    def count() -> list[dict[str, Any]]:
+        return [_count(name, dataset) for name, dataset in room.datasets(store).items()]
+
+    if watch:
+        if failures or messages or form:
+            raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
+        watching.watch(store, count)
         return
+    if not (failures or messages):
+        _print_counts(count(), watching.at_work(store), form)
+        return
+    groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
     if not messages:
         found = [message for message in found if message["status"] != "done"]
@@ -69,6 +82,15 @@ def status(store: str, failures: bool, messages: bool, form: str | None) -> None
         click.echo(printable(f"    {_shared(alike)}"))
     if not found:
         click.echo("no failures" if not messages else "no messages")
+
+
+def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | None) -> None:
+    if form == "json":
+        print_json({"units": {}, "rows": rows, "at_work": at_work})
+        return
+    print_rows(rows, {}, "table")
+    if at_work:
+        click.echo(f"at work: {', '.join(at_work)}")
 
 
 def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:
@@ -111,97 +133,80 @@ def _brief(value: Any) -> str:
 @click.command(cls=Reading)
 @store_argument
 @click.argument("outputs", nargs=-1)
-@series_option
-@select_option
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Over realisations; repeat.")
 @click.option("--realisations", "raw", is_flag=True, help="Show every realisation, not a statistic.")
-@units_option
-@limit_option
-@json_option
-@csv_option
-def show(
-    store: str,
-    outputs: tuple[str, ...],
-    series: str | None,
-    selections: tuple[str, ...],
-    statistic: tuple[str, ...],
-    raw: bool,
-    units: dict[str, str],
-    limit: int,
-    form: str | None,
-) -> None:
+@question_options
+def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
     A mean stands with the standard error of the realisations and, behind a second +-, with the discretisation error.
+    `status` says what became of the realisations: done, or how many of them are missing, failed or not_converged.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
     mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s..1 m/s' --units velocity=km/h --csv
+    mdr-dask show results/quickstart.zarr --where 'friction_coefficient > 0.01 and velocity < 3 km/h' --sort -velocity
+    mdr-dask show results/quickstart.zarr --columns load_number,velocity_number,scaled_friction -o numbers.parquet
     """
-    from mdr_dask import store as room
-    from mdr_dask.aggregation import aggregate as reduce
-    from mdr_dask.questions import selection
-    from mdr_dask.questions.units import in_units
-
-    dataset = selection.group(room.datasets(store), series)
-    wanted = selection.select(selection.outputs(dataset, outputs), selections, tell)
-    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error", "grid_error"))
-    shown = in_units(shown, units)
-    rows, of_columns = table(shown)
-    if not (raw or statistic or form):
-        rows, of_columns = with_errors(rows, of_columns)
-    print_rows(rows, of_columns, form or "table", limit)
+    statistics = None if raw else statistic or ("mean", "standard_error", "grid_error")
+    _answer(store, outputs, statistics, join=not (raw or statistic), **asked)
 
 
 @click.command(cls=Reading)
 @store_argument
-@series_option
+@click.argument("outputs", nargs=-1)
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these; repeat.")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write to FILE.zarr, FILE.nc or FILE.csv.")
-@limit_option
-@json_option
-@csv_option
-def aggregate(
-    store: str, series: str | None, statistic: tuple[str, ...], output: Path | None, limit: int, form: str | None
-) -> None:
-    """Reduce every output over its realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+@question_options
+def aggregate(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], **asked: Any) -> None:
+    """Reduce outputs over realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+
+    Without --statistic, a table for reading has mean, interval and scatter; all other forms have all of them.
 
     \b
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
+    mdr-dask aggregate results/quickstart.zarr friction_coefficient --group-by normal_force
     """
+    brief = ("mean", "standard_deviation", "interval")
+    wanted = statistic or (STATISTICS if asked["form"] or asked["output"] else brief)
+    _answer(store, outputs, wanted, join=not statistic, **asked)
+
+
+def _answer(
+    store: str,
+    outputs: tuple[str, ...],
+    statistics: tuple[str, ...] | None,
+    join: bool,
+    *,
+    series: str | None,
+    form: str | None,
+    output: Path | None,
+    limit: int,
+    **parts: Any,
+) -> None:
+    """Print or write the answer to a question."""
     from mdr_dask import store as room
-    from mdr_dask.aggregation import aggregate as reduce
     from mdr_dask.questions import selection
+    from mdr_dask.questions.labelled import labelled
+    from mdr_dask.questions.table import Question, table
 
     if output is not None:
-        _check_target(output)
-    reduced = reduce(selection.group(room.datasets(store), series), statistic or STATISTICS)
+        if form:
+            raise click.UsageError(f"expected one of --{form} and --output, got both")
+        check_target(output)
+    question = Question(outputs, statistics=statistics, **parts)
+    dataset = selection.group(room.datasets(store), series)
     if output is None:
-        rows, units = table(reduced)
-        print_rows(rows, units, form or "table", limit)
+        print_answer(table(dataset, question, 0 if form else limit, tell), form or "table", limit, join)
         return
-    with writing(output):
-        _write(reduced, output)
-    click.echo(f"{output}: {len(reduced.data_vars)} variables over {dict(reduced.sizes)}")
-
-
-def _check_target(path: Path) -> None:
-    from mdr_dask.store import is_study
-
-    require_suffix(path, (".zarr", ".nc", ".csv"))
-    if path.suffix == ".zarr" and is_study(str(path)):
-        raise click.UsageError(f"expected a place for the statistics, got the store of a study: {str(path)!r}")
-
-
-def _write(dataset: xr.Dataset, path: Path) -> None:
-    from mdr_dask.store import save
-
-    if path.suffix == ".csv":
-        rows, units = table(dataset)
-        with path.open("w") as stream, contextlib.redirect_stdout(stream):
-            print_rows(rows, units, "csv")
-    else:
-        save(dataset, path)
+    if output.suffix in (".nc", ".zarr"):
+        found = labelled(dataset, question, tell)
+        with writing(output):
+            room.save(found, output)
+        click.echo(f"{output}: {len(found.data_vars)} variables over {dict(found.sizes)}")
+        return
+    answer = table(dataset, question, 0, tell)
+    rows = write_answer(answer, output)
+    click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
 
 
 @click.command(cls=Reading)
@@ -218,7 +223,7 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     mdr-dask fit results/friction_force.zarr
     mdr-dask fit results/friction_force.zarr zone_one --json
     """
-    from mdr_dask import fit as room
+    from mdr_dask import fits as room
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 

@@ -1,7 +1,9 @@
 """Plan and store through Dask: resume, retries, failures, progress. The only room that knows Dask."""
 
-from mdr_dask.execute.executors import Resources
+from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.rounds import outlook, run
+from mdr_dask.store import Part
 
-__all__ = ["Progress", "Resources", "outlook", "run"]
+__all__ = ["Event", "Part", "Progress", "Resources", "Tell", "outlook", "run"]

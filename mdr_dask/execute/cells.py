@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import uuid
+import itertools
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import store
+from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex, Template
-from mdr_dask.store import Place
+from mdr_dask.store import Part, Place
 from mdr_dask.task import Work, versions
 
 
@@ -53,22 +54,40 @@ def find_cells(
     needed: NDArray[np.bool_],
     realisations: tuple[int, int],
     retry_failed: bool,
+    own: NDArray[np.bool_] | None = None,
 ) -> Cells:
-    """Compare a round with the ledger: its cases `asked` for, those of them still `needed`, and its realisations."""
+    """Compare a round with the ledger: its cases `asked` for, those of them still `needed`, and its realisations.
+
+    Of all that, only the `own` results of a part, if it is one.
+    """
     status = store.ledger(url, template.series.name, template.shape)
     open_states = [Status.MISSING, Status.NOT_NEEDED]
     if retry_failed:
         open_states += [Status.FAILED, Status.NOT_CONVERGED]
     in_round = np.zeros(status.shape, dtype=bool)
     in_round[..., slice(*realisations)] = asked[..., None]
+    if own is not None:
+        in_round &= own
     wanted = in_round & needed[..., None] & np.isin(status, open_states)
     spared = in_round & ~wanted & (status == Status.MISSING)
     return Cells(template, wanted, spared, int(np.count_nonzero(in_round & ~wanted & ~spared)))
 
 
+def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]]:
+    """Yield, group by group, the number of the part of so many that each result belongs to: one part to a block."""
+    position = itertools.count()
+    for template in layout:
+        numbers = np.zeros(template.shape, dtype=np.int32)
+        for index in template.block_indices():
+            numbers[template.region(index)] = Part.of(next(position), count).number
+        yield numbers
+
+
 def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
-    laid_out = uuid.uuid4().hex
+    place, laid_out = store.absolute(url), store.layout_mark(url)
+    if laid_out is None:
+        raise StoreError(f"{url}: gone since it was laid out")
     for cells in groups:
         template = cells.template
         attempts = store.attempts(url, template.series.name)
@@ -77,7 +96,7 @@ def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
                 yield Work(
-                    place=Place(url, template.series.name, index, region, laid_out),
+                    place=Place(place, template.series.name, index, region, laid_out),
                     model=template.campaign.model,
                     versions=versions(template.campaign.model),
                     block=template.block(index),

@@ -20,8 +20,9 @@ class Progress:
         Blocks run and solutions really computed in this run.
     estimated, finished : float
         Seconds of work by the model's estimate: that of all rounds so far, and that of the blocks run.
-    compute_seconds, write_seconds, wall_seconds : float
-        Time in models and in writing, summed over threads, and time since the start.
+    compute_seconds, compile_seconds, write_seconds, wall_seconds : float
+        Time in models, the part of it in which kernels were compiled, and time in writing, each summed over threads,
+        and time since the start.
     """
 
     total: int = 0
@@ -34,6 +35,7 @@ class Progress:
     estimated: float = 0.0
     finished: float = 0.0
     compute_seconds: float = 0.0
+    compile_seconds: float = 0.0
     write_seconds: float = 0.0
     wall_seconds: float = 0.0
 
@@ -44,10 +46,16 @@ class Progress:
 
     @property
     def seconds_left(self) -> float | None:
-        """Time until the end of this round at the pace so far, each block weighted by its estimate; None before any."""
-        if not self.finished > 0:
+        """Time until the end of this round, each block weighted by its estimate; None before any has ended.
+
+        At the pace of the blocks so far, compiling left out, with as many at work side by side as there were.
+        """
+        busy = self.compute_seconds + self.write_seconds
+        if not (self.finished > 0 and busy > 0 and self.wall_seconds > 0):
             return None
-        return self.wall_seconds * max(self.estimated / self.finished - 1, 0.0)
+        pace = max(busy - self.compile_seconds, 0.0) / self.finished
+        side_by_side = max(busy / self.wall_seconds, 1.0)
+        return pace * max(self.estimated - self.finished, 0.0) / side_by_side
 
     def after(self, outcome: Outcome, wall_seconds: float) -> Progress:
         """Return the state after one more block, so many seconds after the start."""
@@ -61,6 +69,7 @@ class Progress:
             solves=self.solves + outcome.solves,
             finished=self.finished + outcome.estimate,
             compute_seconds=self.compute_seconds + outcome.compute_seconds,
+            compile_seconds=self.compile_seconds + min(outcome.compile_seconds, outcome.compute_seconds),
             write_seconds=self.write_seconds + outcome.write_seconds,
             wall_seconds=wall_seconds,
         )

@@ -4,19 +4,50 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import store
 from mdr_dask.campaign import Campaign
-from mdr_dask.execute.cells import Cells, find_cells, tasks
-from mdr_dask.execute.executors import Execute, Resources, executor
+from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
+from mdr_dask.execute.events import Event, Tell, ended
+from mdr_dask.execute.executors import Execute, executor
 from mdr_dask.execute.progress import Progress
+from mdr_dask.execute.resources import Resources
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
-from mdr_dask.task import Outcome
+from mdr_dask.store import Part
+from mdr_dask.task import Outcome, Work
+
+Masks = list[NDArray[np.bool_]]
+#: Seconds between two looks at what other parts have still to do.
+LOOK = 1.0
+#: Seconds between two words about it.
+PAUSE = 4.0
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What is to be run, and who is told."""
+
+    campaign: Campaign
+    url: str
+    part: Part | None
+    retry_failed: bool
+    report: Callable[[Progress], None]
+    tell: Tell
+
+
+@dataclass(frozen=True)
+class _Round:
+    """One round: the shape of the store, its cases and those of them still needed, the realisations (from, to)."""
+
+    layout: tuple[Template, ...]
+    asked: Masks
+    needed: Masks
+    realisations: tuple[int, int]
 
 
 def run(
@@ -25,6 +56,8 @@ def run(
     resources: Resources,
     report: Callable[[Progress], None],
     retry_failed: bool = False,
+    part: Part | None = None,
+    tell: Tell = lambda _: None,
 ) -> Progress:
     """Run a campaign into a store: everything, or what is missing.
 
@@ -40,11 +73,15 @@ def run(
         Called with the progress after every block.
     retry_failed : bool
         Compute the cases again that failed or did not converge.
+    part : Part, optional
+        Only these blocks of it, while other parts run beside.
+    tell : callable
+        Called with every `Event`, from any thread.
 
     Returns
     -------
     Progress
-        The state at the end.
+        The state at the end, of the part if it is one.
 
     Raises
     ------
@@ -54,13 +91,14 @@ def run(
         If another runner is at work on it.
     CampaignError
         If the campaign is too large to be run.
+    ClusterError
+        If a cluster cannot be started, goes away, or has no worker for too long.
     """
     _plan(campaign, url)  # what is refused leaves no lock behind
-    with store.lock(url):
-        layout, asked = _plan(campaign, url)
-        store.sweep(url)
-        with executor(resources) as execute:
-            return _run_rounds(url, layout, asked, execute, report, retry_failed)
+    with store.alone(url) if part is None else store.beside(url, part):
+        job = _Job(campaign, url, part, retry_failed, report, tell)
+        with executor(resources, tell) as execute:
+            return _run_rounds(job, execute)
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
@@ -90,42 +128,87 @@ def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDAr
     return layout, asked
 
 
-def _run_rounds(
-    url: str,
-    layout: tuple[Template, ...],
-    asked: list[NDArray[np.bool_]],
-    execute: Execute,
-    report: Callable[[Progress], None],
-    retry_failed: bool,
-) -> Progress:
+def _run_rounds(job: _Job, execute: Execute) -> Progress:
     """Run round after round, each over the cases that the one before left too uncertain."""
-    campaign = layout[0].campaign
     start = time.monotonic()
     progress = Progress()
-    needed = asked
-    before = 0
+    current: _Round | None = None
 
-    def account(outcome: Outcome) -> None:
+    def settle(work: Work, outcome: Outcome) -> None:
         nonlocal progress
         progress = progress.after(outcome, time.monotonic() - start)
-        report(progress)
+        job.tell(ended(work, outcome))
+        job.report(progress)
 
-    for count in rounds(campaign.replication):
-        if before:
-            needed = [mask & _still_wide(url, t, before) for mask, t in zip(needed, layout, strict=True)]
-            if not any(mask.any() for mask in needed):
-                break
-            layout = _grow(layout, count)
-        store.lay_out(url, layout)
-        groups = [
-            find_cells(url, template, asked_here, needed_here, (before, count), retry_failed)
-            for template, asked_here, needed_here in zip(layout, asked, needed, strict=True)
-        ]
+    for count in rounds(job.campaign.replication):
+        current = _lay_out(job, current, count)
+        if not any(mask.any() for mask in current.needed):
+            break
+        groups = _find(job, current)
         progress = _begin_round(progress, groups)
-        report(progress)
-        execute(tasks(url, groups), account)
-        before = count
+        job.report(progress)
+        execute(tasks(job.url, groups), settle)
+        job.tell(Event("round ended", {"realisations": count, "done": progress.done, "failed": progress.failed}))
+        if job.part and count < job.campaign.replication.at_most and not _others_are_done(job, job.part, current):
+            break
     return replace(progress, wall_seconds=time.monotonic() - start)
+
+
+def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
+    """Lay the next round out, if any case takes part in it, while no other part does."""
+    with store.entrance(job.url):
+        layout, asked = _plan(job.campaign, job.url)
+        before = last.realisations[1] if last else 0
+        needed = asked
+        if last:
+            needed = [mask & _still_wide(job.url, t, before) for mask, t in zip(last.needed, layout, strict=True)]
+        if any(mask.any() for mask in needed):
+            job.tell(Event("laying out", {"realisations": count}))
+            layout = _grow(layout, count)
+            store.lay_out(job.url, layout)
+            blocks = {template.series.name or "-": list(template.grid) for template in layout}
+            job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
+    return _Round(layout, asked, needed, (before, count))
+
+
+def _find(job: _Job, current: _Round) -> list[Cells]:
+    own: list[NDArray[np.bool_] | None] = [None] * len(current.layout)
+    if job.part:
+        own = [numbers == job.part.number for numbers in owners(current.layout, job.part.count)]
+    return [
+        find_cells(job.url, template, asked, needed, current.realisations, job.retry_failed, own_here)
+        for template, asked, needed, own_here in zip(current.layout, current.asked, current.needed, own, strict=True)
+    ]
+
+
+def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:
+    """Wait until the other parts have done their share of a round; not for one that nobody is at work on."""
+    what = f"the round of {current.realisations[1]} realisations needs results of parts"
+    told = time.monotonic()
+    while True:
+        here = {other.number for other in store.at_work(job.url)[1]}
+        late = _late(job, part, current)
+        if not late:
+            return True
+        if late - here:
+            sentence = f"{what} that are not at work: {_parts(late - here, part)}; start them, then this one again"
+            job.tell(Event("round unfinished", {"parts": sorted(late - here)}, sentence))
+            return False
+        if time.monotonic() - told > PAUSE:
+            told = time.monotonic()
+            job.tell(Event("waiting for parts", {"parts": sorted(late)}, f"{what} {_parts(late, part)}: waiting"))
+        time.sleep(LOOK)
+
+
+def _late(job: _Job, part: Part, current: _Round) -> set[int]:
+    """Return the numbers of the parts that a round still needs results of."""
+    groups = _find(replace(job, part=None, retry_failed=False), current)
+    numbers = owners(current.layout, part.count)
+    return {int(n) for cells, owner in zip(groups, numbers, strict=True) for n in owner[cells.wanted | cells.spared]}
+
+
+def _parts(numbers: set[int], part: Part) -> str:
+    return ", ".join(str(Part(number, part.count)) for number in sorted(numbers))
 
 
 def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ...]:

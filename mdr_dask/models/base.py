@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import reduce
+from functools import lru_cache, reduce
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
+from mdr_dask.tables import described
 
 
 class Status(IntEnum):
@@ -29,21 +31,64 @@ class Status(IntEnum):
     NOT_NEEDED = 4
 
 
+Ways = tuple[tuple[str, ...], ...]
+_WHOLE = re.compile(r"[+-]?\d{1,18}")
+
+
 class Parameters(BaseModel):
     """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
 
-    `gone` has the parameters and outputs that there once were, and what to write instead of each.
+    `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
+    parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
+    ones inside structures, that are given together.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
     gone: ClassVar[Mapping[str, str]] = {}
+    ways: ClassVar[tuple[Ways, ...]] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_numbers_in_quotes(cls, data: Any) -> Any:
+        """Read a whole number in quotes as the number, for a number with a unit is a string too."""
+        if not isinstance(data, dict):
+            return data
+        quoted = {
+            key: int(data[key])
+            for key in data.keys() & _whole_fields(cls)
+            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
+        }
+        return {**data, **quoted} if quoted else data
+
+    def require_one_way(self) -> None:
+        """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
+        for ways in self.ways:
+            given = {name for way in ways for name in way if getattr(self, name) is not None}
+            if not any(given == set(way) for way in ways):
+                raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+
+
+@lru_cache(maxsize=256)
+def _whole_fields(kind: type[BaseModel]) -> frozenset[str]:
+    """Return the fields of a parameter set that may hold a whole number."""
+    return frozenset(name for name, info in kind.model_fields.items() if _may_be_whole(info.annotation))
+
+
+def _may_be_whole(annotation: Any) -> bool:
+    return annotation is int or any(map(_may_be_whole, get_args(annotation)))
+
+
+def said(ways: Ways) -> str:
+    """Return the ways to give one thing in words: ``length with rms_roughness, or profile``."""
+    told = [f"{way[0]} with {', '.join(way[1:])}" if len(way) > 1 else way[0] for way in ways]
+    return ", or ".join(told)
 
 
 def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-def quantity(unit: str, description: str, **bounds: Any) -> Any:
+def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
     """Declare a physical parameter.
 
     Parameters
@@ -52,6 +97,9 @@ def quantity(unit: str, description: str, **bounds: Any) -> Any:
         The coherent SI unit in which the value is held, ``"1"`` for a pure number.
     description : str
         One line that tells a user what it is.
+    usual : str
+        A common value with its unit, ``"10 MPa"``: what ``mdr-dask init`` writes. A bare number that lies more than
+        three decades off is asked about.
     **bounds
         ``default``, ``gt``, ``ge``, ``lt``, ``le`` and whatever else :func:`pydantic.Field` takes.
 
@@ -70,7 +118,8 @@ def quantity(unit: str, description: str, **bounds: Any) -> Any:
             return tuple(convert(item, unit) if _looks_numeric(item) else item for item in value)
         return convert(value, unit) if _looks_numeric(value) else value
 
-    field = Field(description=description, json_schema_extra={"unit": unit}, **bounds)
+    examples = [usual] if usual else None
+    field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
     return field
 
@@ -106,6 +155,30 @@ class DataFile(BaseModel):
             raise DataError(
                 f"{self.path}: expected text in UTF-8, got byte {content[error.start]:#x} at {error.start}"
             ) from None
+
+    def notes(self) -> tuple[str, ...]:
+        """Return columns and ranges of a table, as it has them; nothing of any other file."""
+        return _notes_of_file(self)
+
+
+@lru_cache(maxsize=64)
+def _notes_of_file(file: DataFile) -> tuple[str, ...]:
+    try:
+        return (f"table {file.name}: {described(file.read_text(), file.name)}",)
+    except DataError:
+        return ()
+
+
+def notes_of(parameters: Any) -> tuple[str, ...]:
+    """Return what a parameter set and the parts in it tell of themselves: tables, measured lines, fits."""
+    told: tuple[str, ...] = ()
+    if isinstance(parameters, list | tuple):
+        return tuple(note for part in parameters for note in notes_of(part))
+    if isinstance(parameters, BaseModel):
+        told = tuple(note for name in type(parameters).model_fields for note in notes_of(getattr(parameters, name)))
+        own = getattr(type(parameters), "notes", None)
+        told += own(parameters) if callable(own) else ()
+    return told
 
 
 def _find_file(value: Any, info: ValidationInfo) -> Any:
@@ -178,6 +251,24 @@ class Output:
         """The companion ``<name>_error``: the estimated absolute discretisation error, in the unit of the output."""
         meaning = f"estimated absolute discretisation error, {self.long_name}"
         return Output(f"{self.name}_error", self.unit, meaning, self.dims, self.default)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A dimensionless number that a user can ask for beside the outputs of a model.
+
+    Parameters
+    ----------
+    name, meaning : str
+        As in conditions and tables; the meaning in one line.
+    formula : str
+        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
+        `mdr_dask.questions.expression` reads it.
+    """
+
+    name: str
+    formula: str
+    meaning: str
 
 
 @dataclass(frozen=True)
@@ -306,8 +397,13 @@ class Model(Generic[P]):
         Units of outputs and parameters that differ from the declared ones, as in a campaign of dimensionless numbers.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, beyond its outputs.
-    notes : callable, Parameters -> tuple of str
-        What a user should know of a parameter set before it is run, such as how well a fit to their data holds.
+    notes : callable, sequence of Parameters -> tuple of str
+        What a user should know of a study before it is run, from its parameter sets with one axis varied at a time.
+        What one part of a parameter set has to say by itself is told by its method `notes`.
+    compiling : float
+        Seconds that its kernels take to compile, the first time on a machine.
+    numbers : tuple of Number
+        Dimensionless numbers of its cases.
     """
 
     name: str
@@ -322,7 +418,9 @@ class Model(Generic[P]):
     distinct: Callable[[Block[P]], int] | None = None
     memory: Callable[[Block[P]], float] = lambda _: 0.0
     units: Callable[[P], dict[str, str]] = lambda _: {}
-    notes: Callable[[P], tuple[str, ...]] = lambda _: ()
+    notes: Callable[[Sequence[P]], tuple[str, ...]] = lambda _: ()
+    compiling: float = 0.0
+    numbers: tuple[Number, ...] = ()
 
     @property
     def companions(self) -> dict[str, Output]:

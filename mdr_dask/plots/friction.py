@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
+from mdr_dask.fits.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mdr_dask.fit.base import Fit
+    from mdr_dask.fits.base import Fit
 
 MODELS = ("sliding_friction",)
 MU = "friction_coefficient"

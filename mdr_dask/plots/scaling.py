@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.friction import numbers, spectral_slope
+from mdr_dask.fits.friction import numbers, spectral_slope
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
@@ -104,7 +104,7 @@ def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def _said(name: str, constant: str, what: str, found: Mapping[str, xr.Dataset]) -> str:
     """Return the range of a constant of the fit of the same name, and where its law holds; nothing without a fit."""
-    from mdr_dask.fit import available
+    from mdr_dask.fits import available
 
     try:
         known = {key: data for key, data in found.items() if has_hurst(data)}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,9 +14,10 @@ import numpy as np
 import zarr
 from numpy.typing import NDArray
 
+from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import bytes_of, group_name, guarded, names, read_json, write_bytes
+from mdr_dask.store.files import bytes_of, group_name, guarded, names, read_bytes, read_json, write_bytes
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,8 @@ class Place:
     region : tuple of slice
         The block's place over (axes..., realisation).
     layout : str
-        Differs whenever the store may have been laid out anew, so that nobody writes into a shape of yesterday.
+        The `layout_mark` of the store that the driver sees, so that nobody writes into another one, or into a shape of
+        yesterday.
     """
 
     url: str
@@ -65,9 +69,16 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 def write_record(place: Place, attempt: int, record: Mapping[str, Any]) -> None:
     """Write what a block has to tell besides its numbers: times, versions, messages."""
-    name = ".".join(map(str, place.index))
-    text = json.dumps(record, sort_keys=True)
-    write_bytes(place.url, f"{_records(place.series)}{name}-{attempt}.json", text.encode())
+    write_bytes(place.url, _record_name(place, attempt), json.dumps(record, sort_keys=True).encode())
+
+
+def record(place: Place, attempt: int) -> dict[str, Any] | None:
+    """Return what an attempt at a block had to tell, None if it never came so far."""
+    return read_json(place.url, _record_name(place, attempt))
+
+
+def _record_name(place: Place, attempt: int) -> str:
+    return f"{_records(place.series)}{'.'.join(map(str, place.index))}-{attempt}.json"
 
 
 def records(url: str, series: str) -> Iterator[dict[str, Any]]:
@@ -116,6 +127,22 @@ def _open(url: str, series: str) -> Any:
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Hold the arrays of a group open for as long as its layout stands."""
+    seen = layout_mark(url)
+    if seen != layout:
+        raise StoreError(f"{url}: {_other_store(seen)}")
     with guarded(url, "opening it"):
         group = zarr.open_group(bytes_of(url), path=group_name(series) or None, mode="r+", use_consolidated=True)
         return dict(group.arrays())
+
+
+def _other_store(seen: str | None) -> str:
+    here = platform.node()
+    if seen is None:
+        return f"not seen from {here}; the workers need a shared file system or a URL"
+    return f"{here} sees another store of that name, or a later shape; the workers need a shared file system or a URL"
+
+
+def layout_mark(url: str) -> str | None:
+    """Return what tells a layout of a store from every other one; None where there is no store."""
+    document = read_bytes(url, "zarr.json")
+    return None if document is None else hashlib.blake2b(document, digest_size=16).hexdigest()

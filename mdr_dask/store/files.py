@@ -42,6 +42,12 @@ def bytes_of(url: str) -> Any:
         raise StoreError(f"{url}: expected a path, or a URL that fsspec can open: {error}") from None
 
 
+def absolute(url: str) -> str:
+    """Return the same place for a process in another folder."""
+    path = local(url)
+    return url if path is None else str(path.absolute())
+
+
 @contextmanager
 def guarded(url: str, doing: str) -> Iterator[None]:
     """Turn what the file system or the network has to complain about into one sentence."""
@@ -56,15 +62,20 @@ def guarded(url: str, doing: str) -> Iterator[None]:
         raise StoreError(f"{url}: {doing} failed: {why}") from None
 
 
-def read_json(url: str, name: str) -> dict[str, Any] | None:
-    """Return a JSON document, or None if there is none of that name."""
+def read_bytes(url: str, name: str) -> bytes | None:
+    """Return what stands under a name, or None if nothing does."""
     path = local(url)
     with guarded(url, f"reading {name}"):
         if path is None:
             found = sync(bytes_of(url).get(name, default_buffer_prototype()))
-            content = None if found is None else found.to_bytes()
-        else:
-            content = (path / name).read_bytes() if (path / name).is_file() else None
+            return None if found is None else bytes(found.to_bytes())
+        return (path / name).read_bytes() if (path / name).is_file() else None
+
+
+def read_json(url: str, name: str) -> dict[str, Any] | None:
+    """Return a JSON document, or None if there is none of that name."""
+    content = read_bytes(url, name)
+    with guarded(url, f"reading {name}"):
         return None if content is None else json.loads(content)
 
 
@@ -181,47 +192,62 @@ def group_name(series: str, member: str = "") -> str:
 
 
 @contextmanager
-def lock(url: str) -> Iterator[None]:
-    """Hold a study for one runner; the operating system lets go of it however the runner ends.
+def lock(url: str, name: str = "") -> Iterator[None]:
+    """Hold a lock beside a study; the operating system lets go of it however its holder ends.
 
     Parameters
     ----------
     url : str
         Path of the store. A store at a URL has no lock: do not start two runners on it.
+    name : str
+        Which of its locks; that of a runner alone has no name.
 
     Raises
     ------
     StoreBusyError
-        If another runner holds it; the message names that runner.
+        If another process holds it; the message names that process.
     StoreError
         If nothing can be written there.
     """
-    path = local(url)
-    if path is None:
+    if local(url) is None:
         yield
         return
     from filelock import FileLock, Timeout
 
-    try:
-        path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
-        raise StoreError(f"{url}: expected a path: {error}") from None
-    holder = path.with_name(f".{path.name}.runner")
-    file = path.with_name(f".{path.name}.lock")
+    file = lock_file(url, name)
     guard = FileLock(file, timeout=0)
     with guarded(url, "making it"):
-        if not path.parent.exists():
-            path.parent.mkdir(parents=True, exist_ok=True)
+        if not file.parent.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()  # where this fails, the lock would say that somebody else holds it
         try:
             guard.acquire()
         except Timeout:
-            who = holder.read_text() if holder.exists() else "another process"
-            raise StoreBusyError(f"{url}: {who} is running on this store; wait for it, or stop it") from None
+            raise StoreBusyError(f"{url}: {holder(file)} is running on this store; wait for it, or stop it") from None
     try:
         with guarded(url, "making it"):
-            holder.write_text(f"process {os.getpid()} on {platform.node()}")
+            _holder_file(file).write_text(f"process {os.getpid()} on {platform.node()}")
         yield
     finally:
-        holder.unlink(missing_ok=True)
+        _holder_file(file).unlink(missing_ok=True)
         guard.release()
+
+
+def lock_file(url: str, name: str = "") -> Path:
+    """Return the file of a lock beside a store on this machine."""
+    path = Path(url.removeprefix("file://"))
+    try:
+        path = path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
+        raise StoreError(f"{url}: expected a path: {error}") from None
+    return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
+
+
+def holder(file: Path) -> str:
+    """Return who holds a lock that is held."""
+    told = _holder_file(file)
+    return told.read_text() if told.exists() else "another process"
+
+
+def _holder_file(file: Path) -> Path:
+    return file.with_suffix(".runner")

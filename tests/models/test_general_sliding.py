@@ -5,7 +5,6 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.material import Material
-from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 
 ALL = MODEL.with_companions([output.name for output in MODEL.outputs])
@@ -82,9 +81,9 @@ def test_measured_line_is_the_generated_line_it_was_written_from(tmp_path):
     height = 5e-7 * roughness.line(roughness.amplitudes(100, 0.7), phase, 400)
     rows = "\n".join(f"{i * 0.02 / 400:.17g},{z:.17g}" for i, z in enumerate(height))
     (tmp_path / "line.csv").write_text("x,z\nm,m\n" + rows)
-    profile = ProfileFile.model_validate(str(tmp_path / "line.csv"))
+    surface = {"profile": str(tmp_path / "line.csv")}
     columns = {"velocity": [0.01, 0.1]}
-    measured = MODEL.compute(block(LOAD | KELVIN | {"profile": profile}, columns, accuracy=1e-3))
+    measured = MODEL.compute(block(LOAD | KELVIN | {"surface": surface}, columns, accuracy=1e-3))
     generated = MODEL.compute(block(LINE | LOAD | KELVIN, columns, accuracy=1e-3))
     assert measured.solves == 2  # every realisation is the same line
     for name, tolerance in (("friction_coefficient", 5e-3), ("rms_slope", 1e-9)):
@@ -108,7 +107,7 @@ def test_one_body_and_one_line():
         SlidingFriction.model_validate(LINE | LOAD | KELVIN | {"material": {"kelvin": KELVIN}})
     with pytest.raises(ValidationError, match="expected shear_modulus with relaxation_time, or material"):
         SlidingFriction.model_validate(LINE | LOAD | {"shear_modulus": 1e6})
-    with pytest.raises(ValidationError, match="expected length with rms_roughness, or profile"):
+    with pytest.raises(ValidationError, match="expected length with rms_roughness, or length with surface"):
         SlidingFriction.model_validate(LOAD | KELVIN | {"length": 0.02})
 
 

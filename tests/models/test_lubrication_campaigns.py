@@ -35,8 +35,8 @@ parameters:
 outputs: [central_film, central_film_thickness, pressure, traction_coefficient]
 """
 PROFILES = """\
-  profile_1: {file: one.csv, unit: um}
-  profile_2: {file: two.csv, unit: um}
+  surface_1: {profile: {file: one.csv, unit: um}}
+  surface_2: {profile: {file: two.csv, unit: um}}
 """
 
 
@@ -96,8 +96,8 @@ def profile(name: str, spacing: float, seed: int, size: int = 4000) -> None:
             PROFILES,
             "expected profiles of the same spacing, got 1e-06 m and 2e-06 m",
         ),
-        (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.splitlines(True)[0], "the profiles of both rollers or of none"),
-        (MIXED, "  rms_roughness: 0.2 um\n", "", "expected rms_roughness, or the measured profiles of both rollers"),
+        (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.splitlines(True)[0], "the surfaces of both rollers or of none"),
+        (MIXED, "  rms_roughness: 0.2 um\n", "", "expected rms_roughness, or surface_1 and surface_2"),
         (MIXED, "  rms_roughness: 0.2 um\n", PROFILES.replace("two.csv", "no.csv"), "no.csv"),
         (LINE, "mean_velocity: 1 m/s", "mean_velocity: 0 m/s", "0 m/s"),
         (LINE, "  radius: 20 mm\n", "", "line_load needs radius"),

@@ -6,6 +6,8 @@ from pydantic import ValidationError
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.parts.material import Material, fit_error, fit_notes, solid_of
+from mdr_dask.models.parts.sliding_body import frequency_notes
+from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.solids import complex_modulus
 
 TABLE = "tests/data/dma/freq_user_raw.csv"
@@ -44,13 +46,13 @@ def test_one_kind_and_one_law_only():
         material()
     with pytest.raises(ValidationError, match="got kelvin, standard_solid"):
         material(kelvin=kelvin, standard_solid=solid)
-    with pytest.raises(ValidationError, match="a temperature needs wlf or arrhenius"):
+    with pytest.raises(ValidationError, match="a temperature needs one of wlf, arrhenius, shift_factors"):
         material(kelvin=kelvin, temperature=300.0)
     laws = {
         "wlf": {"c1": 17.4, "c2": 51.6, "reference": 300.0},
         "arrhenius": {"activation_energy": 1e5, "reference": 300.0},
     }
-    with pytest.raises(ValidationError, match="expected wlf or arrhenius, got both"):
+    with pytest.raises(ValidationError, match="expected one of wlf, arrhenius, shift_factors, got wlf and arrhenius"):
         material(kelvin=kelvin, temperature=300.0, **laws)
 
 
@@ -85,9 +87,9 @@ def test_table_of_many_temperatures_is_superposed():
 
 
 def test_table_needs_a_temperature_or_a_reference():
-    with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, or a reference"):
+    with pytest.raises(DataError, match="has several temperatures: name one by table_temperature, a reference"):
         solid_of(material(dma_table={"file": TABLE}))
-    with pytest.raises(DataError, match="got no rows at 500 K"):
+    with pytest.raises(DataError, match=r"got no rows at 226.9 degC; it was measured at -4"):
         solid_of(material(dma_table={"file": TABLE, "table_temperature": 500.0}))
 
 
@@ -143,3 +145,91 @@ def test_columns_of_a_table_go_by_their_names(tmp_path):
 def test_a_table_that_is_no_dma_is_refused(tmp_path, text, message):
     with pytest.raises(DataError, match=message):
         moduli(tmp_path, text)
+
+
+#: Curves of a fluid-like solid at three temperatures, moved by the law of Williams, Landel and Ferry.
+LAW = {"c1": 10.0, "c2": 100.0, "reference": 300.0}
+
+
+def shifted_table(path, temperatures, decades=3):
+    omega = np.logspace(-decades / 2, decades / 2, 4 * decades + 1)
+    lines = ["omega [rad/s],G' [Pa],G'' [Pa],T [K]"]
+    for temperature in temperatures:
+        difference = temperature - LAW["reference"]
+        reduced = omega * 10 ** (-LAW["c1"] * difference / (LAW["c2"] + difference))
+        modulus = 1e6 * (1 + (1j * reduced) ** 0.3)
+        lines += [
+            f"{w!r},{s!r},{ls!r},{temperature!r}"
+            for w, s, ls in zip(omega.tolist(), modulus.real.tolist(), modulus.imag.tolist(), strict=True)
+        ]
+    path.write_text("\n".join(lines))
+    return str(path)
+
+
+def test_known_shift_factors_superpose_a_table(tmp_path):
+    """The law and a table of the same factors give one curve, which the law moves as it moves the data."""
+    file = shifted_table(tmp_path / "dma.csv", (280.0, 300.0, 330.0))
+    at_reference = solid_of(material(dma_table={"file": file}, wlf=LAW))
+    omega = np.logspace(-4, 3, 8)
+    np.testing.assert_allclose(complex_modulus(at_reference, omega), 1e6 * (1 + (1j * omega) ** 0.3), rtol=0.05)
+    rows = [(t, -LAW["c1"] * (t - 300.0) / (LAW["c2"] + t - 300.0)) for t in (280.0, 300.0, 310.0, 330.0)]
+    for heading, write in (("log aT", lambda k: k), ("a_T", lambda k: 10**k)):
+        factors = tmp_path / "shifts.csv"
+        factors.write_text(f"T [K],{heading}\n" + "\n".join(f"{t!r},{write(k)!r}" for t, k in rows))
+        same = material(dma_table={"file": file}, shift_factors=str(factors))
+        np.testing.assert_allclose(solid_of(same).moduli, at_reference.moduli, rtol=1e-6, atol=1.0)
+        warm = solid_of(same.model_copy(update={"temperature": 310.0}))
+        np.testing.assert_allclose(warm.times, at_reference.times * 10 ** rows[2][1], rtol=1e-9)
+
+
+def test_a_table_moves_from_its_own_temperature(tmp_path):
+    """The reference of the law is that of its constants, not the temperature of the table."""
+    file = shifted_table(tmp_path / "dma.csv", (300.0, 330.0))
+    own = {"file": file, "table_temperature": 330.0}
+    at_table = solid_of(material(dma_table=own))
+    same = solid_of(material(dma_table=own, temperature=330.0, wlf=LAW))
+    np.testing.assert_allclose(same.times, at_table.times, rtol=1e-12)
+
+
+def test_curves_with_a_gap_are_refused_before_any_is_shifted(tmp_path):
+    file = shifted_table(tmp_path / "dma.csv", (280.0, 400.0), decades=2)
+    with pytest.raises(DataError, match=r"do not overlap: the modulus reaches .* at 126.9 degC and begins at .*6.85 d"):
+        solid_of(material(dma_table={"file": file, "reference": 300.0}))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("T [K],a_T\n300,1\n310,2\n", "an a_T that falls from each to the next"),
+        ("T [K],a_T\n300,0.5\n310,0.1\n", "expected an a_T that passes 1"),
+        ("T [K],a_T\n300,1\n", "expected two or more temperatures"),
+        ("T [K],a_T,log aT\n300,1,0\n310,0.1,-1\n", "one of the columns a_T and log10 a_T"),
+    ],
+)
+def test_shift_factors_that_are_none_are_refused(tmp_path, text, message):
+    (tmp_path / "shifts.csv").write_text(text)
+    kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
+    with pytest.raises(DataError, match=message):
+        solid_of(material(kelvin=kelvin, temperature=305.0, shift_factors=str(tmp_path / "shifts.csv")))
+
+
+def test_shift_factors_end_where_they_were_measured(tmp_path):
+    (tmp_path / "shifts.csv").write_text("T [K],a_T\n300,1\n310,0.1\n")
+    kelvin = {"shear_modulus": 1e6, "relaxation_time": 1e-3}
+    with pytest.raises(ValueError, match=r"has shift factors for 26.85 degC to 36.85 degC, got 46.85 degC"):
+        solid_of(material(kelvin=kelvin, temperature=320.0, shift_factors=str(tmp_path / "shifts.csv")))
+
+
+def test_a_study_is_told_how_its_frequencies_meet_the_data(tmp_path):
+    file = shifted_table(tmp_path / "dma.csv", (280.0, 300.0, 330.0))
+    body = {"length": 1e-2, "points": 1000, "rms_roughness": 1e-6, "normal_force": 1.0}
+    sets = [
+        SlidingFriction(**body, velocity=v, material=material(dma_table={"file": file}, temperature=t, wlf=LAW))
+        for t in (300.0, 330.0)
+        for v in (1e-6, 1e4)
+    ]
+    cold, warm = frequency_notes(sets)
+    assert cold.startswith("q v of 0.00063 to 3.1e+09 rad/s at 26.85 degC, data from")
+    assert "extrapolated" in cold
+    assert "decades above" in warm
+    assert "at 56.85 degC" in warm

@@ -350,7 +350,7 @@ def test_trace_under_slip_agrees_with_its_mean(slip):
             "expected the longest wavelength above the shortest",
         ),
         ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two spacings"),
-        ({"rms_roughness": None}, "expected rms_roughness, or the measured profiles of both rollers"),
+        ({"rms_roughness": None}, "expected rms_roughness, or surface_1 and surface_2"),
         ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
     ],
 )
@@ -388,8 +388,8 @@ def profiles(tmp_path, spacing_2=1e-6, size_2=4000):
     one = np.convolve(generator.normal(size=4008), np.ones(9) / 9, "valid") * 6e-7
     two = np.convolve(generator.normal(size=size_2 + 8), np.ones(9) / 9, "valid") * 6e-7
     return {
-        "profile_1": write_profile(tmp_path / "one.csv", 1e-6, one + 1e-5 + 1e-4 * 1e-6 * np.arange(4000)),
-        "profile_2": write_profile(tmp_path / "two.csv", spacing_2, two),
+        "surface_1": {"profile": write_profile(tmp_path / "one.csv", 1e-6, one + 1e-5 + 1e-4 * 1e-6 * np.arange(4000))},
+        "surface_2": {"profile": write_profile(tmp_path / "two.csv", spacing_2, two)},
         "rms_roughness": None,
     }
 
@@ -409,10 +409,10 @@ def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
 def test_bad_profiles_give_one_error(tmp_path):
     assert "expected profiles of the same spacing, got 1e-06 m and 2e-06 m" in refused(**profiles(tmp_path, 2e-6))
     files = profiles(tmp_path)
-    assert "expected the profiles of both rollers or of none" in refused(profile_1=files["profile_1"])
+    assert "expected the surfaces of both rollers or of none" in refused(surface_1=files["surface_1"])
     (tmp_path / "bad.csv").write_text("x [m], z [m]\n1, 2\n3, many\n")
     assert "bad.csv:3:4: column z: expected a number, got 'many'" in refused(
-        **files | {"profile_2": str(tmp_path / "bad.csv")}
+        **files | {"surface_2": {"profile": str(tmp_path / "bad.csv")}}
     )
     assert "wider than the line" in refused(**files | {"normal_force": 1e7})
 

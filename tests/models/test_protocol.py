@@ -154,7 +154,7 @@ def test_measured_line_is_the_generated_one(tmp_path: Path, protocol: dict[str, 
     """A file of its own nodes; in the quick solution of a jump they are cells of the same kind."""
     whole = block(protocol=protocol, oversampling=8)
     line = written_line(tmp_path, 400)
-    read = compute(block(protocol=protocol, oversampling=2, profile=line, length=None, rms_roughness=None))
+    read = compute(block(protocol=protocol, oversampling=2, surface={"profile": line}, length=None, rms_roughness=None))
     assert np.all(read.status == Status.DONE), read.messages
     for name in ("friction_coefficient", "friction_coefficient_jump", "rms_slope"):
         wanted = compute(whole).values[name][0, 0]
@@ -166,11 +166,11 @@ def test_flat_measured_line_is_a_status(tmp_path: Path) -> None:
     np.savetxt(
         file, np.column_stack([np.arange(20) * 1e-6, np.zeros(20)]), delimiter=",", header="x [m],z [m]", comments=""
     )
-    found = compute(block(profile=str(file), length=None, rms_roughness=None))
+    found = compute(block(surface={"profile": str(file)}, length=None, rms_roughness=None))
     assert np.all(found.status == Status.FAILED)
     assert all("which is flat" in message for message in found.messages.values())
 
 
 def test_a_line_is_generated_or_measured() -> None:
-    with pytest.raises(ValidationError, match="expected length with rms_roughness, or profile"):
+    with pytest.raises(ValidationError, match="expected length with rms_roughness, or length with surface"):
         block(length=None)

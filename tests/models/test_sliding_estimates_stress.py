@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from references.slow_friction import Body, reference, samples, waves
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.surfaces import roughness
 
@@ -163,7 +162,7 @@ def test_measured_lines_are_right_to_their_own_estimates(tmp_path, shape):
         heights = line(4097)
         body, parameters = material
         depth = share * np.ptp(heights) - heights.max()
-        parameters = parameters | {"profile": ProfileFile.model_validate({"file": str(path)})}
+        parameters = parameters | {"surface": {"profile": str(path)}}
         judge(reference(line, depth, body), parameters)
 
     draw()

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.problem import Aim, Arms, solve
@@ -44,7 +43,7 @@ def measured(path, oversampling=4):
         header="x,z\nm,m",
         comments="",
     )
-    return {"profile": ProfileFile.model_validate(str(path))}
+    return {"surface": {"profile": str(path)}}
 
 
 def solved(parameters, outputs=ALL, columns=None, accuracy=None):

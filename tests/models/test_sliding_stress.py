@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.solids import complex_modulus, prony
 from mdr_dask.physics.surfaces import roughness
@@ -164,9 +163,9 @@ def test_spikes_and_steps_of_a_measured_file(tmp_path_factory, kind, seed, heigh
     }[kind] * 10**height
     path = tmp_path_factory.mktemp("line") / "line.csv"
     np.savetxt(path, np.column_stack([x, z]), delimiter=",", header="x [m],z [m]", comments="")
-    profile = ProfileFile.model_validate({"file": str(path), **options})
+    surface = {"profile": {"file": str(path), **options}}
     material = {"material": SOLID} if general else KELVIN
-    result = solved(material | {"normal_force": 10**force, "velocity": 10**velocity, "profile": profile}, accuracy=0.05)
+    result = solved(material | {"normal_force": 10**force, "velocity": 10**velocity, "surface": surface}, accuracy=0.05)
     assert_answers_or_says_why(result)
     if kind == "flat" and result.status[0, 0] == Status.DONE:
         assert result.values["friction_coefficient"][0, 0] == pytest.approx(0, abs=1e-12)

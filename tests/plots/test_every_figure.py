@@ -16,7 +16,7 @@ import planted
 import pytest
 from drawn import LAST, check_picture, expected, mismatches
 
-from mdr_dask import aggregation, fit, models
+from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import available, curves, style
 
@@ -298,7 +298,7 @@ SAMPLED = [shape for shape, (text, _, _) in TABLE.items() if LHS in text and "se
 
 @pytest.mark.parametrize("shape", SAMPLED)
 def test_laws_are_fitted_to_a_sampled_study_or_say_why_not(shape, stores):
-    for law in fit.available(model_of(TABLE[shape][0])).values():
+    for law in fits.available(model_of(TABLE[shape][0])).values():
         with contextlib.suppress(DataError, FitError):
             assert all("law_holds" in each for each in law.results(stores(shape)).values())
 

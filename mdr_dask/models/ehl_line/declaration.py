@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -32,15 +32,32 @@ class EhlLineParameters(Parameters):
         "discretisation_error": "central_film and minimum_film come with central_film_error and minimum_film_error",
         "traction_error": "traction_coefficient comes with traction_coefficient_error",
     }
-    load_parameter: float | None = quantity("1", "load parameter W = w/(E' R), E' = 2 E*", gt=0, default=None)
-    speed_parameter: float | None = quantity("1", "speed parameter U = eta0 u/(E' R)", gt=0, default=None)
-    material_parameter: float | None = quantity("1", "material parameter G = alpha E'", ge=0, default=None)
-    line_load: float | None = quantity("N/m", "normal force per length of the line w", gt=0, default=None)
-    mean_velocity: float | None = quantity("m/s", "mean velocity of the surfaces u = (u1 + u2)/2", gt=0, default=None)
-    pressure_viscosity: float | None = quantity("1/Pa", "pressure-viscosity coefficient alpha", ge=0, default=None)
-    radius: float | None = quantity("m", "reduced radius of curvature R", gt=0, default=None)
-    viscosity: float | None = quantity("Pa*s", "viscosity at ambient pressure eta0", gt=6.4e-5, default=None)
-    contact_modulus: float = quantity("Pa", "contact modulus E*", gt=0, default=STEEL)
+    ways: ClassVar[tuple[Ways, ...]] = tuple(
+        ((dimensional, *companions), (number,)) for number, dimensional, companions in _PAIRS
+    )
+    load_parameter: float | None = quantity(
+        "1", "load parameter W = w/(E' R), E' = 2 E*", usual="2e-5", gt=0, default=None
+    )
+    speed_parameter: float | None = quantity(
+        "1", "speed parameter U = eta0 u/(E' R)", usual="1e-11", gt=0, default=None
+    )
+    material_parameter: float | None = quantity(
+        "1", "material parameter G = alpha E'", usual="5000", ge=0, default=None
+    )
+    line_load: float | None = quantity(
+        "N/m", "normal force per length of the line w", usual="100 N/mm", gt=0, default=None
+    )
+    mean_velocity: float | None = quantity(
+        "m/s", "mean velocity of the surfaces u = (u1 + u2)/2", usual="1 m/s", gt=0, default=None
+    )
+    pressure_viscosity: float | None = quantity(
+        "1/Pa", "pressure-viscosity coefficient alpha", usual="20 1/GPa", ge=0, default=None
+    )
+    radius: float | None = quantity("m", "reduced radius of curvature R", usual="10 mm", gt=0, default=None)
+    viscosity: float | None = quantity(
+        "Pa*s", "viscosity at ambient pressure eta0", usual="80 mPa s", gt=6.4e-5, default=None
+    )
+    contact_modulus: float = quantity("Pa", "contact modulus E*", usual="115 GPa", gt=0, default=STEEL)
     viscosity_law: Literal["barus", "roelands"] = Field("barus", description="viscosity over pressure")
     compressible: bool = Field(True, description="whether the density follows the law of Dowson and Higginson")
     inlet: float | None = quantity(
@@ -48,7 +65,7 @@ class EhlLineParameters(Parameters):
     )
     slide_roll_ratio: float = quantity("1", "slide-roll ratio (u1 - u2)/u", ge=0, default=0.0)
     shear_law: Literal["newtonian", "eyring"] = Field("newtonian", description="shear stress over shear rate")
-    eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", gt=0, default=5e6)
+    eyring_stress: float = quantity("Pa", "Eyring stress of the shear law eyring", usual="5 MPa", gt=0, default=5e6)
     profile_start: float = quantity("1", "first position of film and pressure, over the half width", default=-4.0)
     profile_end: float = quantity("1", "last position of film and pressure, over the half width", default=2.0)
     profile_points: int = quantity("1", "number of positions of film and pressure", ge=2, default=241)
@@ -130,10 +147,13 @@ def positions(parameters: EhlLineParameters) -> FloatArray:
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 
+distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
+
+
 def seconds(block: Block[EhlLineParameters]) -> float:
     """Return the estimated time of `compute`: a solution takes some 20 ms, more for a tighter accuracy."""
     accuracy = block.accuracy or ACCURACY
-    return 0.02 * block.cases * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
+    return 0.02 * float(distinct(block)) * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
@@ -156,6 +176,18 @@ MODEL = Model(
     seconds=seconds,
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
-    distinct=deferred("mdr_dask.models.ehl_line.solve", "distinct"),
+    distinct=distinct,
     memory=memory,
+    numbers=(
+        Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),
+        Number(
+            "speed_parameter",
+            "viscosity * mean_velocity / (2 * contact_modulus * radius)",
+            "speed parameter U = eta0 u/(E' R)",
+        ),
+        Number("material_parameter", "2 * contact_modulus * pressure_viscosity", "material parameter G = alpha E'"),
+        Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M"),
+        Number("moes_lubricant", "material_parameter * (2 * speed_parameter) ** 0.25", "Moes' lubricant parameter L"),
+    ),
+    compiling=7.0,
 )

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, NamedFile, Number, Output, Parameters, Ways, deferred, quantity
 from mdr_dask.tables import Column, read_table
 
 
@@ -19,7 +19,7 @@ class Parabola(Parameters):
     """A paraboloid, which stands for a sphere."""
 
     shape: Literal["parabola"] = "parabola"
-    radius: float | None = quantity("m", "radius of curvature R at the apex", gt=0, default=None)
+    radius: float | None = quantity("m", "radius of curvature R at the apex", usual="10 mm", gt=0, default=None)
 
     @property
     def power_law(self) -> tuple[float, float]:
@@ -32,7 +32,7 @@ class Cone(Parameters):
 
     shape: Literal["cone"]
     angle: float | None = quantity(
-        "rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2, default=None
+        "rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2, default=None
     )
 
     @property
@@ -45,7 +45,7 @@ class Power(Parameters):
     """A body of revolution c r^n."""
 
     shape: Literal["power"]
-    exponent: float = quantity("1", "exponent n of the body c r^n", gt=0.1, le=50)
+    exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", gt=0.1, le=50)
     coefficient: float | None = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0, default=None)
 
     @property
@@ -96,9 +96,12 @@ _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
 class LoadStep(Parameters):
     """One block of a load history."""
 
-    cycles: float = quantity("1", "cycles of the block (N in a dimensionless campaign)", ge=0)
+    cycles: float = quantity("1", "cycles of the block (N in a dimensionless campaign)", usual="10000", ge=0)
     amplitude_factor: float = quantity("1", "amplitude over the campaign's amplitude", gt=0, default=1.0)
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
+
+
+_OSCILLATION = ("shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
@@ -115,6 +118,13 @@ class FrettingWear(Parameters):
         "block_normal_force": "write block_contact_force",
         "discretisation_error": "every output comes with its own error, such as wear_volume_error",
     }
+    ways: ClassVar[tuple[Ways, ...]] = (
+        (
+            ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "normal_force"),
+            ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "depth"),
+            ("stick_radius",),
+        ),
+    )
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
@@ -122,7 +132,9 @@ class FrettingWear(Parameters):
         "or limit, the end of all wear",
     )
     hold: Literal["depth", "force"] = Field("depth", description="what stays constant while the body wears")
-    cycles: float = quantity("1", "number of cycles; N = cycles / N0 in a dimensionless campaign", ge=0, default=1.0)
+    cycles: float = quantity(
+        "1", "number of cycles; N = cycles / N0 in a dimensionless campaign", usual="10000", ge=0, default=1.0
+    )
     path: float | None = quantity(
         "m",
         "sliding path, in place of cycles and amplitude: gross slip in one direction "
@@ -131,17 +143,21 @@ class FrettingWear(Parameters):
         default=None,
     )
     stick_radius: float | None = quantity(
-        "1", "stick radius c over the first contact radius a0", gt=0, lt=1, default=None
+        "1", "stick radius c over the first contact radius a0", usual="0.5", gt=0, lt=1, default=None
     )
-    amplitude: float | None = quantity("m", "amplitude U0 of the tangential oscillation", gt=0, default=None)
-    contact_modulus: float | None = quantity("Pa", "contact modulus E*", gt=0, default=None)
-    shear_modulus: float | None = quantity("Pa", "effective shear modulus G* of the pair", gt=0, default=None)
-    friction: float | None = quantity("1", "coefficient of friction", gt=0, default=None)
-    normal_force: float | None = quantity("N", "normal force of the virgin contact", gt=0, default=None)
-    depth: float | None = quantity("m", "indentation depth of the virgin contact", gt=0, default=None)
-    hardness: float | None = quantity("Pa", "hardness in the wear law", gt=0, default=None)
+    amplitude: float | None = quantity(
+        "m", "amplitude U0 of the tangential oscillation", usual="1 um", gt=0, default=None
+    )
+    contact_modulus: float | None = quantity("Pa", "contact modulus E*", usual="115 GPa", gt=0, default=None)
+    shear_modulus: float | None = quantity(
+        "Pa", "effective shear modulus G* of the pair", usual="90 GPa", gt=0, default=None
+    )
+    friction: float | None = quantity("1", "coefficient of friction", usual="0.6", gt=0, default=None)
+    normal_force: float | None = quantity("N", "normal force of the virgin contact", usual="50 N", gt=0, default=None)
+    depth: float | None = quantity("m", "indentation depth of the virgin contact", usual="1 um", gt=0, default=None)
+    hardness: float | None = quantity("Pa", "hardness in the wear law", usual="2 GPa", gt=0, default=None)
     wear_coefficient: float | None = quantity(
-        "1", "wear coefficient k of the law V = k F u / hardness", ge=0, default=None
+        "1", "wear coefficient k of the law V = k F u / hardness", usual="1e-4", ge=0, default=None
     )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
     accuracy: float = quantity(
@@ -202,6 +218,15 @@ class FrettingWear(Parameters):
             raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
         return self
 
+    def notes(self) -> tuple[str, ...]:
+        """Say what a simplified rule leaves out."""
+        if self.wear_rule != "fast":
+            return ()
+        return (
+            "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance "
+            "from the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
+        )
+
     def _check_dimensional(self) -> None:
         missing = [name for name in self._needed() if getattr(self, name) is None]
         size = _SIZES.get(self.indenter.shape)
@@ -215,7 +240,7 @@ class FrettingWear(Parameters):
             )
 
     def _needed(self) -> tuple[str, ...]:
-        oscillating = ("shear_modulus", "friction", "amplitude") if self.path is None else ()
+        oscillating = _OSCILLATION if self.path is None else ()
         return ("contact_modulus", *oscillating, "hardness", "wear_coefficient")
 
 
@@ -266,20 +291,10 @@ def units(parameters: FrettingWear) -> dict[str, str]:
     return {"path": "1"} | {output.name: "1" for output in OUTPUTS} if parameters.dimensionless else {}
 
 
-def notes(parameters: FrettingWear) -> tuple[str, ...]:
-    """Say what a simplified rule leaves out."""
-    if parameters.wear_rule != "fast":
-        return ()
-    return (
-        "wear_rule fast is a simplified rule: the errors in the store are those of its own equation; its distance from "
-        "the exact evolution is some hundredths of d0, up to a third at small stick radii (docs/wear.md)",
-    )
-
-
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=4,
+    version=5,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,
@@ -293,5 +308,13 @@ MODEL = Model(
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
-    notes=notes,
+    numbers=(
+        Number("stick_share", "stick_border / contact_radius", "stick radius over the radius of the wear scar"),
+        Number(
+            "archard_share",
+            "wear_volume * hardness / (4 * wear_coefficient * normal_force * amplitude * cycles)",
+            "worn volume over that of gross slip by Archard's law",
+        ),
+    ),
+    compiling=5.0,
 )

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, deferred, quantity
-from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, Source
-from mdr_dask.models.parts.measured_line import ProfileFile
+from mdr_dask.models.base import (
+    Block,
+    Coordinate,
+    Model,
+    NamedFile,
+    Number,
+    Output,
+    Parameters,
+    Ways,
+    deferred,
+    quantity,
+)
+from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
+from mdr_dask.models.parts.surface import Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil, walther_constants
 
@@ -25,11 +36,11 @@ POSITIONS = np.linspace(-1.5, 1.5, 1501)
 class OilData(Parameters):
     """An oil by the numbers of its data sheet."""
 
-    temperature_1: float = quantity("K", "first temperature of the two viscosities", gt=0)
-    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", gt=0)
-    temperature_2: float = quantity("K", "second temperature of the two viscosities", gt=0)
-    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", gt=0)
-    density: float = quantity("kg/m^3", "density at density_temperature", gt=0)
+    temperature_1: float = quantity("K", "first temperature of the two viscosities", usual="40 degC", gt=0)
+    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", usual="320 mm^2/s", gt=0)
+    temperature_2: float = quantity("K", "second temperature of the two viscosities", usual="100 degC", gt=0)
+    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", usual="40 mm^2/s", gt=0)
+    density: float = quantity("kg/m^3", "density at density_temperature", usual="870 kg/m^3", gt=0)
     density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
     correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
         default="gold_mineral", description="pressure-viscosity correlation"
@@ -50,54 +61,72 @@ class MixedLubrication(Parameters):
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "load_share": "write asperity_load_share",
+        "profile_1": "write surface_1: {profile: ...}",
+        "profile_2": "write surface_2: {profile: ...}",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
-    normal_force: float = quantity("N", "normal force F_N on the rollers", gt=0)
-    rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", gt=0)
-    temperature: float = quantity("K", "temperature of rollers and oil", gt=0)
+    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("surface_1", "surface_2")),)
+    normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
+    rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
+    temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
     slide_roll_ratio: float = quantity(
         "1", "creep (v1 - v2)/u with the mean velocity u; 0 is pure rolling", default=0.0, ge=-2, le=2
     )
     rms_roughness: Positive | None = quantity(
-        "m", "rms height of each roller; needed unless profiles are given", default=None
+        "m", "rms height of each roller; needed unless surfaces are given", usual="0.2 um", default=None
     )
-    hurst: float = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
+    hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
         "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
         "load on their asperities asks for it",
+        usual="0.4 mm",
         default="auto",
     )
     cutoff_force: float = quantity(
-        "N", "normal force whose contact width is the longest wavelength", default=1600, gt=0
+        "N", "normal force whose contact width is the longest wavelength", usual="1600 N", default=1600, gt=0
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
-        "m", "wavelength below which there is no roughness; auto is ten spacings of the points", default="auto"
+        "m",
+        "wavelength below which there is no roughness; auto is ten spacings of the points",
+        usual="3 um",
+        default="auto",
     )
-    profile_1: ProfileFile | None = Field(default=None, description="measured line of roller 1")
-    profile_2: ProfileFile | None = Field(default=None, description="measured line of roller 2")
-    layer_thickness: float = quantity("m", "critical thickness h_c of the boundary layer", default=5e-9, gt=0)
-    layer_shear_strength: float = quantity("Pa", "limiting shear stress tau0 of the boundary layer", default=1e6, ge=0)
+    surface_1: Surface | None = Field(default=None, description="measured surface of roller 1")
+    surface_2: Surface | None = Field(default=None, description="measured surface of roller 2")
+    layer_thickness: float = quantity(
+        "m", "critical thickness h_c of the boundary layer", usual="5 nm", default=5e-9, gt=0
+    )
+    layer_shear_strength: float = quantity(
+        "Pa", "limiting shear stress tau0 of the boundary layer", usual="1 MPa", default=1e6, ge=0
+    )
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
         default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet"
     )
     pressure_viscosity: (
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
-    ) = quantity("1/Pa", "pressure-viscosity coefficient alpha, or the correlation that gives it", default="oil")
+    ) = quantity(
+        "1/Pa",
+        "pressure-viscosity coefficient alpha, or the correlation that gives it",
+        usual="20 1/GPa",
+        default="oil",
+    )
     film_formula: Literal["pan_hamrock", "pan_hamrock_minimum", "dowson_higginson", "ehl"] = Field(
         default="pan_hamrock", description="formula of the film thickness, or the central film of the EHL solution"
     )
-    film_thickness: Positive | None = quantity("m", "film thickness, instead of the formula's", default=None)
+    film_thickness: Positive | None = quantity(
+        "m", "film thickness, instead of the formula's", usual="100 nm", default=None
+    )
     edge_rule: Literal["part", "clip", "whole", "inside"] = Field(
         default="part", description="what becomes of a cluster that the edge of the contact cuts"
     )
-    roller_radius: float = quantity("m", "radius of each roller", default=0.05, gt=0)
-    roller_width: float = quantity("m", "length L' of the contact line", default=0.01, gt=0)
-    contact_modulus: float = quantity("Pa", "contact modulus E*", default=STEEL, gt=0)
+    roller_radius: float = quantity("m", "radius of each roller", usual="50 mm", default=0.05, gt=0)
+    roller_width: float = quantity("m", "length L' of the contact line", usual="10 mm", default=0.01, gt=0)
+    contact_modulus: float = quantity("Pa", "contact modulus E*", usual="115 GPa", default=STEEL, gt=0)
     resistivity: float = quantity("ohm m", "electrical resistivity of the rollers", default=2e-7, gt=0)
     boundary_friction: float = quantity("1", "coefficient of friction of intimate contact", default=0.1, ge=0)
-    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", default=5e6, gt=0)
+    eyring_stress: float = quantity("Pa", "Eyring stress of the oil under shear", usual="5 MPa", default=5e6, gt=0)
     viscosity_law: Literal["barus", "roelands"] = Field(
         default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
@@ -105,6 +134,11 @@ class MixedLubrication(Parameters):
     measured: NamedFile | None = Field(
         default=None, description="table of measured contact probabilities, for the fit `breakthrough`"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_exponent_of_measured_surfaces(cls, value: Any) -> Any:
+        return without_exponent(value, "surface_1")
 
     @model_validator(mode="after")
     def _holds_together(self) -> Self:
@@ -120,13 +154,18 @@ class MixedLubrication(Parameters):
 
     def source(self) -> Source:
         """Return where the lines come from; equal for cases that can share them."""
-        if self.profile_1 is not None and self.profile_2 is not None:
-            return Measured(self.profile_1, self.profile_2, self.rms_roughness is not None)
+        one, two = self.surface_1, self.surface_2
+        if one is not None and two is not None and one.profile is not None and two.profile is not None:
+            return Measured(one.profile, two.profile, self.rms_roughness is not None)
         shortest = self.shortest_wavelength
         if shortest == "auto":
             shortest = 10 * self.perimeter / self.points
         modes = int(self.perimeter / shortest * (1 + 1e-12))
-        return Generated(self.points, self.hurst, self.perimeter / self.longest(), modes)
+        waves = self.points, self.perimeter / self.longest(), modes
+        if one is not None and two is not None:
+            return OfSurfaces(*waves, one, two, self.perimeter)
+        assert self.hurst is not None
+        return Generated(*waves, self.hurst)
 
     def longest(self) -> float:
         """Return the longest wavelength of the roughness in m."""
@@ -136,10 +175,9 @@ class MixedLubrication(Parameters):
 
     def problem(self) -> str:
         """Say why the case cannot be computed, in one sentence; an empty string if it can."""
-        if (self.profile_1 is None) != (self.profile_2 is None):
-            return "expected the profiles of both rollers or of none, got one"
-        if self.profile_1 is None and self.rms_roughness is None:
-            return "expected rms_roughness, or the measured profiles of both rollers, got neither"
+        problem = self._problem_of_surfaces()
+        if problem:
+            return problem
         outside = self.oil_data().outside(self.temperature)
         if outside:
             return outside
@@ -148,6 +186,19 @@ class MixedLubrication(Parameters):
             return source.problem(self.perimeter) or self._problem_of_width(source)
         except DataError as error:
             return str(error)
+
+    def _problem_of_surfaces(self) -> str:
+        one, two = self.surface_1, self.surface_2
+        if one is None and two is None:
+            missing = self.rms_roughness is None or self.hurst is None
+            return "expected rms_roughness, or surface_1 and surface_2, got neither" if missing else ""
+        if one is None or two is None:
+            return "expected the surfaces of both rollers or of none, got one"
+        if (one.profile is None) != (two.profile is None):
+            return "expected the profiles of both rollers or the spectra of both, got one of each"
+        if one.profile is None and self.rms_roughness is not None:
+            return "the surfaces take the place of rms_roughness: leave out one or the other"
+        return "" if self.hurst is None else "the surfaces take the place of hurst: leave out one or the other"
 
     def _problem_of_width(self, source: Source) -> str:
         length = source.points * source.spacing(self.perimeter)
@@ -215,6 +266,9 @@ OUTPUTS = (
 )
 
 
+DRAWN = {output.name for output in OUTPUTS if output.dims}
+
+
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     """Return the angles of a trace and the places, in half widths, of the profiles."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
@@ -225,11 +279,12 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from points, cases and creep."""
+    """Estimate the time of a block from points, cases, creep, drawn places and the solutions of the film."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    lines = 0.06 * float(millions.max())
-    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
+    case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
+    films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
+    return films + len(block.realisations) * float(0.06 * millions.max() + np.sum(millions * case))
 
 
 MODEL = Model(
@@ -253,4 +308,14 @@ MODEL = Model(
         "film_thickness",
     ),
     coordinates=coordinates,
+    numbers=(
+        Number(
+            "load_parameter",
+            "normal_force / (roller_width * contact_modulus * roller_radius)",
+            "load parameter W = w/(E' R) of the pair, E' = 2 E* and R half the radius of a roller",
+        ),
+        Number("film_over_layer", "film / layer_thickness", "film over the critical thickness of the boundary layer"),
+        Number("touching_share", "contact_length / (2 * contact_half_width)", "contact length over the Hertzian width"),
+    ),
+    compiling=2.0,
 )

@@ -1,4 +1,4 @@
-"""The two rough lines of a case, generated or measured, and why there may be none."""
+"""The two rough lines of a case: generated, of measured surfaces, or measured; and why there may be none."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
+from mdr_dask.models.parts.surface import Surface, lines_of
 
 
 @dataclass(frozen=True)
-class Generated:
-    """Two generated lines of unit rms height; what fixes them but for their phases."""
+class _Random:
+    """Two lines of random phases; what fixes them but for their phases and their spectra."""
 
     points: int
-    hurst: float
     longest: float  # harmonic number of the longest wavelength
     modes: int  # harmonic number of the shortest wavelength
 
@@ -37,20 +37,72 @@ class Generated:
             )
         return ""
 
-    def combined_rms(self) -> float:
-        """Return the rms height of both lines together."""
-        return float(np.sqrt(2.0))
+    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
+        """Return the amplitudes of both lines."""
+        raise NotImplementedError
 
     def lines(self, seed: int, realisation: int) -> tuple[FloatArray, FloatArray]:
         """Return both lines; one stream feeds them in turn, so that a shorter cut-off keeps the longer waves."""
         from mdr_dask.physics.surfaces import roughness
 
-        amplitude = roughness.amplitudes(self.modes, self.hurst, longest=self.longest)
+        amplitude_1, amplitude_2 = self.amplitudes(realisation)
         phase = roughness.phases(seed, realisation, 2 * self.modes).reshape(-1, 2)
         return (
-            roughness.line(amplitude, phase[:, 0], self.points),
-            roughness.line(amplitude, phase[:, 1], self.points),
+            roughness.line(amplitude_1, phase[:, 0], self.points),
+            roughness.line(amplitude_2, phase[:, 1], self.points),
         )
+
+
+@dataclass(frozen=True)
+class Generated(_Random):
+    """Two self-affine lines of unit rms height."""
+
+    hurst: float
+
+    def combined_rms(self) -> float:
+        """Return the rms height of both lines together."""
+        return float(np.sqrt(2.0))
+
+    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
+        """Return the amplitudes of both lines."""
+        from mdr_dask.physics.surfaces import roughness
+
+        amplitude = roughness.amplitudes(self.modes, self.hurst, longest=self.longest)
+        return amplitude, amplitude
+
+
+@dataclass(frozen=True)
+class OfSurfaces(_Random):
+    """Two lines with the spectra of measured surfaces, in m; of several files realisation r takes the r-th."""
+
+    surface_1: Surface
+    surface_2: Surface
+    perimeter: float
+
+    def combined_rms(self) -> float:
+        """Return the rms height of both lines together, in m, over all files."""
+        squares = [np.mean([np.sum(line**2) / 2 for line in lines]) for lines in self._both()]
+        return float(np.sqrt(sum(squares)))
+
+    def amplitudes(self, realisation: int) -> tuple[FloatArray, FloatArray]:
+        """Return the amplitudes of both lines."""
+        first, second = (lines[realisation % len(lines)] for lines in self._both())
+        return first, second
+
+    def problem(self, perimeter: float) -> str:
+        """Say why there are no such lines; an empty string if there are."""
+        flat = "expected waves of both surfaces between longest_wavelength and shortest_wavelength"
+        return super().problem(perimeter) or (
+            "" if all(np.any(line) for both in self._both() for line in both) else flat
+        )
+
+    def _both(self) -> tuple[list[FloatArray], list[FloatArray]]:
+        waves = np.arange(1, self.modes + 1) >= self.longest * (1 - 1e-12)
+        first, second = (
+            [line * waves for line in lines_of(surface, self.perimeter, self.modes)]
+            for surface in (self.surface_1, self.surface_2)
+        )
+        return first, second
 
 
 @dataclass(frozen=True)
@@ -96,4 +148,4 @@ class Measured:
         return first, second
 
 
-Source = Generated | Measured
+Source = Generated | OfSurfaces | Measured

@@ -41,7 +41,7 @@ class Cone(_PowerLaw):
     """A cone, rough or smooth."""
 
     shape: Literal["cone"]
-    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+    angle: float = quantity("rad", "angle between the cone's surface and the plane", usual="10 deg", gt=0, lt=np.pi / 2)
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
@@ -52,7 +52,7 @@ class Parabola(_PowerLaw):
     """A paraboloid, which stands for a sphere."""
 
     shape: Literal["parabola"]
-    radius: float = quantity("m", "radius of curvature R at the apex", gt=0)
+    radius: float = quantity("m", "radius of curvature R at the apex", usual="10 mm", gt=0)
 
     def power_law(self) -> tuple[float, float]:
         """Return coefficient and exponent of the body c r^n."""
@@ -63,7 +63,7 @@ class Power(_PowerLaw):
     """A body of revolution c r^n."""
 
     shape: Literal["power"]
-    exponent: float = quantity("1", "exponent n of the body c r^n", ge=1, le=100)
+    exponent: float = quantity("1", "exponent n of the body c r^n", usual="2", ge=1, le=100)
     coefficient: float = quantity("m^(1-n)", "coefficient c of the body c r^n, in metres", gt=0)
 
     def power_law(self) -> tuple[float, float]:

@@ -51,7 +51,7 @@ class Ramp(_Course):
     """Velocity and load that change linearly from t = 0 on, and are constant then."""
 
     shape: Literal["ramp"]
-    duration: float = quantity("s", "time that the ramp takes", gt=0)
+    duration: float = quantity("s", "time that the ramp takes", usual="4 ms", gt=0)
     velocity: float | None = quantity("m/s", "velocity at its end; else `velocity`", default=None)
     force: float | None = quantity("N", "normal force at its end; else the same", default=None, gt=0)
 
@@ -60,8 +60,8 @@ class Oscillation(_Course):
     """A velocity that oscillates about `velocity`, and perhaps a load about `normal_force`."""
 
     shape: Literal["oscillation"]
-    amplitude: float = quantity("m/s", "amplitude of the velocity", ge=0)
-    frequency: float = quantity("Hz", "frequency", gt=0)
+    amplitude: float = quantity("m/s", "amplitude of the velocity", usual="20 mm/s", ge=0)
+    frequency: float = quantity("Hz", "frequency", usual="250 Hz", gt=0)
     force_amplitude: float = quantity("N", "amplitude of the normal force, below it", default=0.0, ge=0)
 
 

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import NamedFile, quantity
+from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import to_si
+from mdr_dask.units import shown, to_si
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv")
 
 
-class ProfileFile(Parameters):
+class ProfileFile(NamedByFile):
     """A measured line; a bare file name stands for it with all options at their defaults."""
 
     file: NamedFile = Field(
@@ -34,11 +35,6 @@ class ProfileFile(Parameters):
     )
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
 
-    @model_validator(mode="before")
-    @classmethod
-    def _bare_name(cls, value: Any) -> Any:
-        return {"file": value} if isinstance(value, str) else value
-
     @model_validator(mode="after")
     def _holds_a_line(self, info: ValidationInfo) -> ProfileFile:
         """Refuse a bad file where a campaign names it, before any case fails of it."""
@@ -48,6 +44,22 @@ class ProfileFile(Parameters):
             except DataError as problem:
                 raise ValueError(str(problem)) from None
         return self
+
+    def notes(self) -> tuple[str, ...]:
+        """Return points, length, rms height and rms slope of the line."""
+        return (_statistics(self),)
+
+
+@lru_cache(maxsize=16)
+def _statistics(profile: ProfileFile) -> str:
+    from mdr_dask.physics.surfaces.waves import waves_of
+
+    line = line_of(profile)
+    height, slope = float(line.height.std()), waves_of(line.height).rms_slope() / line.length
+    return (
+        f"profile {profile.file.name}: {line.height.size} points, {shown(line.length, 'm')} long, "
+        f"rms height {shown(height, 'm')}, rms slope {slope:.3g}"
+    )
 
 
 @lru_cache(maxsize=16)

@@ -1,4 +1,4 @@
-"""The roughness of a line as a campaign names it: generated, measured or none; each a sum of waves."""
+"""The roughness of a line as a campaign names it: generated, of a measured surface, measured or none; all are waves."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
+from mdr_dask.models.parts.surface import Surface, lines_of
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.waves import Waves
@@ -25,15 +26,19 @@ class Generated:
 
     def waves(self, seed: int, realisation: int) -> Waves:
         """Return one realisation; ValueError if no wave is left between the cut-offs."""
-        from mdr_dask.physics.surfaces import roughness
-        from mdr_dask.physics.surfaces.waves import Waves
+        return _with_random_phases(_amplitudes(self), self.points, seed, realisation)
 
-        amplitude = _amplitudes(self)
-        return Waves(0.5 * amplitude * roughness.phase_factors(seed, realisation, self.points // 2), self.points)
-
-    def slope(self) -> float:
+    def slope(self, realisation: int) -> float:
         """Return the spectral rms slope."""
         return _slope(self)
+
+
+def _with_random_phases(amplitude: FloatArray, points: int, seed: int, realisation: int) -> Waves:
+    """Return one realisation of the lines with these amplitudes."""
+    from mdr_dask.physics.surfaces import roughness
+    from mdr_dask.physics.surfaces.waves import Waves
+
+    return Waves(0.5 * amplitude * roughness.phase_factors(seed, realisation, points // 2), points)
 
 
 @lru_cache(maxsize=32)
@@ -48,6 +53,46 @@ def _slope(line: Generated) -> float:
     from mdr_dask.physics.surfaces import roughness
 
     return roughness.spectral_slope(_amplitudes(line))
+
+
+@dataclass(frozen=True)
+class OfSurface:
+    """Lines with the spectrum of a measured surface, in units of their length and rms height.
+
+    Of several files realisation r takes the r-th, over and over: the scatter between the files is part of that between
+    realisations, and the mean is that of the files.
+    """
+
+    surface: Surface
+    points: int
+    length: float  # m
+    is_random = True
+
+    def height(self) -> float:
+        """Return the unit of height, m: the rms height of the lines, over all files."""
+        return _height(self)
+
+    def waves(self, seed: int, realisation: int) -> Waves:
+        """Return one realisation."""
+        return _with_random_phases(self._amplitudes(realisation), self.points, seed, realisation)
+
+    def slope(self, realisation: int) -> float:
+        """Return the spectral rms slope."""
+        from mdr_dask.physics.surfaces import roughness
+
+        return roughness.spectral_slope(self._amplitudes(realisation))
+
+    def _amplitudes(self, realisation: int) -> FloatArray:
+        lines = lines_of(self.surface, self.length, self.points // 2)
+        return lines[realisation % len(lines)] / self.height()
+
+
+@lru_cache(maxsize=64)
+def _height(line: OfSurface) -> float:
+    import numpy as np
+
+    lines = lines_of(line.surface, line.length, line.points // 2)
+    return float(np.sqrt(np.mean([np.sum(amplitude**2) / 2 for amplitude in lines])))
 
 
 @dataclass(frozen=True)
@@ -71,7 +116,7 @@ class Measured:
         """Return the waves of the line through the samples."""
         return _waves(self)
 
-    def slope(self) -> float:
+    def slope(self, realisation: int) -> float:
         """Return the spectral rms slope."""
         return _waves(self).rms_slope()
 
@@ -98,9 +143,9 @@ class Smooth:
 
         return Waves(np.zeros(0, np.complex128), self.points)
 
-    def slope(self) -> float:
+    def slope(self, realisation: int) -> float:
         """Return 0."""
         return 0.0
 
 
-Roughness = Generated | Measured | Smooth
+Roughness = Generated | OfSurface | Measured | Smooth

@@ -2,47 +2,133 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import Number, Parameters, Ways, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
-from mdr_dask.models.parts.material import Material
-from mdr_dask.models.parts.measured_line import ProfileFile
+from mdr_dask.models.parts.material import Material, frequencies
+from mdr_dask.models.parts.measured_line import line_of
+from mdr_dask.models.parts.surface import Surface, spectra_of, without_exponent
+from mdr_dask.units import shown
+
+#: What a generated line has and a measured surface brings with it.
+GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
+#: Dimensionless numbers of a Kelvin body on a generated line.
+NUMBERS = (
+    Number("deborah", "velocity * relaxation_time / length", "Deborah number v tau / L"),
+    Number(
+        "load_number",
+        "normal_force / (shear_modulus * rms_roughness * length)",
+        "load number F_N / (G h L) (thesis eq. 3.20)",
+    ),
+    Number(
+        "velocity_number",
+        "velocity * relaxation_time * rms_slope / (sqrt(2) * rms_roughness)",
+        "velocity number v tau s / (sqrt 2 h), s the rms slope (thesis eq. 3.19)",
+    ),
+)
 
 
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
-    length: float | None = quantity("m", "length L of the line, and period of its roughness", default=None, gt=0)
+    gone: ClassVar[Mapping[str, str]] = {"profile": "write surface: {profile: ...}"}
+    ways: ClassVar[tuple[Ways, ...]] = (
+        (("length", "rms_roughness"), ("length", "surface"), ("surface",)),
+        (("shear_modulus", "relaxation_time"), ("material",)),
+    )
+    length: float | None = quantity(
+        "m", "length L of the line, and period of its roughness", usual="10 mm", default=None, gt=0
+    )
     points: int = quantity(
         "1", "Nyquist points: the cut-off wavelength is 2 length / points", default=5000, ge=16, le=10**6
     )
-    hurst: float = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, ge=0)
+    hurst: float | None = quantity("1", "Hurst exponent H of the self-affine roughness", default=0.7, ge=0, le=1)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="0.5 um", default=None, ge=0)
     rolloff_wavelength: float | None = quantity(
-        "m", "wavelength above which the spectrum is constant", default=None, gt=0
+        "m", "wavelength above which the spectrum is constant", usual="1 mm", default=None, gt=0
     )
-    longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
-    profile: ProfileFile | None = Field(default=None, description="a measured line in place of a generated one")
+    longest_wavelength: float | None = quantity(
+        "m", "wavelength above which there is no roughness", usual="1 mm", default=None, gt=0
+    )
+    surface: Surface | None = Field(default=None, description="a measured surface in place of a generated one")
     shear_modulus: float | None = quantity(
-        "Pa", "static shear modulus G of the incompressible Kelvin body", default=None, gt=0
+        "Pa", "static shear modulus G of the incompressible Kelvin body", usual="10 MPa", default=None, gt=0
     )
     relaxation_time: float | None = quantity(
-        "s", "relaxation time tau = eta / G of the Kelvin body", default=None, gt=0
+        "s", "relaxation time tau = eta / G of the Kelvin body", usual="1 ms", default=None, gt=0
     )
     material: Material | None = Field(default=None, description="any linear material in place of the Kelvin body")
-    normal_force: float = quantity("N", "normal force F_N", gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v", gt=0)
+    normal_force: float = quantity("N", "normal force F_N", usual="1 N", gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v", usual="100 mm/s", gt=0)
     indenter: Indenter = Field(default=Plane(), description="the shape under the roughness")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_exponent_of_a_measured_surface(cls, value: Any) -> Any:
+        return without_exponent(value, "surface")
 
     @model_validator(mode="after")
     def _one_body_and_one_line(self) -> SlidingBody:
-        kelvin = self.shear_modulus is not None and self.relaxation_time is not None
-        either = self.shear_modulus is not None or self.relaxation_time is not None
-        if (self.material is None and not kelvin) or (self.material is not None and either):
-            raise ValueError("expected shear_modulus with relaxation_time, or material")
-        generated = self.length is not None and self.rms_roughness is not None
-        partly = self.length is not None or self.rms_roughness is not None
-        if (self.profile is None and not generated) or (self.profile is not None and partly):
-            raise ValueError("expected length with rms_roughness, or profile")
+        problem = self._problem_of_line()
+        if problem:
+            raise ValueError(problem)
+        self.require_one_way()
         return self
+
+    def _problem_of_line(self) -> str:
+        """Say what stands in the way of the line that is named; an empty string if nothing does."""
+        if self.surface is None:
+            return "" if self.hurst is not None else "expected hurst with rms_roughness, got none"
+        both = [name for name in GENERATED if getattr(self, name) is not None]
+        if both:
+            return f"surface takes the place of {', '.join(both)}: leave out one or the other"
+        if self.surface.profile is not None and self.length is not None:
+            return "surface: {profile: ...} brings its length with it: leave out length"
+        if self.surface.profile is None and self.length is None:
+            return "expected length, of the line that stands for the surface"
+        return ""
+
+    def wavelengths(self) -> tuple[float, float]:
+        """Return the shortest and the longest wavelength of the line, m."""
+        if self.surface is not None and self.surface.profile is not None:
+            line = line_of(self.surface.profile)
+            return 2 * line.length / line.height.size, line.length
+        assert self.length is not None
+        ends = [(self.longest_wavelength or self.length, 0.0)]
+        if self.surface is not None:
+            ends = [spectrum.wavelengths for spectrum in spectra_of(self.surface)]
+        shortest = max(2 * self.length / self.points, min(short for _, short in ends))
+        return shortest, min(self.length, max(long for long, _ in ends))
+
+
+def frequency_notes(sets: Sequence[SlidingBody]) -> tuple[str, ...]:
+    """Say how the frequencies of a study, q v, meet those that a law or a table tells, at every temperature."""
+    velocities = [one.velocity for one in sets]
+    waves = [one.wavelengths() for one in sets]
+    low = 2 * math.pi * min(velocities) / max(longest for _, longest in waves)
+    high = 2 * math.pi * max(velocities) / min(shortest for shortest, _ in waves)
+    told = []
+    for material in dict.fromkeys(one.material for one in sets if one.material is not None):
+        known = frequencies(material)
+        if known is None:
+            continue
+        at = "" if material.temperature is None else f" at {shown(material.temperature, 'K')}"
+        ends = f"q v of {low:.2g} to {high:.2g} rad/s{at}, data from {known[0]:.2g} to {known[1]:.2g} rad/s"
+        told.append(f"{ends}: {_met((low, high), known)}")
+    return tuple(told)
+
+
+def _met(asked: tuple[float, float], known: tuple[float, float]) -> str:
+    """Return in words how much of the decades asked for the data tell."""
+    (low, high), (first, last) = np.log10(asked), np.log10(known)
+    beyond = {"below": max(first - low, 0.0), "above": max(high - last, 0.0)}
+    if high <= first or low >= last:
+        return "outside the data, the solid is extrapolated at every velocity"
+    far = [f"{decades:.2g} decades {side}" for side, decades in beyond.items() if decades > 0.05]
+    return f"extrapolated {' and '.join(far)}" if far else "inside"

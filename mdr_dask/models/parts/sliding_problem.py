@@ -13,8 +13,9 @@ from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Status, canonical
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
-from mdr_dask.models.parts.rough_line import Generated, Measured, Roughness, Smooth
+from mdr_dask.models.parts.rough_line import Generated, Measured, OfSurface, Roughness, Smooth
 from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.surface import Surface
 from mdr_dask.physics.outcome import Outcome
 
 if TYPE_CHECKING:
@@ -134,14 +135,22 @@ def _lines(block: Block[Any], faults: dict[int, str]) -> tuple[list[Roughness], 
         if key not in distinct:
             distinct[key] = Smooth(numbers[1]) if smooth else Generated(*numbers)
         lines.append(distinct[key])
-    for j, profile in enumerate(each(block, "profile")):
-        if profile is not None:
+    surfaces: dict[Any, OfSurface | Measured] = {}
+    for j, surface in enumerate(each(block, "surface")):
+        if surface is not None:
+            key = surface, columns[1][j], length[j]
             try:
-                line = Measured(profile)
-                lines[j], length[j], height[j] = line, line_of(profile).length, line.height()
+                line = surfaces.setdefault(key, _measured(*key))
+                length[j] = line_of(line.profile).length if isinstance(line, Measured) else length[j]
+                lines[j], height[j] = line, line.height()
             except DataError as problem:
                 faults[j] = str(problem)
     return lines, length, height
+
+
+def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measured:
+    """Return the roughness of a measured surface, in units of length and height."""
+    return OfSurface(surface, points, length) if surface.profile is None else Measured(surface.profile)
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any]]:

@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mdr_dask.models.base import Model, Output, deferred, quantity
-from mdr_dask.models.parts.material import fit_notes
-from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.base import Model, Number, Output, deferred, quantity
+from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 
 
 class SlidingFriction(SlidingBody):
@@ -38,7 +37,7 @@ SOLVE = "mdr_dask.models.sliding_friction.solve"
 
 MODEL = Model(
     name="sliding_friction",
-    version=6,
+    version=7,
     summary="steady friction of a viscoelastic body on a rough line or a rough indenter",
     parameters=SlidingFriction,
     outputs=OUTPUTS,
@@ -46,6 +45,15 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     whole=("normal_force", "velocity", "shear_modulus", "relaxation_time", "rms_roughness"),
     distinct=deferred(SOLVE, "distinct"),
+    notes=frequency_notes,
     memory=deferred(SOLVE, "memory"),
-    notes=lambda parameters: fit_notes(parameters.material),
+    numbers=(
+        *NUMBERS,
+        Number(
+            "scaled_friction",
+            "friction_coefficient / (sqrt(2) * rms_slope)",
+            "friction over sqrt 2 times the rms slope",
+        ),
+    ),
+    compiling=20.0,
 )

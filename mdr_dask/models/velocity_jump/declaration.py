@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, Number, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol
 from mdr_dask.models.parts.material import solid_of
-from mdr_dask.models.parts.sliding_body import SlidingBody
+from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid
@@ -21,8 +21,8 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 class VelocityJump(SlidingBody):
     """A viscoelastic body under a load on a rough line, whose velocity jumps from v_1 to v_1 + dv."""
 
-    rms_roughness: float | None = quantity("m", "rms height h of the roughness", default=None, gt=0)
-    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", gt=0)
+    rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
+    velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
         "1", "grid points for every Nyquist point of the transient", default=4, ge=2, le=256, multiple_of=2
     )
@@ -84,7 +84,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=4,
+    version=5,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,
@@ -92,4 +92,14 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
+    numbers=(
+        *NUMBERS,
+        Number(
+            "relative_jump",
+            "friction_coefficient_jump / friction_coefficient_before",
+            "immediate change of the friction over the friction before",
+        ),
+    ),
+    notes=frequency_notes,
+    compiling=28.0,
 )

@@ -24,7 +24,7 @@ from mdr_dask.physics.surfaces.shapes import Shape
 
 
 class Settings(NamedTuple):
-    """What was tuned, with ``python -m benchmarks friction honesty`` on seeds other than those of docs/friction.md."""
+    """What was tuned, with ``python -m benchmarks friction honesty``, on seeds other than those of the evidence."""
 
     finest: int = 64  # oversampling beyond which a case is given up
     safety: float = 3.0  # of the difference between two grids of cubic cells

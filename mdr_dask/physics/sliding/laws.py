@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 INDENTER_EXPONENT = 1.5  # alpha of eq. 3.40
-BETA = 1.6  # beta of eq. 3.11, all Hurst exponents: measured 1.61 to 1.67 (docs/friction.md, Laws)
+BETA = 1.6  # beta of eq. 3.11, all Hurst exponents: measured 1.61 to 1.67 (docs/evidence/friction.md, Laws)
 
 
 def force_number(force: Any, shear_modulus: Any, rms: Any, length: Any) -> Any:

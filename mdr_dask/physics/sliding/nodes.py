@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ SUMMIT = 64  # nodes in a cell that its highest point is taken from
 # What is known of a block of cells, in this order
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 KNOWN = 5
+# What a tile holds, in this order: at nodes, from the one before it on, and of cells
+HEIGHT, SLOPE, MEAN, SQUARE, TOP = range(5)
+IN_A_TILE = 5
 
 
 class Nodes(NamedTuple):
@@ -49,7 +53,7 @@ def _close(turn: FloatArray) -> None:
 
 
 @njit(nogil=True, cache=True, inline="always")
-def end_term(h: FloatArray, s: FloatArray, i: int) -> float:
+def _end_term(h: FloatArray, s: FloatArray, i: int) -> float:
     """Return what Euler and Maclaurin add to the trapezium of the slope squared at its first node, in cells.
 
     The derivatives come from heights and slopes at the nodes beside; over a whole line the terms cancel.
@@ -88,25 +92,74 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         for i in range(BEFORE, n + BEFORE):
             s[i] = 0.5 * (h[i + 1] - h[i - 1])
     _close(s)
-    blocks, terms, above, parts = np.empty((n // BLOCK, KNOWN)), np.empty(BLOCK + 1), np.empty(BLOCK), np.empty(BLOCK)
+    blocks, square, above, mean = np.empty((n // BLOCK, KNOWN)), np.empty(BLOCK + 1), np.empty(BLOCK), np.empty(BLOCK)
     for j in range(blocks.shape[0]):
         begin, last = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
         # cell by cell, so that these are vector instructions, and then their sums
-        for k in range(BLOCK + 1):
-            terms[k] = end_term(h, s, begin + k)
+        _integrals(h, s, begin, BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
             above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
-            parts[k] = 0.5 * (h[i] + h[i + 1]) + (s[i] - s[i + 1]) / 12
-            terms[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + terms[k] - terms[k + 1]
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
         for k in range(BLOCK):
             peak, lowest, steepest = max(peak, above[k]), min(lowest, h[begin + k]), min(steepest, s[begin + k])
-            heights += parts[k]
-            squares += terms[k]
+            heights += mean[k]
+            squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
     return Nodes(h, s, blocks, top)
+
+
+@njit(nogil=True, cache=True)
+def _integrals(h: FloatArray, s: FloatArray, first: int, cells: int, mean: FloatArray, square: FloatArray) -> None:
+    """Write the integrals of the height and of the slope squared over cells; `square` is one longer."""
+    for k in range(cells + 1):
+        square[k] = _end_term(h, s, first + k)
+    for k in range(cells):
+        i = first + k
+        mean[k] = 0.5 * (h[i] + h[i + 1]) + (s[i] - s[i + 1]) / 12
+        square[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + square[k] - square[k + 1]
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def _peaks(h: FloatArray, s: FloatArray, first: int, cells: int, peak: FloatArray) -> None:
+    """Write the highest point of cells."""
+    for k in range(cells):
+        i = first + k
+        rise = h[i + 1] - h[i]
+        a, b = 3 * rise - 2 * s[i] - s[i + 1], s[i] + s[i + 1] - 2 * rise
+        inside = a * a - 3 * s[i] * b
+        x = s[i] / ((math.sqrt(inside) if inside > 0 else 0.0) - a)
+        x = x if (x > 0) & (x < 1) else 0.0
+        top, ends = h[i] + x * (s[i] + x * (a + x * b)), max(h[i], h[i + 1])
+        peak[k] = top if top > ends else ends
+
+
+@njit(nogil=True, cache=True)
+def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
+    """Write a tile of a line, on the finer grid that weights make, and return the number of its cells.
+
+    Parameters
+    ----------
+    line : Nodes
+    first, cells : int
+        First node, and number of the cells of the line.
+    weights : array, shape (2, refinement, 4 WING)
+        From :func:`weights`.
+    tile : array, shape (IN_A_TILE, cells refinement + 3)
+        Written, row by row: heights and slopes, a node before the first one and one behind the last one too; integrals
+        of the height and of the slope squared over each cell, and its highest point.
+    """
+    refinement = weights.shape[1]
+    if refinement == 1:
+        tile[HEIGHT, : cells + 3] = line.height[first - 1 : first + cells + 2]
+        tile[SLOPE, : cells + 3] = line.slope[first - 1 : first + cells + 2]
+    else:
+        refine(line, first, cells, weights, tile[HEIGHT], tile[SLOPE])
+    cells *= refinement
+    _integrals(tile[HEIGHT], tile[SLOPE], 1, cells, tile[MEAN], tile[SQUARE])
+    _peaks(tile[HEIGHT], tile[SLOPE], 1, cells, tile[TOP])
+    return cells
 
 
 def _hermite(places: FloatArray, x: float) -> FloatArray:

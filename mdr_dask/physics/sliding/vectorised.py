@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, Nodes, nodes, summit, weights
+from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, IN_A_TILE, Nodes, nodes, summit, weights
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
@@ -130,8 +130,7 @@ def _solve(
     """
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    local = np.empty((2, cells + 3))
-    workspace, near = np.zeros(ROWS * LANES), np.zeros(ROWS * LANES)
+    workspace, tile = np.zeros(ROWS * LANES), np.empty((IN_A_TILE, cells + 3))
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
     last_step, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
@@ -144,7 +143,7 @@ def _solve(
         for _ in range(settings.iterations):
             if count == 0:
                 break
-            sweep(line, weights, local, workspace, near, queue, count)
+            sweep(line, weights, tile, workspace, queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]

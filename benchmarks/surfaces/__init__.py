@@ -1,0 +1,1 @@
+"""Measured surfaces, and how far rough lines stand for them."""

@@ -1,0 +1,117 @@
+"""Rough circular punches on an elastic half-space by ContactMechanics, and the lines of the method beside them.
+
+``python -m benchmarks surfaces punches [SURFACES POINTS]`` computes what is missing in docs/evidence/punches.csv.
+"""
+
+import csv
+import sys
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy import fft
+
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.areal import areal_surface
+from mdr_dask.physics.surfaces.spectrum import self_affine
+
+TABLE = Path(__file__).parents[2] / "docs/evidence/punches.csv"
+COLUMNS = ("body", "hurst", "points", "index", "load", "approach", "contact", "gap")
+HURST = (0.3, 0.5, 0.8)
+LOADS = np.geomspace(1e-4, 1, 9)  # F / (E* L h)
+HEIGHT = 1e-3  # h / L: any, all is linear
+TOLERANCE = 3e-5  # largest penetration over h
+LINES, SEED = 200, 14
+LONGEST, RESOLVED = 2, 8  # waves over the diameter; points of the shortest wave
+
+
+def spectrum(hurst, points):
+    """Return the spectrum of the punch of diameter 1 and rms height 1."""
+    return self_affine(hurst, 1 / LONGEST, RESOLVED / points)
+
+
+def line(hurst, points, index):
+    """Return approach and gap over h, and length in contact over L, of one line at every load."""
+    modes = points // RESOLVED
+    amplitude = spectrum(hurst, points).line(1.0, modes)
+    height = np.sort(roughness.line(amplitude, roughness.phases(SEED, index, modes), points))[::-1]
+    touching = np.arange(1, points + 1)
+    carried = (np.cumsum(height) - touching * height) / points  # F / (E* L h) as each point comes into contact
+    count = np.searchsorted(carried, LOADS, side="right")
+    depth = (LOADS * points - np.cumsum(height)[count - 1]) / count
+    gap = [np.mean(np.maximum(-d - height, 0)) for d in depth]
+    return depth, count / points, gap
+
+
+@lru_cache(maxsize=1)
+def free_half_space(points):
+    """Return ContactMechanics' half-space of unit size and modulus; its transforms pass over the padding."""
+    from ContactMechanics import FreeFFTElasticHalfSpace
+
+    class HalfSpace(FreeFFTElasticHalfSpace):
+        def __init__(self, points):
+            self._comp_nb_grid_pts = (2 * points, 2 * points)
+            super().__init__((points, points), 1.0, (1.0, 1.0))
+            impulse = np.zeros(self._comp_nb_grid_pts)
+            impulse[0, 0] = 1
+            self.response = fft.rfft2(super().evaluate_disp(impulse))
+
+        def evaluate_disp(self, forces, bIncludePadding=False):
+            n = forces.shape[0] // 2
+            waves = fft.fft(fft.rfft(forces[:n, :n], 2 * n, axis=1), 2 * n, axis=0, overwrite_x=True)
+            waves *= self.response
+            displacement = np.zeros_like(forces)
+            inner = fft.ifft(waves, axis=0, overwrite_x=True)[:n]
+            displacement[:n, :n] = fft.irfft(inner, 2 * n, axis=1, overwrite_x=True)[:, :n]
+            return displacement
+
+    return HalfSpace(points)
+
+
+def half_space(hurst, points, index):
+    """Return approach and gap over h, and area in contact over that of the punch, of one surface at every load."""
+    from ContactMechanics.Systems import NonSmoothContactSystem
+    from SurfaceTopography import Topography
+
+    place = (np.arange(points) + 0.5) / points - 0.5
+    punch = np.hypot(place[:, None], place) < 0.5
+    height = HEIGHT * areal_surface(spectrum(hurst, points), (points, points), (1.0, 1.0), SEED, index)
+    surface = Topography(np.ma.masked_array(height, ~punch), (1.0, 1.0))
+    system = NonSmoothContactSystem(free_half_space(points), surface)
+    rows = []
+    for load in LOADS:
+        found = system.minimize_proxy(external_force=load * HEIGHT, pentol=TOLERANCE * HEIGHT, maxiter=2000)
+        if not found.success:
+            raise RuntimeError(f"H = {hurst}, surface {index}, load {load:.2g}: {found.message}")
+        gap = found.x[:points, :points] - height - found.offset
+        rows.append((found.offset / HEIGHT, np.mean(found.jac[punch] > 0), np.mean(gap[punch]) / HEIGHT))
+    return tuple(np.array(rows).T)
+
+
+def rows():
+    """Return what has been computed, as a list of dictionaries."""
+    if not TABLE.exists():
+        return []
+    with TABLE.open() as stream:
+        return list(csv.DictReader(stream))
+
+
+def compute(surfaces=20, points=512):
+    """Append what is missing, one surface or line after the other."""
+    known = {(row["body"], float(row["hurst"]), int(row["points"]), int(row["index"])) for row in rows()}
+    for body, function, count in (("line", line, LINES), ("half-space", half_space, surfaces)):
+        for index in range(count):
+            for hurst in HURST:
+                if (body, hurst, points, index) in known:
+                    continue
+                columns = function(hurst, points, index)
+                new = not TABLE.exists()
+                with TABLE.open("a", newline="") as stream:
+                    writer = csv.writer(stream, lineterminator="\n")
+                    writer.writerows([COLUMNS] if new else [])
+                    for load, *numbers in zip(LOADS, *columns, strict=True):
+                        writer.writerow([body, hurst, points, index, *(f"{x:.6g}" for x in (load, *numbers))])
+
+
+if __name__ == "__main__":
+    compute(*map(int, sys.argv[1:]))

@@ -1,0 +1,164 @@
+"""The first campaign of a model: every parameter with a common value, its unit and its meaning, ready to be edited."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from mdr_dask.campaign import fields
+from mdr_dask.campaign.reference import yaml_text
+from mdr_dask.models.base import DataFile, Model, NamedFile, Parameters, said, unit_of
+from mdr_dask.units import is_unit, shown
+
+_HEAD = """\
+# yaml-language-server: $schema=campaign.schema.json
+#
+# {summary}
+#   mdr-dask schema -o campaign.schema.json    lets an editor complete and check as you type
+#   mdr-dask check {file}
+#   mdr-dask run {file}
+#
+# A number carries its unit; a bare one is in SI. To vary a parameter, give it a list, {{linear: [a, b, n]}} or
+# {{geometric: [a, b, n]}}. What has a # in front is optional; its value there is the default, or an example.
+name: {name}
+model: {model}
+seed: 1
+realisations: 1                     # independent rough lines, or scatter, of each case; 20 or more for a mean
+# sampling: zip                     # or {{sobol: 100}}, {{latin_hypercube: 100}}, {{table: cases.csv}}; else a grid
+# accuracy: 1 %                     # error allowed for the outputs
+
+parameters:
+"""
+#: Column of the comments, and the longest value that is written out.
+_COMMENTS, _LONGEST = 36, 60
+_EXAMPLE_FILE = "table.csv"
+_BOUNDS = ("gt", "ge", "lt", "le")
+
+
+def draft(name: str, model: Model[Any], file: str) -> str:
+    """Return the text of a campaign that passes every check, unless the model cannot do without a file.
+
+    Parameters
+    ----------
+    name : str
+        As a campaign names the model.
+    model : Model
+        The model.
+    file : str
+        What the campaign file will be called, for its comments.
+    """
+    short = name.partition(":")[2].lower() if ":" in name else name
+    summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
+    head = _HEAD.format(summary=summary, file=file, name=short, model=name)
+    wanted = [output.name for output in model.outputs if output.default]
+    more = [output.name for output in model.outputs if not output.default]
+    lines = [*_entries(model.parameters), "", f"outputs: [{', '.join(wanted)}]"]
+    lines += [f"# also: {', '.join(more)}"] if more else []
+    return head + "\n".join(lines) + "\n"
+
+
+def _entries(parameters: type[Parameters]) -> Iterator[str]:
+    """Yield the lines of all parameters: those that are needed live, the others as comments."""
+    needed = _needed(parameters)
+    told: dict[str, None] = {}
+    for ways in parameters.ways:
+        yield from textwrap.wrap(f"{said(ways)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
+        names = {name.partition(".")[0]: None for way in ways for name in way}
+        for name in [name for name in names if name not in told]:
+            yield from _entry(parameters, name, needed)
+        told |= names
+        yield ""
+    rest = [name for name in parameters.model_fields if name not in told]
+    for name in sorted(rest, key=lambda name: name not in needed):
+        yield from _entry(parameters, name, needed)
+
+
+def _needed(parameters: type[BaseModel]) -> set[str]:
+    """Return the parameters without which there is no case, dotted ones of structures among them."""
+    ways = getattr(parameters, "ways", ())
+    required = {name for name, info in parameters.model_fields.items() if info.is_required()}
+    return required | {name for each in ways for name in each[0]}
+
+
+def _entry(parameters: type[BaseModel], name: str, needed: set[str]) -> Iterator[str]:
+    info = parameters.model_fields[name]
+    inner = {path.partition(".")[2] for path in needed if path.startswith(f"{name}.")}
+    mark = "" if name in needed or inner else "# "
+    first, *others = _values(parameters, name, inner)
+    start = f"  {mark}{name}: {first}"
+    yield f"{start:{_COMMENTS - 2}s}  # {_comment(info, first)}".rstrip()
+    yield from (f"  # or {name}: {other}" for other in others)
+
+
+def _comment(info: FieldInfo, value: str) -> str:
+    others = [choice for choice in _choices(info) if choice != value]
+    return "; or ".join(filter(None, [info.description or "", ", ".join(others)]))
+
+
+def _choices(info: FieldInfo) -> list[str]:
+    """Return the words that a field may have."""
+    kinds = [kind for kind in fields.members(info.annotation) if get_origin(kind) is Literal]
+    return [str(choice) for kind in kinds for choice in get_args(kind)]
+
+
+def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
+    """Return what may be written for a field: one text, or one for each structure that it may be."""
+    info = parameters.model_fields[name]
+    kinds = [kind for kind in fields.structures(info) if kind is not DataFile]
+    if inner:
+        kinds.sort(key=lambda kind: not inner <= set(kind.model_fields))
+    found = [text for kind in kinds for text in _structures(kind, inner)]
+    if not found or isinstance(info.default, str):
+        found.insert(0, _scalar(parameters, name))
+    return list(dict.fromkeys(found))
+
+
+def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
+    """Return a structure on one line, once for each way to give it."""
+    needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "ways", ())
+    alternatives: list[set[str]] = [set(way) for way in next(iter(ways), ())] or [needed]
+    texts = []
+    for way in alternatives:
+        keys = [key for key in kind.model_fields if key in fixed or key in way or key in inner]
+        parts = [f"{key}: {fixed[key] if key in fixed else _values(kind, key, set())[0]}" for key in keys]
+        texts.append(f"{{{', '.join(parts)}}}")
+    return texts
+
+
+def _scalar(parameters: type[BaseModel], name: str) -> str:
+    """Return a value of a field: a common one, the default, or one within its bounds."""
+    info = parameters.model_fields[name]
+    kinds = fields.members(info.annotation)
+    unit = unit_of(parameters, name)
+    default = None if info.is_required() else info.get_default(call_default_factory=True, validated_data={})
+    if isinstance(default, int | float) and not isinstance(default, bool) and unit is not None:
+        return shown(default, unit, 12)
+    if default is not None:
+        return text if len(text := yaml_text(default)) <= _LONGEST else "[...]"
+    usual = fields.usual(info)
+    if usual:
+        return f"[{usual}]" if fields.holds_list(info) else usual
+    if DataFile in kinds or info.annotation == tuple[NamedFile, ...]:
+        return f"[{_EXAMPLE_FILE}]" if fields.holds_list(info) else _EXAMPLE_FILE
+    if bool in kinds:
+        return "true"
+    if _choices(info):
+        return _choices(info)[0]
+    number = _inside(info)
+    text = f"{number:g} {unit}" if unit and unit != "1" and is_unit(unit) else f"{number:g}"
+    return f"[{text}]" if fields.holds_list(info) else text if {int, float} & set(kinds) else "text"
+
+
+def _inside(info: FieldInfo) -> float:
+    """Return a number within the bounds of a field, 1 if they allow it."""
+    bounds = {key: getattr(part, key) for part in info.metadata for key in _BOUNDS if hasattr(part, key)}
+    low = bounds.get("ge", bounds.get("gt", -math.inf))
+    high = bounds.get("le", bounds.get("lt", math.inf))
+    if low < 1 < high:
+        return 1.0
+    return float(low + 1 if math.isinf(high) else high - 1 if math.isinf(low) else (low + high) / 2)

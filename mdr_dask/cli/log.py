@@ -1,0 +1,75 @@
+"""The log of a run, in JSON lines, and the words that its user has to hear at once."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
+
+from mdr_dask.cli.printing import printable
+from mdr_dask.version import __version__
+
+if TYPE_CHECKING:
+    from mdr_dask.execute import Event, Tell
+
+
+@contextmanager
+def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
+    """Yield the function that takes the events of a run: into its log, and what is urgent to stderr.
+
+    Parameters
+    ----------
+    quiet : bool
+        Nothing on stderr.
+    log : Path or None
+        File that the log is appended to.
+    about
+        What its first line tells of the run.
+    """
+    if log is None:
+        yield _speaker(quiet)
+        return
+    say = _speaker(quiet)
+    with log.open("a", encoding="utf-8") as stream:
+        write = _writer(stream)
+
+        def tell(event: Event) -> None:
+            write(event.name, dict(event.facts))
+            say(event)
+
+        write("run begun", {**about, "mdr_dask": __version__, "host": platform.node(), "process": os.getpid()})
+        try:
+            yield tell
+        except BaseException as error:
+            write("run broken off", {"why": str(error) or type(error).__name__})
+            raise
+        write("run ended", {})
+
+
+def _speaker(quiet: bool) -> Callable[[Event], None]:
+    def say(event: Event) -> None:
+        if event.sentence and not quiet:
+            click.echo(printable(event.sentence), err=True)
+
+    return say
+
+
+def _writer(stream: TextIO) -> Callable[[str, dict[str, Any]], None]:
+    """Return the function that writes one line, whole, from any thread."""
+    lock = threading.Lock()
+
+    def write(name: str, facts: dict[str, Any]) -> None:
+        line = {"time": datetime.now(UTC).isoformat(timespec="milliseconds"), "event": name, **facts}
+        with lock:
+            stream.write(json.dumps(line) + "\n")
+            stream.flush()
+
+    return write

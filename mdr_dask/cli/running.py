@@ -1,0 +1,142 @@
+"""The command that runs a campaign."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdr_dask.cli.campaigns import CAMPAIGN, ask
+from mdr_dask.cli.log import telling
+from mdr_dask.cli.printing import print_json
+from mdr_dask.cli.progress import reporter, seconds
+from mdr_dask.cli.understood import costs_row, study_lines
+
+if TYPE_CHECKING:
+    from mdr_dask.campaign import Campaign
+    from mdr_dask.execute import Part, Progress, Resources
+
+
+@click.command()
+@click.argument("campaign", type=CAMPAIGN)
+@click.option("--store", "url", help="Path or URL of the store, instead of the one that the file names.")
+@click.option("--dry-run", is_flag=True, help="Say what would be done, and do nothing.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads of this process (default: one per core).")
+@click.option("--workers", type=click.IntRange(min=1), help="Start a local Dask cluster of so many processes.")
+@click.option("--scheduler", metavar="ADDRESS", help="Use the running Dask scheduler at ADDRESS.")
+@click.option("--cluster", type=CAMPAIGN, help="YAML file with class, arguments and scale of any Dask cluster.")
+@click.option(
+    "--patience",
+    type=click.IntRange(1),
+    metavar="SECONDS",
+    default=600,
+    show_default=True,
+    help="Wait for workers so long.",
+)
+@click.option("--part", metavar="K/N", help="Run the K-th of N disjoint sets of blocks, beside the other ones.")
+@click.option("--retry-failed", is_flag=True, help="Compute the cases again that failed or did not converge.")
+@click.option("--log", type=click.Path(dir_okay=False, path_type=Path), help="Append events to FILE, JSON lines.")
+@click.option("--quiet", is_flag=True, help="No progress on stderr.")
+@click.option("--json", "form", flag_value="json", help="Print the outcome as one JSON document.")
+def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str | None, **options: Any) -> int:
+    """Run a campaign into its store: everything, or what is missing.
+
+    Interrupt it, kill it, run it again: what is in the store is kept, and only the rest is computed.
+
+    \b
+    mdr-dask run campaigns/quickstart.yaml
+    mdr-dask run campaigns/friction_force.yaml --workers 2
+    mdr-dask run campaigns/friction_force.yaml --scheduler tcp://head:8786
+    mdr-dask run campaigns/friction_force.yaml --part 3/8
+    """
+    from mdr_dask.campaign import load
+
+    study = load(campaign)
+    url = options["url"] or study.store
+    if url.startswith("memory:"):
+        raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
+    ask(study)
+    if dry_run:
+        _print_plan(study, url, form)
+        return 0
+    from mdr_dask import execute
+
+    resources, part = _resources(options), _part(options["part"])
+    about = {"campaign": str(campaign), "store": url, "part": options["part"]}
+    with reporter(quiet) as report, telling(quiet, log, **about) as tell:
+        progress = execute.run(study, url, resources, report, options["retry_failed"], part, tell)
+    _print_outcome(url if part is None else f"{url}, part {part}", url, progress, form)
+    return 1 if progress.failed else 0
+
+
+def _print_plan(study: Campaign, url: str, form: str | None) -> None:
+    from mdr_dask import store
+    from mdr_dask.plan import estimate
+
+    costs = estimate(study)
+    kept, to_do = 0, costs.results
+    if store.exists(url):
+        from mdr_dask.execute import outlook
+
+        progress = outlook(study, url)
+        kept, to_do = progress.kept, progress.to_do
+    if form == "json":
+        print_json({"campaign": study.name, "store": url, **costs_row(costs), "kept": kept, "to_do": to_do})
+        return
+    click.echo("\n".join([f"{study.name} -> {url}", *study_lines(study, costs)]))
+    if kept:
+        left = seconds(costs.seconds * to_do / costs.results)
+        click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
+
+
+def _resources(options: dict[str, Any]) -> Resources:
+    from mdr_dask.campaign.cluster import load_cluster
+    from mdr_dask.execute import Resources
+
+    chosen = [name for name in ("threads", "workers", "scheduler", "cluster") if options[name] is not None]
+    if len(chosen) > 1:
+        raise click.UsageError(f"expected one of --{', --'.join(chosen)}, got {len(chosen)} of them")
+    cluster = options["cluster"] and load_cluster(options["cluster"])
+    return Resources(options["threads"], options["workers"], options["scheduler"], cluster, options["patience"])
+
+
+def _part(text: str | None) -> Part | None:
+    from mdr_dask.execute import Part
+
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)
+    number, count = map(int, found.groups()) if found else (0, 0)
+    if not 1 <= number <= count:
+        raise click.UsageError(f"--part: expected K/N with K from 1 to N, such as 3/8, got {text!r}")
+    return Part(number, count)
+
+
+def _print_outcome(what: str, url: str, progress: Progress, form: str | None) -> None:
+    if form == "json":
+        from dataclasses import asdict
+
+        print_json({"store": url, **asdict(progress)})
+        return
+    fresh = progress.done + progress.failed
+    if not fresh and not progress.not_needed:
+        click.echo(f"{what}: all {progress.kept} results are there already; nothing to do")
+        return
+    kept = f"{progress.kept} kept, " if progress.kept else ""
+    spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
+    click.echo(f"{what}: {kept}{progress.done} done, {progress.failed} failed{spared}")
+    click.echo(
+        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {progress.blocks} blocks, "
+        f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
+        err=True,
+    )
+    if progress.failed:
+        click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+
+
+def _shared(progress: Progress) -> str:
+    """Return the share of the results that needed no solve of their own."""
+    share = 1 - progress.solves / max(progress.done + progress.failed, 1)
+    return f" ({share:.1%} of the results needed none of their own)" if progress.solves and share > 0 else ""

@@ -1,0 +1,122 @@
+"""What a campaign was understood to be: axes, tables, sizes and times, for a reader or as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from mdr_dask.cli.progress import seconds
+from mdr_dask.units import shown
+
+if TYPE_CHECKING:
+    from mdr_dask.campaign import Axis, Campaign
+    from mdr_dask.plan import Estimate
+
+#: Longest list of values that is shown in full.
+LISTED = 6
+#: Seconds that a run takes to start and to end, whatever is in it.
+START = 2.0
+
+
+def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
+    """Yield what a campaign was understood to be: the axes of each series, what its data hold, what it costs."""
+    from mdr_dask import models
+
+    for series in campaign.series:
+        units = models.load(campaign.model).units(series.parameters)
+        if series.name:
+            yield f"  {series.name}{'' if series.axes else ': one case'}"
+        width = max((len(axis.name) for axis in series.axes), default=0)
+        indent = "    " if series.name else "  "
+        for axis in series.axes:
+            unit = units.get(axis.path, axis.unit or "1")
+            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit)}"
+    yield from (f"  {note}" for note in costs.notes)
+    yield from (f"  {line}" for line in cost_lines(costs))
+
+
+def axis_range(axis: Axis, unit: str) -> str:
+    """Return the values of an axis, or their range and number: ``1 mN to 100 N, 20 values, geometric``."""
+    count = len(axis.values)
+    if axis.labels is not None:
+        more = f", ... ({count} values)" if count > LISTED else ""
+        return ", ".join(axis.labels[:LISTED]) + more
+    if count <= LISTED:
+        return ", ".join(shown(value, unit) for value in axis.values)
+    ends = f"{shown(min(axis.values), unit)} to {shown(max(axis.values), unit)}, {count} values"
+    return ends if axis.dim == "case" else ends + spacing(axis.values)
+
+
+def spacing(values: tuple[float, ...]) -> str:
+    """Return how values are spaced, if all alike."""
+    import numpy as np
+
+    numbers = np.asarray(values, dtype=np.float64)
+    steps = np.diff(numbers)
+    if np.allclose(steps, steps[0], rtol=1e-6, atol=0):
+        return ", linear"
+    if np.all(numbers > 0) and np.allclose(np.diff(np.log(numbers)), np.log(numbers[1] / numbers[0]), rtol=1e-6):
+        return ", geometric"
+    return ""
+
+
+def cost_lines(costs: Estimate) -> Iterator[str]:
+    """Yield counts, size and time of a study, from the first round to the last one that there may be."""
+    more = costs.rounds
+    yield (
+        f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
+    )
+    yield f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks"
+    sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
+    times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
+    compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
+    yield f"{sizes} uncompressed, about {times} on one core{compiling}"
+    if more > 1:
+        yield "from the first round to the last one, if no case meets its tolerance before"
+
+
+def human_bytes(size: float) -> str:
+    """Return a number of bytes as a person says it."""
+    for unit in ("B", "kB", "MB", "GB", "TB"):
+        if size < 999.5 or unit == "TB":
+            break
+        size /= 1000
+    return f"{size:.0f} {unit}" if size >= 99.5 or unit == "B" else f"{size:.2g} {unit}"
+
+
+def costs_row(costs: Estimate) -> dict[str, Any]:
+    """Return counts, bytes and seconds of a study under stable keys."""
+    return {
+        "cases": costs.cases,
+        "realisations": costs.realisations,
+        "at_most": costs.at_most,
+        "results": costs.results,
+        "solves": costs.solves,
+        "blocks": costs.blocks,
+        "bytes": costs.bytes,
+        "seconds": float(costs.seconds),
+        "compiling": costs.compiling,
+        "notes": list(costs.notes),
+    }
+
+
+def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
+    """Return the axes of all series: name, unit, number of values, first and last."""
+    return [
+        {
+            "series": series.name,
+            "axis": axis.name,
+            "dimension": axis.dim,
+            "unit": axis.unit,
+            "values": len(axis.values),
+            "first": axis.values[0] if axis.labels is None else axis.labels[0],
+            "last": axis.values[-1] if axis.labels is None else axis.labels[-1],
+        }
+        for series in campaign.series
+        for axis in series.axes
+    ]
+
+
+def _range(first: int, more: float) -> str:
+    """Return a count of the first round, and what it comes to at most."""
+    return f"{first}" if more == 1 else f"{first} to {round(first * more)}"

@@ -1,0 +1,58 @@
+"""How long numba has compiled in this process: the kernels of a model, the first time on a machine."""
+
+from __future__ import annotations
+
+import threading
+import time
+from functools import lru_cache
+from typing import Any
+
+
+class CompileClock:
+    """Seconds in which some thread compiled; compilations inside others, and beside them, count once."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running, self._since, self._before = 0, 0.0, 0.0
+
+    def begin(self) -> None:
+        """Note that a compilation begins."""
+        with self._lock:
+            self._since = self._since if self._running else time.perf_counter()
+            self._running += 1
+
+    def end(self) -> None:
+        """Note that one has ended."""
+        with self._lock:
+            self._running -= 1
+            if not self._running:
+                self._before += time.perf_counter() - self._since
+
+    @property
+    def is_running(self) -> bool:
+        """Whether some thread compiles now."""
+        return self._running > 0
+
+    @property
+    def seconds(self) -> float:
+        """Time spent so far."""
+        with self._lock:
+            return self._before + (time.perf_counter() - self._since if self._running else 0.0)
+
+
+@lru_cache(maxsize=1)
+def compile_clock() -> CompileClock:
+    """Return the clock of this process, listening to numba from now on."""
+    from numba.core.event import Event, Listener, register
+
+    clock = CompileClock()
+
+    class Listening(Listener):
+        def on_start(self, event: Event) -> Any:
+            clock.begin()
+
+        def on_end(self, event: Event) -> Any:
+            clock.end()
+
+    register("numba:compile", Listening())  # type: ignore[no-untyped-call]
+    return clock

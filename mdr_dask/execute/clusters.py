@@ -1,0 +1,156 @@
+"""Starting a Dask cluster, or finding one that runs."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from importlib import import_module
+from typing import Any
+
+import dask
+from distributed import Client, LocalCluster
+from distributed.comm import get_address_host_port
+from distributed.deploy import Cluster
+from distributed.security import Security
+
+from mdr_dask.errors import ClusterError
+from mdr_dask.execute.crew import Crew
+from mdr_dask.execute.events import Event, Tell
+from mdr_dask.execute.resources import Resources
+
+#: Run in every worker process: Ctrl-C reaches them too, and it is for the driver to end them.
+IGNORE_INTERRUPTS = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+#: Seconds that a scheduler is given to answer.
+SCHEDULER_PATIENCE = 10
+#: Where the page of a scheduler is served: to this machine alone.
+DASHBOARD = "127.0.0.1:0"
+#: Seconds of work that a cluster which grows by itself should have for each of its threads: about a block.
+TARGET_DURATION = "1s"
+#: Loggers that complain when workers cannot be started: that ends up in our sentences.
+STARTING = ("distributed.deploy", "dask_jobqueue", "tornado")
+#: Loggers whose complaints follow from what is told in one sentence anyhow.
+ECHOES = ("distributed", "asyncio")
+#: What keeps a cluster on this machine from giving up a worker whose nanny is about to start it again.
+NANNIES = {"distributed.deploy.lost-worker-timeout": "1 day"}
+
+
+class _LastWord(logging.Handler):
+    """Keeps the last complaint of a library, in one line."""
+
+    text = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        error = record.exc_info[1] if record.exc_info else None
+        said = f"{type(error).__name__}: {error}" if error else record.getMessage()
+        self.text = " ".join(said.split())
+
+
+@contextmanager
+def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
+    """Yield the workers of a cluster: of one that is started, or of one that runs.
+
+    Raises
+    ------
+    ClusterError
+        If it cannot be started, or does not answer.
+    """
+    word = _LastWord(logging.ERROR)
+    with ExitStack() as stack:
+        for names, handler in ((STARTING, word), (ECHOES, logging.NullHandler())):
+            for name in names:
+                stack.enter_context(_taken(logging.getLogger(name), handler))
+        again = _nothing
+        if resources.scheduler is not None:
+            tell(Event("connecting", {"scheduler": resources.scheduler}))
+            client, most = stack.enter_context(_connected(resources.scheduler)), 0
+        else:
+            plan = _local(resources.workers) if resources.cluster is None else resources.cluster
+            tell(Event("starting", {"cluster": plan["class"]}, f"starting {plan['class']}"))
+            cluster = stack.enter_context(_started(plan))
+            if isinstance(cluster, LocalCluster):
+                stack.enter_context(dask.config.set(NANNIES))
+            elif "scale" in plan:  # jobs that have reached their wall time are not replaced otherwise
+                again = partial(cluster.scale, **plan["scale"])
+            client, most = stack.enter_context(Client(cluster, set_as_default=False)), _most(plan)
+        yield Crew(client, tell, resources.patience, most, again, lambda: word.text)
+
+
+def _nothing() -> None:
+    """Leave a cluster to itself."""
+
+
+@contextmanager
+def _taken(logger: logging.Logger, handler: logging.Handler) -> Iterator[None]:
+    """Give what a logger has to say to a handler alone."""
+    before = logger.handlers[:], logger.propagate, logger.level
+    logger.handlers, logger.propagate = [handler], False
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.handlers, logger.propagate = before[:2]
+        logger.setLevel(before[2])
+
+
+def _connected(address: str) -> Client:
+    try:
+        get_address_host_port(address)
+        return Client(address, timeout=SCHEDULER_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(f"no Dask scheduler answers at {address!r}: {str(error) or type(error).__name__}") from None
+
+
+def _local(workers: int | None) -> dict[str, Any]:
+    """Return what a cluster file of worker processes on this machine would say."""
+    arguments = {"n_workers": workers, "threads_per_worker": 1, "preload": [IGNORE_INTERRUPTS]}
+    return {"class": "distributed.LocalCluster", "arguments": arguments}
+
+
+def _started(plan: Mapping[str, Any]) -> Cluster:
+    kind = _cluster_class(plan["class"])
+    try:
+        cluster = kind(**_closed_to_others(kind, plan.get("arguments", {})))
+        if "scale" in plan:
+            cluster.scale(**plan["scale"])
+        if "adapt" in plan:
+            cluster.adapt(**{"target_duration": TARGET_DURATION, **plan["adapt"]})
+    except (ImportError, AttributeError, TypeError, ValueError, OSError, RuntimeError) as error:
+        raise ClusterError(f"cannot start {plan['class']!r}: {type(error).__name__}: {error}") from None
+    return cluster
+
+
+def _cluster_class(name: str) -> type[Cluster]:
+    """Return the class of that name; nothing but a Dask cluster is ever called."""
+    package, _, attribute = name.rpartition(".")
+    try:
+        found = getattr(import_module(package), attribute)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ClusterError(f"cannot start {name!r}: {type(error).__name__}: {error}") from None
+    if not (isinstance(found, type) and issubclass(found, Cluster)):
+        raise ClusterError(f"cannot start {name!r}: expected a class of Dask clusters, got {type(found).__name__}")
+    return found
+
+
+def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Add to the arguments what keeps other users out, unless they say otherwise: TLS, and a page for here alone."""
+    local, queue = issubclass(kind, LocalCluster), hasattr(kind, "job_cls")
+    own = dict(arguments)
+    if local:
+        own = {"dashboard_address": DASHBOARD, **own}
+    if queue:
+        own["scheduler_options"] = {"dashboard_address": DASHBOARD, **own.get("scheduler_options", {})}
+    if (local or queue) and own.setdefault("security", True) is True:
+        own["security"] = Security.temporary()
+    if own.get("security") is False:
+        del own["security"]
+    return own
+
+
+def _most(plan: Mapping[str, Any]) -> int:
+    """Return the threads that a cluster may grow to by itself, by its cluster file."""
+    arguments = plan.get("arguments", {})
+    adapt = plan.get("adapt", {})
+    each = arguments.get("cores", 1) if "maximum_jobs" in adapt else arguments.get("threads_per_worker", 1)
+    return int(max(adapt.get("maximum_jobs", 0), adapt.get("maximum", 0)) * each)

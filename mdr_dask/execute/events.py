@@ -1,0 +1,49 @@
+"""What happens in a run, told as it happens: for its log, and for whoever watches it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mdr_dask.models.base import Status
+from mdr_dask.task import Outcome, Work
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened.
+
+    Parameters
+    ----------
+    name : str
+        What it was: ``laid out``, ``block done``, ...
+    facts : mapping
+        What is to be known of it, as JSON can hold it.
+    sentence : str
+        What a user has to be told at once; empty for what goes without saying.
+    """
+
+    name: str
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    sentence: str = ""
+
+
+#: Takes events, from any thread.
+Tell = Callable[[Event], None]
+#: Takes a task that has ended.
+Settle = Callable[[Work, Outcome], None]
+
+
+def of_block(name: str, work: Work, **facts: Any) -> Event:
+    """Return an event of a block."""
+    own = {"series": work.place.series, "block": list(work.place.index), "attempt": work.attempt}
+    return Event(f"block {name}", {**own, **facts})
+
+
+def ended(work: Work, outcome: Outcome) -> Event:
+    """Return the end of a block: it failed where any of its results did."""
+    counts = {state.name.lower(): outcome.counts[state] for state in Status if outcome.counts[state]}
+    failed = outcome.counts[Status.FAILED] + outcome.counts[Status.NOT_CONVERGED]
+    seconds = outcome.compute_seconds + outcome.write_seconds
+    return of_block("failed" if failed else "done", work, results=counts, seconds=round(seconds, 6))

@@ -1,0 +1,218 @@
+"""Tables of a dynamic-mechanical analysis as a campaign names them, and their curves as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.parts.temperature import Law
+from mdr_dask.tables import Column, read_table
+from mdr_dask.units import shown
+
+SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
+#: Neighbouring curves whose moduli are apart by more than this cannot overlap, decades: what instruments scatter.
+APART = 0.02
+
+
+class ModulusTable(Parameters):
+    """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
+
+    file: NamedFile = Field(
+        description="table with columns frequency, storage modulus, loss modulus or tan delta, and perhaps temperature"
+    )
+    frequency_unit: str = Field(default="", description="unit of the frequencies, where the table does not say")
+    modulus_unit: str = Field(default="", description="unit of the moduli, where the table does not say")
+    table_temperature: float | None = quantity("K", "measured temperature to use", default=None, gt=0)
+    reference: float | None = quantity(
+        "K",
+        "temperature at which a table of several is superposed by its own curves; with neither, the shift factors of "
+        "wlf, arrhenius or shift_factors superpose it",
+        default=None,
+        gt=0,
+    )
+    poisson_ratio: float | None = quantity(
+        "1", "given where the moduli are of tension: divides them by 2 (1 + nu)", default=None, ge=-1, le=0.5
+    )
+    arms_per_decade: float = quantity("1", "density of relaxation times", default=1.0, gt=0, le=5)
+
+    @model_validator(mode="after")
+    def _holds_moduli(self, info: ValidationInfo) -> ModulusTable:
+        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        if info.context is not None:
+            try:
+                _measured(self)
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """One curve of moduli.
+
+    Parameters
+    ----------
+    omega, storage, loss : array, shape (points,)
+        Angular frequency, rad/s, and moduli of shear, Pa.
+    temperature : float or None
+        Where it holds, K; None if the table does not say.
+    measured : tuple of float or None
+        Lowest and highest temperature of the table, K.
+    superposed : str
+        How several temperatures became one curve, in a sentence; empty for one temperature.
+    """
+
+    omega: FloatArray
+    storage: FloatArray
+    loss: FloatArray
+    temperature: float | None
+    measured: tuple[float, float] | None
+    superposed: str = ""
+
+
+def one_curve(chosen: ModulusTable, law: Law | None) -> Moduli:
+    """Return the moduli of a table at one temperature, superposed if it has several and none is named.
+
+    Raises
+    ------
+    DataError
+        If the table does not hold moduli, or its curves do not make one.
+    """
+    found = _as_measured(chosen, law)
+    divisor = 1.0 if chosen.poisson_ratio is None else 2 * (1 + chosen.poisson_ratio)
+    return replace(found, storage=found.storage / divisor, loss=found.loss / divisor)
+
+
+def _as_measured(chosen: ModulusTable, law: Law | None) -> Moduli:
+    """Return the moduli at one temperature, of tension where the table has those."""
+    omega, storage, loss, temperature = _measured(chosen)
+    if temperature is None:
+        return Moduli(omega, storage, loss, None, None)
+    ends = float(temperature.min()), float(temperature.max())
+    if ends[1] - ends[0] < SAME_TEMPERATURE:
+        return Moduli(omega, storage, loss, float(temperature.mean()), ends)
+    if chosen.table_temperature is not None:
+        near = _near(temperature, chosen.table_temperature)
+        return Moduli(omega[near], storage[near], loss[near], chosen.table_temperature, ends)
+    member, levels = _levels(temperature)
+    if chosen.reference is None:
+        return _by_law(chosen, law, (omega, storage, loss), member, levels, ends)
+    return _by_curves(chosen.reference, law, (omega, storage, loss), member, levels, ends)
+
+
+def _near(temperature: FloatArray, wanted: float) -> FloatArray:
+    return np.asarray(np.abs(temperature - wanted) <= SAME_TEMPERATURE)
+
+
+def _levels(temperature: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return which of the temperatures each row was measured at, and these temperatures, ascending."""
+    order = np.argsort(temperature, kind="stable")
+    member = np.empty(order.size, dtype=np.intp)
+    member[order] = np.append(0, np.cumsum(np.diff(temperature[order]) > SAME_TEMPERATURE))
+    return member, np.array([temperature[member == number].mean() for number in range(int(member.max()) + 1)])
+
+
+Rows = tuple[FloatArray, FloatArray, FloatArray]
+
+
+def _by_law(
+    chosen: ModulusTable, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
+) -> Moduli:
+    """Shift every temperature by the factors that are known of it."""
+    if law is None:
+        raise DataError(
+            f"{chosen.file.name}: has several temperatures: name one by table_temperature, a reference to superpose "
+            "them at, or the law that superposes them (wlf, arrhenius or shift_factors)"
+        )
+    omega, storage, loss = rows
+    reference = law.reference
+    told = f"superposed at {shown(reference, 'K')} by the shift factors given"
+    return Moduli(omega * law.factor(levels)[member], storage, loss, reference, ends, told)
+
+
+def _by_curves(
+    reference: float, law: Law | None, rows: Rows, member: IntArray, levels: FloatArray, ends: tuple[float, float]
+) -> Moduli:
+    """Shift every temperature to the reference by its storage modulus."""
+    from mdr_dask.physics.superposition.master_curve import superpose
+
+    omega, storage, loss = rows
+    _require_overlap(storage, member, levels)
+    parts = [member == number for number in range(levels.size)]
+    curves = [(np.log10(omega[part]), np.log10(storage[part])) for part in parts]
+    found = superpose(levels, curves, reference=reference)
+    told = (
+        f"superposed at {shown(reference, 'K')} by its own curves{_compared(levels, found.horizontal, law, reference)}"
+    )
+    return Moduli(omega * 10 ** found.horizontal[member], storage, loss, reference, ends, told)
+
+
+def _compared(levels: FloatArray, decades: FloatArray, law: Law | None, reference: float) -> str:
+    """Return how far the shift factors of the curves, log10, lie off those given, which move to other temperatures."""
+    if law is None:
+        return ""
+    try:
+        apart = np.abs(decades - np.log10(law.factor(levels) / law.factor(reference)))
+    except ValueError as error:
+        return f", whose shift factors cannot be compared with those given ({error})"
+    worst = int(apart.argmax())
+    return (
+        f", whose shift factors lie up to {apart[worst]:.2g} decades off those given (at {shown(levels[worst], 'K')})"
+    )
+
+
+def _require_overlap(storage: FloatArray, member: IntArray, levels: FloatArray) -> None:
+    """Refuse curves with a gap in the modulus, which no shift closes, before any is shifted."""
+    low, high = (
+        np.array([find(storage[member == number]) for number in range(levels.size)]) for find in (np.min, np.max)
+    )
+    order = np.argsort(low)
+    reach = np.maximum.accumulate(high[order])
+    for place in np.flatnonzero(np.log10(low[order][1:] / reach[:-1]) > APART)[:1]:
+        below = order[: place + 1][np.argmax(high[order[: place + 1]])]
+        above = order[place + 1]
+        raise DataError(
+            f"the curves do not overlap: the modulus reaches {shown(high[below], 'Pa')} at {shown(levels[below], 'K')} "
+            f"and begins at {shown(low[above], 'Pa')} at {shown(levels[above], 'K')}: measure in between, or give the "
+            "shift factors (wlf, arrhenius or shift_factors, and no reference)"
+        )
+
+
+def _measured(chosen: ModulusTable) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
+    """Return angular frequency, storage and loss modulus and perhaps temperature in SI, as the file has them."""
+    name = chosen.file.name
+    table = read_table(chosen.file.read_text(), name, _columns(chosen))
+    omega, storage, loss = (table.get(column) for column in ("frequency", "storage modulus", "loss modulus"))
+    assert omega is not None
+    assert storage is not None
+    if loss is None and "tan delta" in table:
+        loss = storage * table["tan delta"]
+    if loss is None:
+        raise DataError(f"{name}: expected a column loss modulus or tan delta")
+    temperature, wanted = table.get("temperature"), chosen.table_temperature
+    if temperature is not None and wanted is not None and np.count_nonzero(_near(temperature, wanted)) < 2:
+        _, levels = _levels(temperature)
+        known = ", ".join(shown(level, "K") for level in levels[:12])
+        raise DataError(f"{name}: got no rows at {shown(wanted, 'K')}; it was measured at {known}")
+    return omega, storage, loss, temperature
+
+
+def _columns(chosen: ModulusTable) -> tuple[Column, ...]:
+    """Return the columns of a dynamic-mechanical analysis, by the names that machines and people give them."""
+    storage = ("E'", "G'", "storage", "E stor", "G stor", "Estor", "Gstor", "E1", "G1")
+    loss = ("E''", "G''", "loss", "E loss", "G loss", "Eloss", "Gloss", "E2", "G2")
+    temperature = ("T", "temp", "temp.", "sample temperature")
+    frequency = ("f", "freq", "freq.", "omega", "angular frequency", "w", "ω")
+    return (
+        Column("frequency", "rad/s", frequency, above=0, given_unit=chosen.frequency_unit),
+        Column("storage modulus", "Pa", storage, above=0, given_unit=chosen.modulus_unit),
+        Column("loss modulus", "Pa", loss, needed=False, above=0, given_unit=chosen.modulus_unit),
+        Column("temperature", "K", temperature, needed=False, above=0),
+        Column("tan delta", "1", ("tan(delta)", "tan d", "tand", "loss factor", "tan δ"), needed=False, above=0),
+        Column("set", "1", ("segment", "point", "index", "no"), needed=False),
+    )

@@ -1,0 +1,106 @@
+"""Laws of temperature as a campaign names them: how far relaxation times move between two temperatures."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.tables import Column, read_table
+from mdr_dask.units import shown
+
+
+class Wlf(Parameters):
+    """Temperature by Williams, Landel and Ferry."""
+
+    c1: float = quantity("1", "constant c1 of the law", usual="17.4", gt=0)
+    c2: float = quantity("K", "constant c2 of the law", usual="51.6 K", gt=0)
+    reference: float = quantity("K", "temperature of c1 and c2, at which a_T is 1", usual="20 degC", gt=0)
+
+    def factor(self, temperature: FloatArray | float) -> FloatArray:
+        """Return a_T, of the shape of the temperatures in K; ValueError where the law ends."""
+        from mdr_dask.physics.solids import wlf_factor
+
+        lowest, end = float(np.min(temperature)), self.reference - self.c2
+        if lowest <= end:
+            raise ValueError(f"wlf holds above reference - c2 = {shown(end, 'K')}, got {shown(lowest, 'K')}")
+        return wlf_factor(temperature, self.reference, self.c1, self.c2)
+
+
+class Arrhenius(Parameters):
+    """Temperature by an activation energy."""
+
+    activation_energy: float = quantity("J/mol", "activation energy", usual="100 kJ/mol", gt=0)
+    reference: float = quantity("K", "temperature at which a_T is 1", usual="20 degC", gt=0)
+
+    def factor(self, temperature: FloatArray | float) -> FloatArray:
+        """Return a_T, of the shape of the temperatures in K."""
+        from mdr_dask.physics.solids import arrhenius_factor
+
+        return arrhenius_factor(temperature, self.reference, self.activation_energy)
+
+
+class ShiftFactors(Parameters):
+    """Measured shift factors; a bare file name stands for them."""
+
+    file: NamedFile = Field(description="table with columns temperature and a_T, or log10 a_T; a_T is 1 somewhere")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare_name(cls, value: Any) -> Any:
+        return {"file": value} if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _holds_factors(self, info: ValidationInfo) -> ShiftFactors:
+        """Refuse a bad table where a campaign names it, before any case fails of it."""
+        if info.context is not None:
+            try:
+                _ = self.reference
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
+
+    @property
+    def reference(self) -> float:
+        """Temperature at which a_T is 1, K."""
+        temperature, decades = _shifts(self)
+        return float(np.interp(0.0, decades[::-1], temperature[::-1]))
+
+    def factor(self, temperature: FloatArray | float) -> FloatArray:
+        """Return a_T, linear in the logarithm between the temperatures of the table, in K; ValueError outside."""
+        known, decades = _shifts(self)
+        wanted = np.asarray(temperature, dtype=np.float64)
+        for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
+            ends = f"{shown(known[0], 'K')} to {shown(known[-1], 'K')}"
+            raise ValueError(f"{self.file.name}: has shift factors for {ends}, got {shown(outside, 'K')}")
+        return np.asarray(10 ** np.interp(wanted, known, decades), dtype=np.float64)
+
+
+@lru_cache(maxsize=16)
+def _shifts(factors: ShiftFactors) -> tuple[FloatArray, FloatArray]:
+    """Return temperatures, ascending, and log10 a_T, which falls."""
+    name = factors.file.name
+    columns = (
+        Column("temperature", "K", ("T", "temp"), above=0),
+        Column("a_T", "1", ("aT", "a(T)", "shift factor"), needed=False, above=0),
+        Column("log10 a_T", "1", ("log aT", "log a_T", "log10 aT", "log10(aT)", "log(aT)"), needed=False),
+    )
+    table = read_table(factors.file.read_text(), name, columns)
+    if ("a_T" in table) == ("log10 a_T" in table):
+        raise DataError(f"{name}: expected one of the columns a_T and log10 a_T")
+    decades = np.log10(table["a_T"]) if "a_T" in table else table["log10 a_T"]
+    order = np.argsort(table["temperature"])
+    temperature, decades = table["temperature"][order], decades[order]
+    if order.size < 2 or np.any(np.diff(temperature) <= 0) or np.any(np.diff(decades) >= 0):
+        raise DataError(f"{name}: expected two or more temperatures, and an a_T that falls from each to the next")
+    if not decades[-1] <= 0 <= decades[0]:
+        raise DataError(f"{name}: expected an a_T that passes 1, its value at the reference")
+    return temperature, decades
+
+
+Law = Wlf | Arrhenius | ShiftFactors

@@ -1,0 +1,46 @@
+"""Generated areal surfaces: random phases on a given isotropic spectrum (thesis 2.16, 2.17)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import fft
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.spectrum import Spectrum
+
+
+def areal_surface(
+    spectrum: Spectrum, points: tuple[int, int], size: tuple[float, float], seed: int, realisation: int
+) -> FloatArray:
+    """Return a periodic isotropic surface, m, on a regular grid: h = sum_q B(q) exp(i (q x + phi)), mean 0.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        C2D. Waves that the grid does not resolve are left out.
+    points : tuple of int
+        Numbers of points along x and y.
+    size : tuple of float
+        Lengths along x and y, m.
+    seed, realisation : int
+        They fix the phases.
+
+    Returns
+    -------
+    array, shape points
+        B(q) = 2 pi sqrt(C2D / (L_x L_y)), so that every surface has the same spectrum.
+    """
+    generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
+    waves = fft.rfft2(generator.standard_normal(points), overwrite_x=True)  # phases of noise are those of a real field
+    waves /= np.abs(waves)
+    q_x, q_y = wavenumbers(points, size)
+    waves *= 2 * np.pi * np.sqrt(spectrum.at(np.hypot(q_x[:, None], q_y)) / (size[0] * size[1]))
+    surface: FloatArray = fft.irfft2(waves, points, norm="forward", overwrite_x=True)
+    return surface
+
+
+def wavenumbers(points: tuple[int, int], size: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return the angular wave numbers, rad/m, along both axes of the half of a spectrum that `rfft2` gives."""
+    q_x = 2 * np.pi * fft.fftfreq(points[0], size[0] / points[0])
+    q_y = 2 * np.pi * fft.rfftfreq(points[1], size[1] / points[1])
+    return np.asarray(q_x), np.asarray(q_y)

@@ -1,0 +1,138 @@
+"""From straight cuts through an isotropic surface back to its spectrum: the inverse of Abel's transform.
+
+A cut has the spectrum C_cut(q) = 2 int_q^inf C2D(k) k / sqrt(k^2 - q^2) dk, not the pi q C2D of the method's line: its
+harmonics are smaller, and its rms slope is that of the surface over the root of two.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy import optimize
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.physics.surfaces.measured import MeasuredLine
+from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
+
+BINS = 10  # for every decade of the wave number
+BEND = 3.0  # standard deviation that is granted to a change of the slope d log C2D / d log q from bin to bin
+STEEPEST = 30.0  # fall d log C / d log q from bin to bin that is an end of the spectrum
+
+
+class Cut(NamedTuple):
+    """The spectrum of straight cuts, averaged over lines and over waves of similar length.
+
+    Parameters
+    ----------
+    wavenumber : array, shape (bins,)
+        q, rad/m.
+    density : array, shape (bins,)
+        C_cut, m^3, two-sided: <h^2> = 2 int C_cut dq.
+    error : array, shape (bins,)
+        Relative standard error of the density.
+    """
+
+    wavenumber: FloatArray
+    density: FloatArray
+    error: FloatArray
+
+
+def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
+    """Return the spectrum of scans: squared Fourier amplitudes, averaged in logarithmic bins.
+
+    Parameters
+    ----------
+    lines : sequence of MeasuredLine
+        Detrended scans of one length and spacing.
+    hann : bool
+        Whether to window them by Hann's window, normalised so that <h^2> is kept.
+
+    Raises
+    ------
+    DataError
+        If lengths or numbers of points differ.
+    """
+    points, length = lines[0].height.size, lines[0].length
+    if any(line.height.size != points or not math.isclose(line.length, length, rel_tol=1e-3) for line in lines):
+        raise DataError(
+            "expected scans of one length and number of points: name each other one as a surface of its own"
+        )
+    height = np.array([line.height - line.height.mean() for line in lines])
+    window = hann_window(points) if hann else np.ones(points)
+    power = length / (2 * np.pi) * np.mean(np.abs(np.fft.rfft(height * window) / points) ** 2, axis=0)[1:]
+    waves = np.arange(1, power.size + 1)
+    last = (points - 1) // 2  # the wave of two points has no phase
+    independent = len(lines) / (1.94 if hann else 1.0)  # 1 / sum of squares of the window's squared correlation
+    return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
+
+
+def averaged(wavenumber: FloatArray, density: FloatArray, independent: float) -> Cut:
+    """Average a spectrum of equidistant wave numbers in logarithmic bins, so that the power of each is kept."""
+    decades = np.log10(wavenumber / wavenumber[0] + 0.5)
+    member = np.floor(decades * BINS).astype(int)
+    _, member, count = np.unique(member, return_inverse=True, return_counts=True)
+    power = np.bincount(member, density)
+    q = np.exp(np.bincount(member, np.log(wavenumber)) / count)
+    return Cut(q, power / count, 1 / np.sqrt(count * independent))
+
+
+def hann_window(points: int) -> FloatArray:
+    """Return Hann's window with a mean square of one."""
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
+    return np.asarray(window / np.sqrt(np.mean(window**2)))
+
+
+def _until_the_end(cut: Cut) -> slice:
+    """Return the bins before the spectrum ends: before its first fall that is steeper than that of any roughness."""
+    with np.errstate(divide="ignore"):
+        logs = np.log(cut.density)
+    falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
+    return slice(0, int(falls[0]) + 1 if falls.size else None)
+
+
+def of_cut(cut: Cut) -> Spectrum:
+    """Return the isotropic spectrum whose cut is the one given.
+
+    C2D is a power law between the wave numbers of the cut, so that it is positive. Its logarithms there are the most
+    likely ones: the cut is known within its errors, and the slope changes from one to the next by a standard deviation
+    of `BEND`. Noise is not amplified, as it is by -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than three wave numbers with a positive density.
+    """
+    q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
+    if q.size < 3:
+        raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
+    edge = q[-1] ** 2 / q[-2]  # the cut at the last wave number is of shorter waves: they end one step beyond
+    knots = np.append(q, edge)
+    place, weight = quadrature(q, knots)
+    where = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, knots.size - 2)
+    share = np.log(place / knots[where]) / np.log(knots[where + 1] / knots[where])
+    basis = np.zeros((q.size, place.shape[1], knots.size))
+    rows, columns = np.indices(place.shape)
+    basis[rows, columns, where] = 1 - share
+    basis[rows, columns, where + 1] += share
+    steps = np.diff(np.log(knots))
+    slopes = np.zeros((steps.size, knots.size))
+    slopes[np.arange(steps.size), np.arange(steps.size)] = -1 / steps
+    slopes[np.arange(steps.size), np.arange(steps.size) + 1] = 1 / steps
+    bends = np.diff(slopes, axis=0) / BEND
+
+    def residual(logs: FloatArray) -> FloatArray:
+        found = np.sum(weight * np.exp(basis @ logs), axis=1)
+        return np.concatenate([np.log(found / density) / error, bends @ logs])
+
+    def jacobian(logs: FloatArray) -> FloatArray:
+        part = weight * np.exp(basis @ logs)
+        rows = np.einsum("ij,ijk->ik", part, basis) / part.sum(axis=1)[:, None]
+        return np.concatenate([rows / error[:, None], bends])
+
+    start = np.log(np.append(density, density[-1] * (q[-1] / edge) ** 3) / (np.pi * knots))
+    logs = optimize.least_squares(residual, start, jacobian, method="lm", xtol=1e-12, ftol=1e-12).x
+    return Spectrum(knots, np.exp(logs))

@@ -1,0 +1,187 @@
+"""The isotropic spectrum of a surface: power laws between points, and the line, the cut and the moments that follow.
+
+Angular wave numbers q are in rad/m; spectra are two-sided (thesis 2.12 and 2.13).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+
+ROUNDING = 1e-9  # of a wave number that lies on an end
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+STEP = 0.1  # longest piece of a quadrature, in log q
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """The spectrum C2D(q) of an isotropic surface: a power law between its points, ends included, 0 outside.
+
+    Parameters
+    ----------
+    wavenumber : array, shape (points,)
+        Angular wave numbers q, rad/m, ascending; two points at least.
+    density : array, shape (points,)
+        C2D, m^4, positive.
+
+    Raises
+    ------
+    DataError
+        If there are fewer than two points, or they do not ascend, or are not positive and finite.
+    """
+
+    wavenumber: FloatArray
+    density: FloatArray
+
+    def __post_init__(self) -> None:
+        q, density = self.wavenumber, self.density
+        if q.size < 2 or q.size != density.size:
+            raise DataError(f"expected a spectrum of two points or more, got {q.size} and {density.size}")
+        for what, numbers in (("wave numbers", q), ("spectral densities", density)):
+            if not np.all(np.isfinite(numbers) & (numbers > 0)):
+                raise DataError(f"expected {what} of a spectrum above 0")
+        if not np.all(np.diff(q) > 0):
+            raise DataError("expected wave numbers of a spectrum that ascend, each of them once")
+
+    @cached_property
+    def _logs(self) -> tuple[FloatArray, FloatArray]:
+        return np.log(self.wavenumber), np.log(self.density)
+
+    @property
+    def wavelengths(self) -> tuple[float, float]:
+        """The longest and the shortest wavelength, m."""
+        return 2 * np.pi / float(self.wavenumber[0]), 2 * np.pi / float(self.wavenumber[-1])
+
+    def at(self, wavenumber: ArrayLike) -> FloatArray:
+        """Return C2D at wave numbers, m^4, by linear interpolation of the logarithms."""
+        q = np.asarray(wavenumber, dtype=np.float64)
+        inside = (q >= self.wavenumber[0] * (1 - ROUNDING)) & (q <= self.wavenumber[-1] * (1 + ROUNDING))
+        density = np.zeros_like(q)
+        density[inside] = np.exp(np.interp(np.log(q[inside]), *self._logs))
+        return density
+
+    def line(self, length: float, modes: int) -> FloatArray:
+        """Return the amplitudes of the line that the method puts in the place of the surface.
+
+        Parameters
+        ----------
+        length : float
+            Length L of the line, m.
+        modes : int
+            Number of harmonics q_k = 2 pi k / L.
+
+        Returns
+        -------
+        array, shape (modes,)
+            A_k = 2 sqrt(C1D(q_k) 2 pi / L), m, with C1D = pi q C2D (thesis 2.19, 2.20): the line has the rms height and
+            the full rms gradient of the surface.
+        """
+        q = 2 * np.pi / length * np.arange(1, modes + 1)
+        amplitude: FloatArray = 2 * np.sqrt(np.pi * q * self.at(q) * (2 * np.pi / length))
+        return amplitude
+
+    def between(self, longest: float = 0.0, shortest: float = 0.0) -> Spectrum:
+        """Return the spectrum of the waves between two wavelengths, m; 0 keeps that end.
+
+        Raises
+        ------
+        DataError
+            If nothing is left.
+        """
+        low = max(2 * np.pi / longest if longest else 0.0, float(self.wavenumber[0]))
+        high = min(2 * np.pi / shortest if shortest else math.inf, float(self.wavenumber[-1]))
+        if not low < high:
+            ends = " to ".join(f"{2 * np.pi / q:.4g} m" for q in self.wavenumber[[0, -1]])
+            raise DataError(f"expected cut-offs that leave some of the spectrum, which has wavelengths of {ends}")
+        inner = (self.wavenumber > low * (1 + ROUNDING)) & (self.wavenumber < high * (1 - ROUNDING))
+        q = np.concatenate([[low], self.wavenumber[inner], [high]])
+        return Spectrum(q, self.at(q))
+
+    def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
+        """Return the spectrum with power laws to wavelengths, m, beyond its ends; 0 leaves that end.
+
+        Each goes on from the last point with the slope of a straight line through the logarithms of the last decade.
+        """
+        q, density = [self.wavenumber], [self.density]
+        for index, end in (
+            (0, 2 * np.pi / longest if longest else 0.0),
+            (-1, 2 * np.pi / shortest if shortest else 0.0),
+        ):
+            last = self.wavenumber[index]
+            if end and (end < last if index == 0 else end > last):
+                near = np.abs(np.log10(self.wavenumber / last)) <= decades
+                near[[index, 1 if index == 0 else -2]] = True
+                slope = np.polyfit(self._logs[0][near], self._logs[1][near], 1)[0]
+                place = 0 if index == 0 else len(q)
+                q.insert(place, np.array([end]))
+                density.insert(place, self.density[[index]] * (end / last) ** slope)
+        return Spectrum(np.concatenate(q), np.concatenate(density))
+
+    def cut(self, wavenumber: ArrayLike) -> FloatArray:
+        """Return the spectrum of a straight cut through the surface, m^3: 2 int C2D(sqrt(q^2 + u^2)) du from 0 on."""
+        k, weight = quadrature(np.asarray(wavenumber, dtype=np.float64), self.wavenumber)
+        cut: FloatArray = np.sum(weight * self.at(k), axis=1)
+        return cut
+
+    def rms_height(self) -> float:
+        """Return the rms height, m (thesis 2.21)."""
+        return math.sqrt(2 * np.pi * self._moment(1))
+
+    def rms_gradient(self) -> float:
+        """Return the rms of the gradient, both slopes together (thesis 2.23)."""
+        return math.sqrt(2 * np.pi * self._moment(3))
+
+    def _moment(self, order: int) -> float:
+        """Return the integral of q^order C2D, exact for power laws."""
+        q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
+        rise = np.diff(np.log(value))
+        # int exp(v) dx of a straight v: the mean of its ends, weighted
+        small = np.abs(rise) < 1e-8
+        safe = np.where(small, 1.0, rise)
+        mean = np.where(small, 0.5 * (value[1:] + value[:-1]), np.diff(value) / safe)
+        return float(np.sum(mean * np.diff(q)))
+
+
+def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0, rolloff: float = 0.0) -> Spectrum:
+    """Return C2D ~ q^(-2 - 2 H) between two wavelengths, constant above the wavelength `rolloff`, m (thesis 2.14).
+
+    Parameters
+    ----------
+    hurst : float
+        Hurst exponent H.
+    longest, shortest : float
+        Wavelengths of the ends, m.
+    rms : float
+        Rms height of the surface, m.
+    rolloff : float
+        Wavelength, m; 0 for none.
+    """
+    corners = sorted({2 * np.pi / end for end in (longest, shortest, rolloff) if end and shortest <= end <= longest})
+    q = np.array(corners)
+    bend = 2 * np.pi / rolloff if rolloff else 0.0
+    unit = Spectrum(q, np.maximum(q / q[-1], bend / q[-1]) ** (-2 - 2 * hurst))
+    return Spectrum(q, unit.density * (rms / unit.rms_height()) ** 2)
+
+
+def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return places k and weights of the integral along a cut, for every wave number, shape (wave numbers, places).
+
+    sum(weight * C2D(k)) = 2 int C2D(k) k / sqrt(k^2 - q^2) dk over k from q on, for a C2D that is smooth between edges.
+    """
+    parts = [np.geomspace(low, high, 1 + math.ceil(math.log(high / low) / STEP))[:-1] for low, high in pairwise(edges)]
+    bounds = np.append(np.concatenate(parts), edges[-1])
+    q = wavenumber[:, None]
+    u = np.sqrt(np.maximum(bounds[None, :] ** 2 - q**2, 0.0))
+    half = 0.5 * np.diff(u, axis=1)[:, :, None]
+    place = 0.5 * (u[:, 1:] + u[:, :-1])[:, :, None] + half * NODES
+    k = np.sqrt(q[:, :, None] ** 2 + place**2)
+    shape = wavenumber.size, -1
+    return np.clip(k, bounds[0], bounds[-1]).reshape(shape), (2 * half * WEIGHTS).reshape(shape)

@@ -1,0 +1,59 @@
+"""Parts of a campaign in processes of their own, killed at random instants and started again."""
+
+from __future__ import annotations
+
+import multiprocessing
+import random
+import time
+from dataclasses import replace
+
+import toy
+
+from mdr_dask import execute, models
+from mdr_dask.execute import Part, Resources
+
+#: Processes are copies of one that has loaded everything, and runs nothing.
+PROCESSES = multiprocessing.get_context("forkserver")
+PROCESSES.set_forkserver_preload(["toy", "killed_parts", "zarr", "dask", "filelock", "mdr_dask.execute.rounds"])
+
+
+def study(blocks: int):
+    axis = toy.axis("position", [1.0 + number for number in range(blocks)])
+    return replace(toy.campaign(axis), blocks={"position": 1})
+
+
+def run_part(url: str, part: Part, blocks: int, pause: float) -> None:
+    toy.install(pause)
+    assert "toy" in models.NAMES
+    execute.run(study(blocks), url, Resources(threads=1), lambda _: None, part=part)
+
+
+def run_with_kills(url: str, parts: int, kills: int, blocks: int, pause: float, seed: int = 1) -> int:
+    """Start all parts at once, kill one after the other and start it again; return how many kills hit one at work."""
+    chance = random.Random(seed)
+
+    def start(number: int):
+        process = PROCESSES.Process(target=run_part, args=(url, Part(number, parts), blocks, pause))
+        process.start()
+        return process
+
+    running = {number: start(number) for number in range(1, parts + 1)}
+    hit = 0
+    try:
+        while hit < kills:
+            time.sleep(chance.uniform(0.02, 0.25))
+            alive = [number for number, process in running.items() if process.is_alive()]
+            if not alive:
+                break
+            number = chance.choice(alive)
+            running[number].kill()
+            running[number].join()
+            hit += running[number].exitcode == -9
+            running[number] = start(number)
+        for process in running.values():
+            process.join()
+        assert {process.exitcode for process in running.values()} == {0}
+    finally:
+        for process in running.values():
+            process.kill()
+    return hit

@@ -1,0 +1,154 @@
+"""``check`` says what it understood, asks about bare numbers, and refuses what would fail in every case."""
+
+import json
+import math
+
+import pytest
+
+from mdr_dask.cli import main
+from mdr_dask.cli.understood import human_bytes, spacing
+
+CAMPAIGN = """\
+name: tyre
+model: sliding_friction
+parameters:
+  surface: {profile: road.csv}
+  material:
+    dma_table: {file: rubber.csv}
+    temperature: [0 degC, 20 degC, 50 degC]
+    wlf: {c1: 10, c2: 100 K, reference: 20 degC}
+  normal_force: 1 N
+  velocity: {geometric: [1 um/s, 1 m/s, 7]}
+realisations: 2
+"""
+LAW = {"c1": 10.0, "c2": 100.0, "reference": 20.0}
+
+
+def rubber(temperatures):
+    lines = ["f [Hz];E' [MPa];E'' [MPa];T [C]"]
+    for temperature in temperatures:
+        difference = temperature - LAW["reference"]
+        factor = 10 ** (-LAW["c1"] * difference / (LAW["c2"] + difference))
+        for power in range(-2, 3):
+            modulus = 1 + (2j * math.pi * 10**power * factor) ** 0.3
+            lines.append(f"{10**power};{modulus.real:.6g};{modulus.imag:.6g};{temperature}")
+    return "\n".join(lines).replace(".", ",")
+
+
+@pytest.fixture(autouse=True)
+def files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    heights = "\n".join(f"{k / 100},{math.sin(2 * math.pi * k / 50):.6f}" for k in range(100))
+    (tmp_path / "road.csv").write_text(f"x [mm],z [um]\n{heights}\n")
+    (tmp_path / "rubber.csv").write_text(rubber((0, 20, 50)))
+    (tmp_path / "tyre.yaml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+def test_check_tells_axes_tables_lines_and_how_they_meet(capsys):
+    assert main(["check", "tyre.yaml"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    for line in (
+        "tyre.yaml: sliding_friction",
+        "  material_temperature  0 degC, 20 degC, 50 degC",
+        "  velocity              1 um/s to 1 m/s, 7 values, geometric",
+        "  table rubber.csv: 15 rows; f 0.01 to 100 Hz, E' 1.079 to 35.62 MPa, E'' 0.0402 to 17.64 MPa, T 0 to 50 C",
+        "  profile road.csv: 100 points, 1 mm long, rms height 707.1 nm, rms slope 0.00889",
+        "  21 cases x 2 realisations = 42 results",
+    ):
+        assert line in said
+    text = "\n".join(said)
+    assert "table rubber.csv: superposed at 20 degC by the shift factors given; " in text
+    for temperature in (0, 20, 50):
+        assert f"q v of 0.0063 to 3.1e+05 rad/s at {temperature} degC, data from" in text
+    assert " uncompressed, about " in said[-1]
+
+
+def test_check_tells_the_same_to_a_program(capsys):
+    assert main(["check", "tyre.yaml", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert [(axis["axis"], axis["unit"], axis["values"]) for axis in row["axes"]] == [
+        ("material_temperature", "K", 3),
+        ("velocity", "m/s", 7),
+    ]
+    assert (row["results"], row["questions"]) == (42, [])
+    assert any(note.startswith("profile road.csv: 100 points") for note in row["notes"])
+
+
+REFUSED = {
+    "curves with a gap": (
+        lambda folder: (folder / "rubber.csv").write_text(rubber((-20, 200))),
+        ("dma_table: {file: rubber.csv}", "dma_table: {file: rubber.csv, reference: 20 degC}"),
+        "material: the curves do not overlap: the modulus reaches",
+    ),
+    "no law and no reference": (
+        lambda _: None,
+        ("    temperature: [0 degC, 20 degC, 50 degC]\n    wlf: {c1: 10, c2: 100 K, reference: 20 degC}\n", ""),
+        "rubber.csv: has several temperatures: name one by table_temperature, a reference to superpose them at",
+    ),
+    "reference outside the data": (
+        lambda _: None,
+        ("dma_table: {file: rubber.csv}", "dma_table: {file: rubber.csv, table_temperature: 90 degC}"),
+        "rubber.csv: got no rows at 90 degC; it was measured at 0 degC, 20 degC, 50 degC",
+    ),
+    "the law ends": (
+        lambda _: None,
+        ("[0 degC, 20 degC, 50 degC]", "[-90 degC, 20 degC]"),
+        "material: wlf holds above reference - c2 = -80 degC, got -90 degC",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_would_fail_in_every_case_is_refused(kind, files, capsys):
+    damage, change, told = REFUSED[kind]
+    damage(files)
+    (files / "tyre.yaml").write_text(CAMPAIGN.replace(*change))
+    assert main(["check", "tyre.yaml"]) == 2
+    assert told in capsys.readouterr().err
+
+
+BARE = {
+    "10 Pa of rubber": ("shear_modulus: 10", "write '10 MPa' if you mean that, '10 Pa' if not"),
+    "a line of 20 m": ("length: 20", "write '20 mm' if you mean that, '20 m' if not"),
+    "a roughness of half a metre": ("rms_roughness: 0.5", "write '0.5 um' if you mean that"),
+    "a range": ("velocity: {geometric: [0.1, 1e6, 8]}", "parameters.velocity.geometric[1]: 1e+06 is read as 1e+06 m/s"),
+    "a list": ("relaxation_time: [1 ms, 5000]", "parameters.relaxation_time[1]: 5000 is read as 5000 s"),
+    "inside a structure": (
+        "indenter: {shape: parabola, radius: 50}",
+        "parameters.indenter.radius: 50 is read as 50 m: write '50 mm'",
+    ),
+}
+BODY = {
+    "length": "20 mm",
+    "rms_roughness": "1 um",
+    "shear_modulus": "10 MPa",
+    "relaxation_time": "1 ms",
+    "normal_force": "1",
+    "velocity": "0.1",
+}
+
+
+@pytest.mark.parametrize("kind", BARE)
+def test_bare_numbers_far_from_usual_are_asked_about(kind, files, capsys):
+    written, question = BARE[kind]
+    name, _, value = written.partition(": ")
+    body = "".join(f"  {key}: {entry}\n" for key, entry in (BODY | {name: value}).items())
+    (files / "bare.yaml").write_text(f"name: bare\nmodel: sliding_friction\nparameters:\n{body}")
+    for command in (["check"], ["run", "--dry-run"]):
+        assert main([*command, "bare.yaml"]) == 0
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("bare.yaml:")
+        assert question in line
+
+
+@pytest.mark.parametrize(("size", "told"), [(999, "999 B"), (1500, "1.5 kB"), (39.2e9, "39 GB"), (2.5e14, "250 TB")])
+def test_sizes_are_for_people(size, told):
+    assert human_bytes(size) == told
+
+
+@pytest.mark.parametrize(
+    ("values", "told"), [((1, 2, 3), ", linear"), ((1, 10, 100), ", geometric"), ((1, 2, 5), ""), ((-1, 0, 5), "")]
+)
+def test_even_spacing_is_named(values, told):
+    assert spacing(values) == told

@@ -1,0 +1,81 @@
+"""Progress: nothing is silent, compiling is no pace, and the time left does not lie."""
+
+import time
+
+import pytest
+
+from mdr_dask import compile_clock as clocks
+from mdr_dask.cli import progress as shown
+from mdr_dask.cli.progress import describe, reporter
+from mdr_dask.execute import Progress
+from mdr_dask.models.base import Status
+from mdr_dask.task import Outcome
+
+BLOCK, BLOCKS, THREADS, COMPILING = 0.5, 100, 2, 20.0
+
+
+def after_blocks(count: int) -> Progress:
+    """Return the state after some blocks of half a second on two threads, which compiled for 20 s before the first."""
+    progress = Progress(total=10 * BLOCKS, estimated=2 * BLOCK * BLOCKS)  # estimated twice too long
+    counts = tuple(10 if state == Status.DONE else 0 for state in Status)
+    for done in range(1, count + 1):
+        compiling = COMPILING if done <= THREADS else 0.0
+        wall = COMPILING + BLOCK * -(-done // THREADS)
+        progress = progress.after(Outcome(counts, 10, 2 * BLOCK, compiling + BLOCK, 0.0, compiling), wall)
+    return progress
+
+
+@pytest.mark.parametrize("count", [2, 4, 20, 99])
+def test_compiling_is_no_pace(count):
+    left = (BLOCKS - count) * BLOCK / THREADS
+    assert after_blocks(count).seconds_left == pytest.approx(left, rel=0.1)
+
+
+def test_a_line_tells_share_time_and_time_left_first(monkeypatch):
+    assert describe(None, 7.3) == "preparing, 7 s"
+    progress = Progress(total=1000)
+    assert describe(progress, 3.0) == "0 %, 3 s, 0 of 1000 results, 0 failed"
+    assert describe(after_blocks(20), 25.0) == "20 %, 25 s, about 20 s left, 200 of 1000 results, 0 failed"
+    import numba  # noqa: F401  (without it nothing compiles)
+
+    clock = clocks.CompileClock()
+    clock.begin()
+    monkeypatch.setattr(clocks, "compile_clock", lambda: clock)
+    assert describe(progress, 12.0) == "0 %, 12 s, compiling ..., 0 of 1000 results, 0 failed"
+
+
+def test_compilations_beside_each_other_count_once(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    clock = clocks.CompileClock()
+    for moment, call in ((1, "begin"), (2, "begin"), (4, "end"), (5, "end"), (9, "begin"), (10, "end")):
+        now[0] = float(moment)
+        getattr(clock, call)()
+    assert clock.seconds == 5.0
+    assert not clock.is_running
+
+
+def test_the_clock_hears_numba():
+    import numba
+
+    clock = clocks.compile_clock()
+    before = clock.seconds
+    assert numba.njit(lambda number: number + 1)(1) == 2
+    assert clock.seconds > before
+    assert not clock.is_running
+
+
+def test_lines_come_though_nothing_ends(monkeypatch, capsys):
+    monkeypatch.setattr(shown, "PAUSE", 0.02)
+    with reporter(quiet=False) as report:
+        _wait_for(capsys, "preparing, 0 s")
+        report(Progress(total=50))
+        _wait_for(capsys, "0 %, 0 s, 0 of 50 results, 0 failed")
+
+
+def _wait_for(capsys, line):
+    for _ in range(500):
+        if line in capsys.readouterr().err.splitlines():
+            return
+        time.sleep(0.01)
+    raise AssertionError(line)
