@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdr_dask.plots import style
+from mdr_dask.plots import drawing, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,7 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
     spectra : tuple of Spectrum
         What a campaign takes of each: between the cut-offs, without noise.
     """
-    figure, (areal, line) = style.panels(2, columns=2, size=(5.2, 4.2))
+    figure, (areal, line) = drawing.panels(2, columns=2, size=(5.2, 4.2))
     colours = style.scale(len(reports))
     for report, taken, colour in zip(reports, spectra, colours, strict=True):
         name = Path(report.file.name).name
