@@ -81,8 +81,8 @@ def master_curve(
     """
     require_suffix(keep, KEPT)
     require_suffix(figure, FIGURES)
-    from mdr_dask.fit.master_curve import master_curve as superpose
-    from mdr_dask.fit.master_curve import rereferenced
+    from mdr_dask.fits.master_curve import master_curve as superpose
+    from mdr_dask.fits.master_curve import rereferenced
 
     kept = _kept(source)
     if kept is None:
@@ -114,7 +114,7 @@ def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
-    from mdr_dask.fit.master_curve import friction_of_roughness, read_table
+    from mdr_dask.fits.master_curve import friction_of_roughness, read_table
     from mdr_dask.questions import selection
 
     path = Path("/dev/stdin" if source == "-" else source)

@@ -67,6 +67,7 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         return
     if not (failures or messages):
         _print_counts(count(), watching.at_work(store), form)
+        room.require_sound(store, room.series_names(store))
         return
     groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
@@ -108,7 +109,7 @@ def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
 
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     for record in sorted(room.records(store, series), key=lambda record: record["attempt"]):
-        for message in record["messages"]:
+        for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = room.ledger(store, series, dataset["status"].shape)
     return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
@@ -223,7 +224,7 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     mdr-dask fit results/friction_force.zarr
     mdr-dask fit results/friction_force.zarr zone_one --json
     """
-    from mdr_dask import fit as room
+    from mdr_dask import fits as room
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 

@@ -35,7 +35,7 @@ def sensitivity(
     mdr-dask sensitivity results/rolling.zarr film_ratio -o sensitivity.png
     """
     from mdr_dask import store as room
-    from mdr_dask.fit.sensitivity import sobol_indices
+    from mdr_dask.fits.sensitivity import sobol_indices
     from mdr_dask.plots.sensitivity import sensitivity as drawn
     from mdr_dask.questions import selection
 

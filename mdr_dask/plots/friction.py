@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
+from mdr_dask.fits.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, style
 from mdr_dask.plots.base import Plot
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from mdr_dask.fit.base import Fit
+    from mdr_dask.fits.base import Fit
 
 MODELS = ("sliding_friction",)
 MU = "friction_coefficient"
@@ -420,7 +420,7 @@ def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def _said(name: str, constant: str, what: str, found: Mapping[str, xr.Dataset]) -> str:
     """Return the range of a constant of the fit of the same name, and where its law holds; nothing without a fit."""
-    from mdr_dask.fit import available
+    from mdr_dask.fits import available
 
     try:
         known = {key: data for key, data in found.items() if _has_hurst(data)}

@@ -159,7 +159,7 @@ TIME_AXIS = "relaxation_times"
 
 def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the relaxing part with the exponential fitted to it, for the case that relaxes most (Fig. 4.3)."""
-    from mdr_dask.fit.kinetics import relaxation_curves
+    from mdr_dask.fits.kinetics import relaxation_curves
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"))
     if "example" in jumps(groups):
@@ -215,8 +215,8 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
 
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
-    from mdr_dask.fit.kinetic_cases import law_rate
-    from mdr_dask.fit.kinetic_courses import relaxation_law
+    from mdr_dask.fits.kinetic_cases import law_rate
+    from mdr_dask.fits.kinetic_courses import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
     over = curves.along_dim(data, "velocity", BEFORE_JUMP)

@@ -25,7 +25,7 @@ COLLAPSED = 0.05
 
 
 def draw_master_curve(curve: xr.Dataset) -> Figure:
-    """Draw what :func:`mdr_dask.fit.master_curve.master_curve` returns: curves, merged curve and factors side by side.
+    """Draw what :func:`mdr_dask.fits.master_curve.master_curve` returns: curves, merged curve and factors side by side.
 
     Bars and the band are 68 %; the merged curve is dashed beyond the range measured at the reference. The title says
     how far the points are from the merged curve, and whether they collapse at all.
@@ -163,7 +163,7 @@ def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: flo
 
 
 def _of_store(groups: Mapping[str, xr.Dataset]) -> Figure:
-    from mdr_dask.fit.master_curve import friction_of_roughness, master_curve
+    from mdr_dask.fits.master_curve import friction_of_roughness, master_curve
 
     found, told = {}, []
     for name, data in groups.items():

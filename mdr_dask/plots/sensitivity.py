@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def sensitivity(indices: xr.Dataset) -> Figure:
-    """Draw what `mdr_dask.fit.sensitivity.sobol_indices` found: a bar for every index of every input."""
+    """Draw what `mdr_dask.fits.sensitivity.sobol_indices` found: a bar for every index of every input."""
     from matplotlib.figure import Figure
 
     inputs = [style.quantity(str(name)).symbol for name in indices["parameter"].to_numpy()]

@@ -16,7 +16,7 @@ import pytest
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fit.friction import spectral_slope
+from mdr_dask.fits.friction import spectral_slope
 from mdr_dask.plots import available, curves, style
 
 V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 11]}\n"

@@ -1,7 +1,7 @@
 import numpy as np
 import pandas as pd
 
-from mdr_dask.fit.master_curve import master_curve
+from mdr_dask.fits.master_curve import master_curve
 from mdr_dask.plots.master_curve import draw_master_curve
 
 
