@@ -52,8 +52,6 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "Oils": (
         ("mdr_dask.physics.lubrication.oil", ("Oil", "walther_constants", "pressure_viscosity", "barus", "roelands")),
     ),
-        ("mdr_dask.physics.lubrication.oil", ("Oil", "walther_constants", "pressure_viscosity", "barus", "roelands")),
-    ),
     "Superposition": (("mdr_dask.physics.superposition.master_curve", ("superpose", "Superposition", "rereference")),),
 }
 
