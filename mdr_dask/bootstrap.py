@@ -17,6 +17,8 @@ CONFIDENCE = 0.95
 RESAMPLES = 400
 #: Sets of values that are moved by their errors one after the other; the errors within one have one sign.
 GROUPS = 32
+#: Probabilities of the ends of an interval.
+TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
 
 
 @lru_cache(maxsize=8)
@@ -103,7 +105,7 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
         values = np.log(np.where(stack > 0, stack, np.nan)) if positive else stack
     known = np.isfinite(values[0]) & np.any(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) & (np.asarray(count) > 1)
     ends = np.full((2, *values.shape[1:]), np.nan)
-    ends[:, known] = np.nanquantile(values[1 : 1 + RESAMPLES, known], _TAILS, axis=0)
+    ends[:, known] = np.nanquantile(values[1 : 1 + RESAMPLES, known], TAILS, axis=0)
     with np.errstate(invalid="ignore"):
         shifts = values[1 + RESAMPLES :] - values[0]
     wider = widening(count)
@@ -112,15 +114,12 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     return (np.exp(low), np.exp(high)) if positive else (low, high)
 
 
-_TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
-
-
 def widening(count: ArrayLike) -> FloatArray:
     """Return sqrt(n / (n - 1)) t / z, by which deviations of resamples are too small for n realisations."""
     from scipy.special import ndtri, stdtrit
 
     number = np.maximum(np.asarray(count, dtype=np.float64), 2.0)
-    wider: FloatArray = np.sqrt(number / (number - 1)) * stdtrit(number - 1, _TAILS[1]) / ndtri(_TAILS[1])
+    wider: FloatArray = np.sqrt(number / (number - 1)) * stdtrit(number - 1, TAILS[1]) / ndtri(TAILS[1])
     return wider
 
 

@@ -41,13 +41,32 @@ class FitError(MdrDaskError):
     """A law that cannot be fitted to the data given."""
 
 
+#: What words in a name stand for others that people use.
+_SYNONYMS = {
+    "load": ("normal_force", "line_load"),
+    "speed": ("velocity", "mean_velocity", "rotation_speed"),
+    "mu": ("friction_coefficient", "friction"),
+    "friction": ("friction_coefficient",),
+    "roughness": ("rms_roughness",),
+    "modulus": ("shear_modulus", "contact_modulus"),
+    "youngs_modulus": ("shear_modulus", "contact_modulus"),
+    "repeats": ("realisations",),
+    "samples": ("realisations",),
+    "profile": ("surface",),
+    "shape": ("indenter",),
+    "alpha": ("pressure_viscosity",),
+    "slip": ("slide_roll_ratio",),
+}
+
+
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
     """Return a hint in parentheses, with a leading blank: the nearest known word, or all of them if they are few."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}
     typed = str(word).casefold()
-    near = get_close_matches(typed, list(folded), n=1) or [name for name in folded if len(typed) > 3 and typed in name]
+    near = [name for name in _SYNONYMS.get(typed, ()) if name in folded] or get_close_matches(typed, list(folded), n=1)
+    near = near or [name for name in folded if len(typed) > 3 and typed in name]
     if near:
         return f" (did you mean {folded[near[0]]!r}?)"
     return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""

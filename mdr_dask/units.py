@@ -106,8 +106,20 @@ _MEANINGS = {
 _MOST_LETTERS = 60
 _UNTOLD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
-_NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)")
+_NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
+#: A number with a decimal comma, one with a comma that may be either, and what looks like several numbers.
+_COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
+_SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
+
+
+#: Units that a misspelt one is compared with.
+_COMMON = (
+    "m mm um nm cm km s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent "
+    "meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute hour newton "
+    "millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz gram kilogram"
+)
 
 
 def to_si(value: str, unit: str) -> float:
@@ -131,20 +143,31 @@ def to_si(value: str, unit: str) -> float:
         If it is no number with a unit, the unit is unknown or of another dimension.
     """
     match = _QUANTITY.match(value)
-    if match is None or _NOT_A_UNIT.match(match[2]) or len(match[2]) > _MOST_LETTERS or _UNTOLD_POWER.search(match[2]):
+    if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
         shown = value if len(value) <= _MOST_LETTERS else value[:_MOST_LETTERS] + "..."
-        raise ValueError(f"expected {expected(unit)}, got {shown!r}")
+        raise ValueError(f"expected {expected(unit)}, got {shown!r}{spelt(value)}")
     number, given = match.groups()
     if not math.isfinite(float(number)):
         raise ValueError(f"expected a finite number, got {value!r}")
     try:
         factor, offset = conversion(given, unit) if given else (1.0, 0.0)
     except ValueError as error:
-        raise ValueError(f"{error}, got {value!r}") from None
+        raise ValueError(f"{error}, got {value!r}{spelt(value)}") from None
     si = _times(number, factor) + offset
     if not math.isfinite(si):
         raise ValueError(f"expected a finite number, got {value!r}")
     return si
+
+
+def spelt(value: str) -> str:
+    """Return how a number that is none is written: with a decimal point, or several as a list or a range."""
+    if _THOUSANDS.fullmatch(value.strip()):
+        return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
+    if _COMMA.match(value):
+        return f" (write a decimal point: {value.replace(',', '.', 1)!r})"
+    if _SEVERAL.search(value.strip()):
+        return " (several values are [a, b, c], a range {linear: [a, b, n]} or {geometric: [a, b, n]})"
+    return ""
 
 
 def expected(unit: str) -> str:
@@ -230,13 +253,17 @@ def example_unit(unit: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit of the list."""
-    if _NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text):
+    if not _may_be_unit(text):
         return False
     try:
         registry().parse_units(_spelling(text))
     except Exception:  # whatever its tokens happen to raise
         return False
     return True
+
+
+def _may_be_unit(text: str) -> bool:
+    return not (_NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text))
 
 
 def _times(number: str, factor: float) -> float:
@@ -281,6 +308,26 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     return (1.0, zero) if zero else (one, 0.0)
 
 
+#: Coherent SI units of the dimensions that pint derives from `DEFINITIONS`.
+_COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "current": "A", "angle": "rad"}
+
+
+@lru_cache(maxsize=1024)
+def dimension_of(unit: str) -> tuple[Any, str]:
+    """Return the dimension of a unit, as pint knows it, and the coherent SI unit of that dimension.
+
+    Raises
+    ------
+    ValueError
+        If it is no unit of the list.
+    """
+    if unit not in ("", "1") and not is_unit(unit):
+        raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
+    dimension = registry().parse_units(_spelling(unit)).dimensionality
+    coherent = " * ".join(f"{_COHERENT[name.strip('[]')]}**{power}" for name, power in dimension.items())
+    return dimension, coherent or "1"
+
+
 def _spelling(unit: str) -> str:
     unit = unit.replace("%", " percent ").strip()
     return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
@@ -289,6 +336,8 @@ def _spelling(unit: str) -> str:
 def _nearest(word: str) -> str:
     if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
         return ", temperatures are in 'degC', '°C' or 'K'"
-    common = "m mm um nm s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent"
-    hint = did_you_mean(word, common.split())
+    power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
+    if power and is_unit(power[1]):
+        return f" (write {power[1]}^{power[2]})"
+    hint = did_you_mean(word, _COMMON.split())
     return hint if "mean" in hint else ""

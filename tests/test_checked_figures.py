@@ -8,7 +8,7 @@ import pytest
 
 from mdr_dask import datasets, execute, load
 from mdr_dask.campaign import Replication
-from mdr_dask.fit import available
+from mdr_dask.fits import available
 
 CAMPAIGNS = Path(__file__).parent.parent / "campaigns"
 #: At v -> 0 from statics alone, 200 realisations, H = 0, 0.1, ..., 1.

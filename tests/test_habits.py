@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from mdr_dask import campaign, fit, models, plots
+from mdr_dask import campaign, fits, models, plots
 from mdr_dask.campaign.reference import reference_page
 from mdr_dask.cli import cli
 from mdr_dask.cli.reference import commands_page
@@ -68,7 +68,7 @@ def test_every_campaign_of_the_house_is_right(path):
 
 
 def test_every_fit_and_figure_is_registered_for_a_model():
-    for room, folder in ((fit, "fit"), (plots, "plots")):
+    for room, folder in ((fits, "fits"), (plots, "plots")):
         written = {path.stem for path in (ROOT / "mdr_dask" / folder).glob("*.py")} - {"__init__", "base"}
         named = {name for name in written if not name.startswith("_")}
         assert set(room.SUBJECTS) <= named

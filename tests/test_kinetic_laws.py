@@ -8,7 +8,7 @@ import pytest
 
 from mdr_dask import datasets, execute, load
 from mdr_dask.cli import main
-from mdr_dask.fit import available as fits
+from mdr_dask.fits import available as fits
 from mdr_dask.plots import available as plots
 
 CAMPAIGN = """

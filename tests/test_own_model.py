@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask import fit, models
+from mdr_dask import fits, models
 from mdr_dask.cli import main
 from mdr_dask.errors import ModelError
-from mdr_dask.fit.base import Fit
+from mdr_dask.fits.base import Fit
 
 PAGE = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
 MODULE, CAMPAIGN = (re.search(rf"^```{kind}\n(.*?)^```", PAGE, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
@@ -111,8 +111,8 @@ def test_installed_packages_offer_models_and_fits_by_name(example, monkeypatch):
         def load(self):
             return (law,)
 
-    monkeypatch.setattr(fit, "entry_points", lambda group: [Offered()])
-    assert fit.available("wear_rate") == {"archard": law}
+    monkeypatch.setattr(fits, "entry_points", lambda group: [Offered()])
+    assert fits.available("wear_rate") == {"archard": law}
 
 
 def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written_too(example, capsys):

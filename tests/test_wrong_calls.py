@@ -12,7 +12,7 @@ from mdr_dask.cli import main
 #: Command line, and what the error has to say; STORE is a filled store, FOREIGN a Zarr group of somebody else.
 WRONG = [
     ("check nowhere.yaml", "File 'nowhere.yaml' does not exist"),
-    ("models nobody", "unknown model 'nobody'; known: sliding_friction"),
+    ("models nobody", "unknown model 'nobody' (known: sliding_friction"),
     ("run small.yaml --threads 0", "0 is not in the range x>=1"),
     ("run small.yaml --threads 2 --workers 2", "expected one of --threads, --workers, got 2 of them"),
     (
@@ -47,14 +47,41 @@ WRONG = [
     ("show STORE --select velocity=2..1", "no velocity 2 m/s .. 1 m/s: it has the values 0.001 m/s, 0.01 m/s"),
     ("show STORE --units velocity=N", "velocity: expected a velocity (such as '1 mm/s'), got 'N'"),
     ("show STORE --limit -1", "-1 is not in the range x>=0"),
-    ("aggregate STORE -o means.xls", "expected a file that ends in .zarr, .nc or .csv, got 'means.xls'"),
-    ("aggregate STORE -o STORE", "expected a place for the statistics, got the store of a study: 'STORE'"),
+    ("aggregate STORE -o means.xls", "expected a file that ends in .csv, .json, .jsonl, .parquet, .nc or .zarr, got"),
+    ("aggregate STORE -o STORE", "expected a place for the answer, got the store of a study: 'STORE'"),
+    ("show STORE -o x.csv --json", "expected one of --json and --output, got both"),
+    ("show STORE -o x.nc --sort velocity", "expected a table for rows in an order: .csv, .jsonl or .parquet"),
+    ("show STORE --where velocity>1kg", "'velocity>1kg': expected quantities of one dimension"),
+    (
+        "show STORE --where velocity=1",
+        "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7', got 'velocity=1'",
+    ),
+    ("show STORE --columns wear", "no column 'wear'; known: "),
+    ("show STORE --group-by case", "expected axes to group by, got 'case'"),
     ("aggregate STORE -o small.yaml/x.csv", "small.yaml/x.csv: Not a directory"),
     ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
     (
         "plot STORE nothing",
         "no figure of sliding_friction is called 'nothing'; known: contact, lines, regions, velocity",
     ),
+    ("plot STORE friction_coefficient", "friction_coefficient is an output: say --over AXIS, or --effects"),
+    ("plot STORE friction_coefficient --over speed", "no axis 'speed' (known: normal_force, velocity"),
+    (
+        "plot STORE friction_coefficient --over velocity --effects",
+        "expected --over once, twice for a map, or --effects",
+    ),
+    (
+        "plot STORE friction_coefficient --over velocity --log q",
+        "expected --log with letters of xyz, or 'none', got 'q'",
+    ),
+    ("plot STORE friction_coefficient --over velocity --units velocity=kg", "velocity: expected a velocity"),
+    (
+        "plot STORE friction_coefficient --over velocity --size 85",
+        "expected a width such as '85mm', or width and height",
+    ),
+    ("plot STORE friction_coefficient --over velocity --style x.mplstyle", "no style file of matplotlib"),
+    ("plot STORE velocity --by normal_force", "--by is for an output with --over or --effects"),
+    ("plot STORE nowhere.zarr velocity", "nowhere.zarr: no store here"),
     ("plot STORE velocity --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
     ("plot STORE velocity -o velocity.bmp", "expected a file that ends in .png, .pdf or .svg, got 'velocity.bmp'"),
     ("plot STORE velocity force -o both.png", "expected a folder for the figures, got 'both.png'"),

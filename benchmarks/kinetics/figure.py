@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from mdr_dask import bootstrap
-from mdr_dask.fit.relaxation import exponential, point_weights, widths
+from mdr_dask.fits.relaxation import exponential, point_weights, widths
 from mdr_dask.physics.sliding.backward_euler import solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line

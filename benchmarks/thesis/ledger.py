@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import Resources, datasets, loads, run
-from mdr_dask.fit import available
+from mdr_dask.fits import available
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -108,8 +109,29 @@ def parse(text: str, source: str, problems: Problems) -> Document:
     return document
 
 
+_NO_BLANK = re.compile(r"(?:^|[{,])\s*(?:- )?([A-Za-z_]\w*):(?=[^\s:/\\])")
+
+
 def _hint(text: str, index: int) -> str:
-    return " (indent with blanks, not with tabs)" if text[index : index + 1] == "\t" else ""
+    """Return what is probably amiss where a text ceases to be YAML, or in the lines just above."""
+    if text[index : index + 1] == "\t":
+        return " (indent with blanks, not with tabs)"
+    end = text.find("\n", index)
+    above = text[: end if end >= 0 else len(text)].splitlines()
+    for back, line in enumerate(reversed(above[-3:])):
+        found = _NO_BLANK.search(line)
+        if found:
+            return f" (a blank is missing behind '{found[1]}:' in line {len(above) - back})"
+    return " (entries of one mapping begin in the same column)" if _is_indented_otherwise(above) else ""
+
+
+def _is_indented_otherwise(lines: list[str]) -> bool:
+    """Return whether the last line and the one before it begin in different columns, neither below a key alone."""
+    written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
+    if len(written) < 2 or written[0].rstrip().endswith(":"):
+        return False
+    first, second = (len(line) - len(line.lstrip()) for line in written)
+    return second != first and second > 0
 
 
 class _EndlessError(Exception):

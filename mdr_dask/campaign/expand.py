@@ -15,7 +15,7 @@ from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.campaign.remarks import remarks
-from mdr_dask.campaign.spec import CampaignSpec, LatinHypercubeSpec, SobolSpec, TableSpec
+from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
 from mdr_dask.campaign.variation import Origin, Variation
 from mdr_dask.models.base import Model, Parameters
 from mdr_dask.units import to_si
@@ -90,7 +90,7 @@ class _Expansion:
 
     def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
-        drawn = isinstance(design, SobolSpec | LatinHypercubeSpec)
+        drawn = isinstance(design, Drawn)
         found = variation.find(self.document, self.parameters, self.data, self.paths, drawn, self.problems)
         origin = Origin("sampling", self.document.place(("sampling",)))
         if isinstance(design, TableSpec):
@@ -101,7 +101,7 @@ class _Expansion:
             )
         if drawn and not found:
             self._complain(origin, "expected at least one range among the parameters, got none")
-        if isinstance(design, SobolSpec | LatinHypercubeSpec) and found and all(one.spread for one in found):
+        if isinstance(design, Drawn) and found and all(one.spread for one in found):
             return sampling.drawn(design, self.spec.seed, found)
         if design == "zip":
             self._check_lengths(found)

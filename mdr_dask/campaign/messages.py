@@ -13,19 +13,21 @@ from pydantic_core import ErrorDetails
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.errors import did_you_mean
-from mdr_dask.units import expected, likely
+from mdr_dask.units import expected, likely, spelt
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
 Report = Callable[[Path, bool, str], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
 _BOUNDS |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "of at most")}
+_ROUND = ("sphere", "ball", "spherical")
+_SPHERE = " (a sphere is a parabola of its radius: {shape: parabola, radius: ...})"
 _KINDS = {
     "int_type": "a whole number",
     "int_from_float": "a whole number",
     "float_type": "a number",
     "bool_type": "true or false",
-    "string_type": "a text",
+    "string_type": "a string",
     "dict_type": "a mapping",
     "tuple_type": "a list",
     "list_type": "a list",
@@ -117,7 +119,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
     else:
         value = value_at(data, path)
         wanted = " or ".join(dict.fromkeys(_wanted(details, path, kind, data) for details in group))
-        hint = _hint(group, value) or _forgotten_unit(group, path, kind, data)
+        hint = _hint(group, value) or _forgotten_unit(group, path, kind, data) or _meant(path, kind, data)
         report(path, False, f"expected {wanted}, got {shown(value)}{hint}")
 
 
@@ -129,9 +131,12 @@ def _entry(value: Any, what: str) -> Path:
 
 def _hint(group: list[ErrorDetails], value: Any) -> str:
     types = {details["type"] for details in group}
+    choices = [choice for details in group for choice in _choices(details)]
+    if isinstance(value, str) and value.casefold() in _ROUND and "parabola" in choices:
+        return _SPHERE
     if isinstance(value, str):
-        hint = did_you_mean(value, [choice for details in group for choice in _choices(details)])
-        return hint if "mean" in hint else ""
+        hint = did_you_mean(value, choices)
+        return hint if "mean" in hint else spelt(value) if types & {"int_type", "float_type"} else ""
     if isinstance(value, float) and value.is_integer() and types & {"int_type", "int_from_float"}:
         return f" (write {value:.0f})"
     if isinstance(value, dict) and types & {"float_type", "int_type"}:
@@ -143,10 +148,38 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
     """Return the unit that a bare number out of bounds may lack."""
     value, found, unit = value_at(data, path), fields.owner(kind, path, data), fields.unit_at(kind, path, data)
     usual = fields.usual(found[0].model_fields[found[1]]) if found else ""
-    if not (usual and unit and isinstance(value, int | float)) or group[0]["type"] not in _BOUNDS:
+    if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
         return ""
-    meant = likely(value, unit, usual)
+    if unit == "1" and value in range(1, 101) and next(iter(group[0]["ctx"].values())) == 1:
+        return f" (write '{value:g} %' if you mean that)"
+    meant = likely(value, unit, usual) if usual and unit else ""
     return f" (write {meant!r} if you mean that)" if meant else ""
+
+
+def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
+    """Return how a word is written that stands where a mapping or a list is expected."""
+    value, found = value_at(data, path), fields.owner(kind, path, data)
+    if not found or not isinstance(value, str):
+        return ""
+    info = found[0].model_fields[found[1]]
+    shapes = [only for one in fields.structures(info) for only in fields.fixed(one).values()]
+    if value.casefold() in _ROUND and "parabola" in shapes:
+        return _SPHERE
+    for one in fields.structures(info):
+        if value in one.model_fields:
+            return f" (write {{{value}: ...}})"
+        for key, only in fields.fixed(one).items():
+            if value == only:
+                return f" (write {{{', '.join([f'{key}: {only}', *(f'{name}: ...' for name in required(one))])}}})"
+    if fields.holds_list(info):
+        return f" (write [{value}])"
+    first = next((name for one in fields.structures(info) for name in one.model_fields), "")
+    return f" (write {{{first}: {value}}})" if first == "path" else ""
+
+
+def required(kind: type[BaseModel]) -> list[str]:
+    """Return the fields without which a parameter set is none, those with one value apart."""
+    return [name for name, info in kind.model_fields.items() if info.is_required() and name not in fields.fixed(kind)]
 
 
 def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any) -> str:

@@ -67,6 +67,7 @@ a name.
 | `zip` | the first values together, the second values together, ...: one dimension `case` |
 | `{sobol: n}` | `n` points of a scrambled Sobol sequence in the ranges |
 | `{latin_hypercube: n}` | `n` points, one in each of `n` strips of every range |
+| `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
 All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
@@ -116,9 +117,14 @@ def output_rows(model: Model[Any]) -> list[dict[str, str]]:
     ]
 
 
+def number_rows(model: Model[Any]) -> list[dict[str, str]]:
+    """Return name, formula and meaning of every dimensionless number of a model."""
+    return [{"number": number.name, "formula": number.formula, "meaning": number.meaning} for number in model.numbers]
+
+
 def _model(model: Model[Any]) -> str:
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
-    tables = [_table(parameter_rows(model)), _table(output_rows(model))]
+    tables = [_table(rows) for rows in (parameter_rows(model), output_rows(model), number_rows(model)) if rows]
     together = [f"* {line}" for line in ways_told(model)]
     together = ["What belongs together:", "", *together, ""] if together else []
     return "\n".join([f"## `{model.name}`", "", summary, "", *together, *tables])
@@ -140,8 +146,9 @@ def _units() -> str:
         [
             "## Units",
             "",
-            "A number without a unit is in SI. With a unit it is a text, `20 mm`, `10 mPa s`, `5 1/mm`, `870 kg/m^3`;",
-            "the unit has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`.",
+            "A number without a unit is in SI. With a unit it is a string, `20 mm`, `10 mPa s`, `870 kg/m^3`; the unit",
+            "has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`. A bare number more than",
+            "three decades from a usual value, such as `length: 20`, is read as it stands, and asked about.",
             "",
             f"Prefixes: {', '.join(f'`{prefix}`' for prefix in prefixes)}, and their names.",
             "",
@@ -222,7 +229,7 @@ _NOUNS = {
     "number": "number",
     "integer": "whole number",
     "boolean": "true, false",
-    "string": "text",
+    "string": "string",
     "object": "mapping",
 }
 

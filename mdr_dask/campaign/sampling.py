@@ -6,27 +6,31 @@ import errno
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Place, Problems, dotted
-from mdr_dask.campaign.spec import LatinHypercubeSpec, SobolSpec
+from mdr_dask.campaign.spec import Drawn, LatinHypercubeSpec, SaltelliSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
 from mdr_dask.errors import did_you_mean
 from mdr_dask.models.base import Parameters
 from mdr_dask.tables import Cell, Sheet, TableError, read_sheet
 
+if TYPE_CHECKING:
+    from mdr_dask.arrays import FloatArray
+
 _PATH = re.compile(r"[A-Za-z_][\w.]*\Z")
 _NOT_A_HEADING = "expected the name of a parameter, perhaps with a unit in brackets, such as velocity [mm/s]"
 
 
-def drawn(design: SobolSpec | LatinHypercubeSpec, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
+def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Variation, ...]:
     """Draw values for parameters that vary over intervals.
 
     Parameters
     ----------
-    design : SobolSpec or LatinHypercubeSpec
-        The design and its number of points. Sobol points keep their order: a larger number adds some and moves none.
+    design : SobolSpec, LatinHypercubeSpec or SaltelliSpec
+        The design and its number of points. Points of a Sobol sequence keep their order: a larger number adds some and
+        moves none.
     seed : int
         Seed of the scrambling.
     variations : sequence of Variation
@@ -41,12 +45,31 @@ def drawn(design: SobolSpec | LatinHypercubeSpec, seed: int, variations: Sequenc
     from scipy.stats import qmc
 
     generator = np.random.Generator(np.random.Philox(seed))
-    if isinstance(design, SobolSpec):
-        number = design.sobol
-        points = qmc.Sobol(len(variations), seed=generator).random_base2((number - 1).bit_length())[:number]
+    inputs = len(variations)
+
+    def sequence(number: int, dimensions: int) -> FloatArray:
+        points: FloatArray = qmc.Sobol(dimensions, seed=generator).random_base2((number - 1).bit_length())[:number]
+        return points
+
+    if isinstance(design, LatinHypercubeSpec):
+        points = qmc.LatinHypercube(inputs, seed=generator).random(design.latin_hypercube)
+    elif isinstance(design, SaltelliSpec):
+        points = _exchanged(*np.hsplit(sequence(design.saltelli, 2 * inputs), 2))
     else:
-        points = qmc.LatinHypercube(len(variations), seed=generator).random(design.latin_hypercube)
+        points = sequence(design.sobol, inputs)
     return tuple(variation.drawn(column) for variation, column in zip(variations, points.T, strict=True))
+
+
+def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return for each pair of points: a, b, and for every input a with that input of b, one behind the other."""
+    import numpy as np
+
+    number, inputs = first.shape
+    points: FloatArray = np.repeat(first[:, np.newaxis], inputs + 2, axis=1)
+    points[:, 1] = second
+    for index in range(inputs):
+        points[:, index + 2, index] = second[:, index]
+    return points.reshape(number * (inputs + 2), inputs)
 
 
 def tabled(

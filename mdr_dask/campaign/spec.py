@@ -55,6 +55,20 @@ class LatinHypercubeSpec(Parameters):
     )
 
 
+class SaltelliSpec(Parameters):
+    """Saltelli's design for Sobol indices."""
+
+    saltelli: int = Field(
+        ge=2,
+        le=10**5,
+        description="number n of base points of a design for `mdr-dask sensitivity`: n (d + 2) cases for d varied "
+        "parameters",
+    )
+
+
+Drawn = SobolSpec | LatinHypercubeSpec | SaltelliSpec
+
+
 class TableSpec(Parameters):
     """Cases from a file."""
 
@@ -74,9 +88,11 @@ Sampling = Annotated[
     Annotated[Literal["grid", "zip"], Tag("name")]
     | Annotated[SobolSpec, Tag("sobol")]
     | Annotated[LatinHypercubeSpec, Tag("latin_hypercube")]
+    | Annotated[SaltelliSpec, Tag("saltelli")]
     | Annotated[TableSpec, Tag("table")],
     Discriminator(_sampling_kind, custom_error_type="sampling", custom_error_message=(
-        "Input should be 'grid', 'zip', {sobol: n}, {latin_hypercube: n} or {table: cases.csv}"
+        "Input should be 'grid', 'zip', {sobol: n}, {latin_hypercube: n}, {saltelli: n} or "
+        "{table: cases.csv}"
     )),
 ]  # fmt: skip
 

@@ -10,11 +10,14 @@ import sys
 import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
-from mdr_dask.cli.figures import figures
+from mdr_dask.cli.figures import figures, plot
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
-from mdr_dask.cli.results import aggregate, fit, plot, show, status
+from mdr_dask.cli.results import aggregate, fit, show, status
 from mdr_dask.cli.running import run
+from mdr_dask.cli.sensitivity import sensitivity
+from mdr_dask.cli.storage import verify
+from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
 BROKE = 3
@@ -38,7 +41,23 @@ def cli() -> None:
     """
 
 
-for command in (models, init, check, run, status, show, aggregate, fit, plot, figures, master_curve, schema):
+for command in (
+    models,
+    init,
+    check,
+    run,
+    status,
+    verify,
+    show,
+    aggregate,
+    fit,
+    sensitivity,
+    plot,
+    figures,
+    master_curve,
+    surface,
+    schema,
+):
     cli.add_command(command)
 
 

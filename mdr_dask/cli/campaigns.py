@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.printing import print_json, printable
+from mdr_dask.cli.progress import at_work
 from mdr_dask.cli.understood import axes_rows, costs_row, study_lines
 from mdr_dask.cli.writing import writing
 
@@ -29,7 +30,7 @@ def models(name: str | None, form: str | None) -> None:
     mdr-dask models sliding_friction
     """
     from mdr_dask import models as room
-    from mdr_dask.campaign.reference import output_rows, parameter_rows, ways_told
+    from mdr_dask.campaign.reference import number_rows, output_rows, parameter_rows, ways_told
 
     if name is None:
         rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
@@ -38,7 +39,7 @@ def models(name: str | None, form: str | None) -> None:
     model = _model(name)
     if form == "json":
         parts = {"parameters": parameter_rows(model), "together": ways_told(model), "outputs": output_rows(model)}
-        print_json({"model": name, **parts})
+        print_json({"model": name, **parts, "numbers": number_rows(model)})
         return
     click.echo(f"{name}: {model.summary}\n\nparameters")
     _print_left(parameter_rows(model), None)
@@ -46,6 +47,9 @@ def models(name: str | None, form: str | None) -> None:
         click.echo("\n".join(["", "what belongs together", *ways_told(model)]))
     click.echo("\noutputs")
     _print_left(output_rows(model), None)
+    if model.numbers:
+        click.echo("\ndimensionless numbers")
+        _print_left(number_rows(model), None)
 
 
 def _model(name: str) -> Model[Any]:
@@ -109,8 +113,9 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     rows, problems = [], []
     for path in campaigns:
         try:
-            campaign = load(path)
-            costs = estimate(campaign)
+            with at_work(f"checking {path}"):
+                campaign = load(path)
+                costs = estimate(campaign)
         except CampaignError as error:
             problems += list(error.args)
             continue

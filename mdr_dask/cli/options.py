@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import click
 
 
@@ -14,6 +18,10 @@ def _units(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> dic
     from mdr_dask.questions.units import parse_units
 
     return parse_units(texts)
+
+
+def _listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name.strip().replace(".", "_") for text in texts for name in text.split(",") if name.strip())
 
 
 series_option = click.option("--series", help="Name of the series, where the campaign has any.")
@@ -31,3 +39,59 @@ units_option = click.option(
     metavar="NAME=UNIT,...",
     help="Units of columns: velocity=km/h,temperature=degC; repeat.",
 )
+where_option = click.option(
+    "--where",
+    default="",
+    metavar="CONDITION",
+    help="Keep rows where it holds: 'friction_coefficient > 0.5 and velocity < 3 km/h'.",
+)
+json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
+csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
+limit_option = click.option(
+    "--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most rows of a table; 0 for all."
+)
+_QUESTION = (
+    series_option,
+    select_option,
+    where_option,
+    click.option(
+        "--group-by",
+        multiple=True,
+        callback=_listed,
+        metavar="AXIS,...",
+        help="A row for each value of these axes, averaged over all other cases.",
+    ),
+    click.option(
+        "--sort", multiple=True, metavar="[-]COLUMN", help="Order of the rows, - for the largest first; repeat."
+    ),
+    click.option(
+        "--columns",
+        multiple=True,
+        callback=_listed,
+        metavar="NAME,...",
+        help="Only these: axes, parameters, outputs, dimensionless numbers, realisations, status.",
+    ),
+    units_option,
+    limit_option,
+    json_option,
+    csv_option,
+    click.option(
+        "--jsonl",
+        "form",
+        flag_value="jsonl",
+        help="Print a line of JSON for each row.",
+    ),
+    click.option(
+        "--output",
+        "-o",
+        type=click.Path(path_type=Path),
+        help="Write to FILE.csv, .json, .jsonl or .parquet, or as labelled arrays to FILE.nc or .zarr.",
+    ),
+)
+
+
+def question_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add what show and aggregate have in common: the parts of a question, and the forms of its answer."""
+    for option in reversed(_QUESTION):
+        command = option(command)
+    return command

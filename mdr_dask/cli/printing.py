@@ -37,7 +37,7 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
         return
     names = list(rows[0]) if rows else list(units)
-    titles = [f"{name} [{units[name]}]" if units.get(name, "1") not in ("1", "") else name for name in names]
+    titles = [titled(name, units.get(name, "1")) for name in names]
     if form == "csv":
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
@@ -46,17 +46,36 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
         click.echo(text.getvalue(), nl=False)
         return
     shown = rows[:limit] if limit else rows
-    cells = [titles, *([_short(row[name]) for name in names] for row in shown)]
-    widths = [max(len(line[i]) for line in cells) for i in range(len(names))]
-    for line in cells:
-        click.echo("  ".join(map(_aligned, names, line, widths)).rstrip())
-    if len(shown) < len(rows):
-        click.echo(f"... {len(rows) - len(shown)} more rows (--limit 0 prints all)", err=True)
+    print_aligned(titles, [[row[name] for row in shown] for name in names])
+    print_left(len(rows) - len(shown))
+
+
+def titled(name: str, unit: str) -> str:
+    """Return the heading of a column: its name, and its unit if it has one."""
+    return f"{name} [{unit}]" if unit not in ("1", "") else name
+
+
+def print_aligned(
+    titles: Sequence[str], columns: Sequence[Sequence[Any]], widths: Sequence[int] = (), head: bool = True
+) -> list[int]:
+    """Print columns side by side, at least as wide as those before them; return how wide they are."""
+    cells = [[title, *map(short, column)] for title, column in zip(titles, columns, strict=True)]
+    widths = [max(map(len, column)) for column in cells] if head else list(widths)
+    widths = [max(width, *map(len, column)) for width, column in zip(widths, cells, strict=True)]
+    for line in list(zip(*cells, strict=True))[0 if head else 1 :]:
+        click.echo("  ".join(map(_aligned, titles, line, widths)).rstrip())
+    return widths
+
+
+def print_left(count: int | None) -> None:
+    """Say on stderr how many rows a limit left out; None for some that nobody counted."""
+    if count != 0:
+        click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
 
 def _aligned(name: str, cell: str, width: int) -> str:
     """Return a cell, numbers to the right and the sentence of a fit to the left."""
-    return cell.ljust(width) if name == "law_holds" else cell.rjust(width)
+    return cell.ljust(width) if name in ("law_holds", "status") else cell.rjust(width)
 
 
 def printable(text: str) -> str:
@@ -91,42 +110,32 @@ def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
     return values
 
 
-def with_errors(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
-    """Join each mean and its errors into one column for a reader: ``0.1234 +- 0.0005 +- 0.0001``."""
-    outputs = [name.removesuffix("_mean") for name in units if name.endswith("_mean")]
-    of_outputs = {f"{name}_{part}" for name in outputs for part in ("mean", "standard_error", "grid_error")}
-    kept = [name for name in units if name not in of_outputs]
-    joined = [
-        {name: row[name] for name in kept}
-        | {
-            name: _with_error(row[f"{name}_mean"], row[f"{name}_standard_error"], row.get(f"{name}_grid_error"))
-            for name in outputs
-        }
-        for row in rows
-    ]
-    return joined, {name: units[name] for name in kept} | {name: units[f"{name}_mean"] for name in outputs}
-
-
 def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
     """Join each constant and the ends of its interval into one column for a reader: ``0.123 (0.120, 0.126)``."""
     known = {name for name in units if f"{name}_low" in units and f"{name}_high" in units}
     ends = {f"{name}_{end}" for name in known for end in ("low", "high")}
     kept = [name for name in units if name not in ends]
-    joined = [{name: _with_interval(row, name) if name in known else row[name] for name in kept} for row in rows]
+    joined = [
+        {
+            name: with_interval(*(row[name + end] for end in ("", "_low", "_high"))) if name in known else row[name]
+            for name in kept
+        }
+        for row in rows
+    ]
     return joined, {name: units[name] for name in kept}
 
 
-def _with_interval(row: Row, name: str) -> str:
-    value, low, high = row[name], row[f"{name}_low"], row[f"{name}_high"]
+def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
+    """Join a number and the ends of its interval, where they are known."""
     if not (math.isfinite(low) and math.isfinite(high)):
-        return _short(value)
+        return short(value)
     return f"{value:.4g} ({low:.4g}, {high:.4g})"
 
 
-def _with_error(mean: float, *errors: float | None) -> str:
+def with_error(mean: float, *errors: float | None) -> str:
     """Join a mean and its errors; ``-`` for an error that is not known, 0 for rounding noise."""
     if not any(error is not None and math.isfinite(error) for error in errors):
-        return _short(mean)
+        return short(mean)
     shown = [_error(error, abs(mean)) for error in errors if error is not None]
     return " +- ".join([f"{mean:.4g}", *shown])
 
@@ -137,7 +146,8 @@ def _error(error: float, size: float) -> str:
     return f"{error:.1g}" if error > ROUNDING * size else "0"
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """Return a value as a cell of a table."""
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 

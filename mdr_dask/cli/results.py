@@ -1,17 +1,25 @@
-"""Commands around a store: status, show, aggregate, fit, plot."""
+"""Commands around a store: status, show, aggregate, fit."""
 
 from __future__ import annotations
 
-import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from mdr_dask.cli import watching
-from mdr_dask.cli.options import select_option, series_option, tell, units_option
-from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_errors, with_intervals
-from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
+from mdr_dask.cli.answers import check_target, print_answer, write_answer
+from mdr_dask.cli.options import (
+    csv_option,
+    json_option,
+    limit_option,
+    question_options,
+    series_option,
+    tell,
+)
+from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_intervals
+from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,11 +39,6 @@ class Reading(click.Command):
 STATISTICS = ("mean", "standard_deviation", "standard_error", "grid_error", "quantile", "interval", "count")
 
 store_argument = click.argument("store")
-json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
-csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
-limit_option = click.option(
-    "--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most rows of a table; 0 for all."
-)
 
 
 @click.command(cls=Reading)
@@ -64,6 +67,7 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         return
     if not (failures or messages):
         _print_counts(count(), watching.at_work(store), form)
+        room.require_sound(store, room.series_names(store))
         return
     groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
@@ -105,7 +109,7 @@ def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
 
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     for record in sorted(room.records(store, series), key=lambda record: record["attempt"]):
-        for message in record["messages"]:
+        for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = room.ledger(store, series, dataset["status"].shape)
     return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
@@ -130,97 +134,80 @@ def _brief(value: Any) -> str:
 @click.command(cls=Reading)
 @store_argument
 @click.argument("outputs", nargs=-1)
-@series_option
-@select_option
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Over realisations; repeat.")
 @click.option("--realisations", "raw", is_flag=True, help="Show every realisation, not a statistic.")
-@units_option
-@limit_option
-@json_option
-@csv_option
-def show(
-    store: str,
-    outputs: tuple[str, ...],
-    series: str | None,
-    selections: tuple[str, ...],
-    statistic: tuple[str, ...],
-    raw: bool,
-    units: dict[str, str],
-    limit: int,
-    form: str | None,
-) -> None:
+@question_options
+def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
     A mean stands with the standard error of the realisations and, behind a second +-, with the discretisation error.
+    `status` says what became of the realisations: done, or how many of them are missing, failed or not_converged.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
     mdr-dask show results/quickstart.zarr --select 'velocity=1 mm/s..1 m/s' --units velocity=km/h --csv
+    mdr-dask show results/quickstart.zarr --where 'friction_coefficient > 0.01 and velocity < 3 km/h' --sort -velocity
+    mdr-dask show results/quickstart.zarr --columns load_number,velocity_number,scaled_friction -o numbers.parquet
     """
-    from mdr_dask import store as room
-    from mdr_dask.aggregation import aggregate as reduce
-    from mdr_dask.questions import selection
-    from mdr_dask.questions.units import in_units
-
-    dataset = selection.group(room.datasets(store), series)
-    wanted = selection.select(selection.outputs(dataset, outputs), selections, tell)
-    shown = wanted if raw else reduce(wanted, statistic or ("mean", "standard_error", "grid_error"))
-    shown = in_units(shown, units)
-    rows, of_columns = table(shown)
-    if not (raw or statistic or form):
-        rows, of_columns = with_errors(rows, of_columns)
-    print_rows(rows, of_columns, form or "table", limit)
+    statistics = None if raw else statistic or ("mean", "standard_error", "grid_error")
+    _answer(store, outputs, statistics, join=not (raw or statistic), **asked)
 
 
 @click.command(cls=Reading)
 @store_argument
-@series_option
+@click.argument("outputs", nargs=-1)
 @click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these; repeat.")
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="Write to FILE.zarr, FILE.nc or FILE.csv.")
-@limit_option
-@json_option
-@csv_option
-def aggregate(
-    store: str, series: str | None, statistic: tuple[str, ...], output: Path | None, limit: int, form: str | None
-) -> None:
-    """Reduce every output over its realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+@question_options
+def aggregate(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], **asked: Any) -> None:
+    """Reduce outputs over realisations: mean, scatter, standard error, quantiles, bootstrap interval.
+
+    Without --statistic, a table for reading has mean, interval and scatter; all other forms have all of them.
 
     \b
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
+    mdr-dask aggregate results/quickstart.zarr friction_coefficient --group-by normal_force
     """
+    brief = ("mean", "standard_deviation", "interval")
+    wanted = statistic or (STATISTICS if asked["form"] or asked["output"] else brief)
+    _answer(store, outputs, wanted, join=not statistic, **asked)
+
+
+def _answer(
+    store: str,
+    outputs: tuple[str, ...],
+    statistics: tuple[str, ...] | None,
+    join: bool,
+    *,
+    series: str | None,
+    form: str | None,
+    output: Path | None,
+    limit: int,
+    **parts: Any,
+) -> None:
+    """Print or write the answer to a question."""
     from mdr_dask import store as room
-    from mdr_dask.aggregation import aggregate as reduce
     from mdr_dask.questions import selection
+    from mdr_dask.questions.labelled import labelled
+    from mdr_dask.questions.table import Question, table
 
     if output is not None:
-        _check_target(output)
-    reduced = reduce(selection.group(room.datasets(store), series), statistic or STATISTICS)
+        if form:
+            raise click.UsageError(f"expected one of --{form} and --output, got both")
+        check_target(output)
+    question = Question(outputs, statistics=statistics, **parts)
+    dataset = selection.group(room.datasets(store), series)
     if output is None:
-        rows, units = table(reduced)
-        print_rows(rows, units, form or "table", limit)
+        print_answer(table(dataset, question, 0 if form else limit, tell), form or "table", limit, join)
         return
-    with writing(output):
-        _write(reduced, output)
-    click.echo(f"{output}: {len(reduced.data_vars)} variables over {dict(reduced.sizes)}")
-
-
-def _check_target(path: Path) -> None:
-    from mdr_dask.store import is_study
-
-    require_suffix(path, (".zarr", ".nc", ".csv"))
-    if path.suffix == ".zarr" and is_study(str(path)):
-        raise click.UsageError(f"expected a place for the statistics, got the store of a study: {str(path)!r}")
-
-
-def _write(dataset: xr.Dataset, path: Path) -> None:
-    from mdr_dask.store import save
-
-    if path.suffix == ".csv":
-        rows, units = table(dataset)
-        with path.open("w") as stream, contextlib.redirect_stdout(stream):
-            print_rows(rows, units, "csv")
-    else:
-        save(dataset, path)
+    if output.suffix in (".nc", ".zarr"):
+        found = labelled(dataset, question, tell)
+        with writing(output):
+            room.save(found, output)
+        click.echo(f"{output}: {len(found.data_vars)} variables over {dict(found.sizes)}")
+        return
+    answer = table(dataset, question, 0, tell)
+    rows = write_answer(answer, output)
+    click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
 
 
 @click.command(cls=Reading)
@@ -237,16 +224,16 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     mdr-dask fit results/friction_force.zarr
     mdr-dask fit results/friction_force.zarr zone_one --json
     """
-    from mdr_dask import fit as room
+    from mdr_dask import fits as room
     from mdr_dask import store as stores
     from mdr_dask.questions import selection
 
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
-        _list(model, {name: law.summary for name, law in known.items()})
+        list_names(model, {name: law.summary for name, law in known.items()})
         return
-    _require_known(names, list(known), f"law for {model}")
+    require_known(names, list(known), f"law for {model}")
     groups = stores.datasets(store)
     if series is not None:
         groups = {series: selection.group(groups, series)}
@@ -263,7 +250,8 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
             )
 
 
-def _list(model: str, summaries: dict[str, str]) -> None:
+def list_names(model: str, summaries: dict[str, str]) -> None:
+    """Print what there is for a model, with a line about each."""
     if not summaries:
         click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)
@@ -271,78 +259,8 @@ def _list(model: str, summaries: dict[str, str]) -> None:
         click.echo(f"{name.ljust(width)}  {summary}")
 
 
-def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
+def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
+    """Refuse a name that is not known."""
     for name in names:
         if name not in known:
             raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")
-
-
-@click.command(cls=Reading)
-@store_argument
-@click.argument("names", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="Draw every figure that the store has the data for.")
-@click.option("--series", "series", multiple=True, help="Only this series; repeat.")
-@select_option
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
-@format_option
-def plot(
-    store: str,
-    names: tuple[str, ...],
-    everything: bool,
-    series: tuple[str, ...],
-    selections: tuple[str, ...],
-    output: Path | None,
-    suffix: str,
-) -> None:
-    """Draw figures from a store; without a name, say which figures there are.
-
-    A figure holds axes that it cannot show at one value, and says which; --select chooses another.
-
-    \b
-    mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
-    mdr-dask plot results/friction_force.zarr --all -o figures
-    mdr-dask plot results/friction_force.zarr regions --select 'normal_force=1 N'
-    """
-    from mdr_dask import plots as room
-    from mdr_dask import store as stores
-    from mdr_dask.errors import DataError, FitError
-    from mdr_dask.plots import style
-    from mdr_dask.questions import selection
-
-    model = stores.attributes(store)["model"]
-    known = room.available(model)
-    if not names and not everything:
-        _list(model, {name: figure.summary for name, figure in known.items()})
-        return
-    _require_known(names, list(known), f"figure of {model}")
-    folder, file = _places(output, alone=len(names) == 1 and not everything)
-    groups = stores.datasets(store)
-    groups = {name: selection.group(groups, name) for name in series} if series else groups
-    groups = selection.select_all(groups, selections, tell)
-    for name in names or tuple(known):
-        path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
-        try:
-            figure = known[name].figure(groups)
-        except (DataError, FitError) as error:
-            if not everything:
-                raise
-            click.echo(f"{name}: left out: {error}", err=True)
-            continue
-        with writing(path):
-            figure.savefig(path, dpi=style.DPI)
-        click.echo(str(path))
-        if style.left_out(figure):
-            click.echo(f"{name}: not drawn: {style.left_out(figure)}", err=True)
-
-
-def _places(output: Path | None, alone: bool) -> tuple[Path, Path | None]:
-    """Return the folder of figures, and the file of a figure that is drawn alone where one is named."""
-    folder = output or Path("figures")
-    if not folder.suffix or folder.is_dir():
-        return folder, None
-    if alone:
-        require_suffix(folder, FIGURES)
-        return folder, folder
-    if folder.suffix in FIGURES:
-        raise click.UsageError(f"expected a folder for the figures, got {str(folder)!r}")
-    return folder, None

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import lru_cache, reduce
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
@@ -31,6 +32,7 @@ class Status(IntEnum):
 
 
 Ways = tuple[tuple[str, ...], ...]
+_WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
 class Parameters(BaseModel):
@@ -45,12 +47,35 @@ class Parameters(BaseModel):
     gone: ClassVar[Mapping[str, str]] = {}
     ways: ClassVar[tuple[Ways, ...]] = ()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _whole_numbers_in_quotes(cls, data: Any) -> Any:
+        """Read a whole number in quotes as the number, for a number with a unit is a string too."""
+        if not isinstance(data, dict):
+            return data
+        quoted = {
+            key: int(data[key])
+            for key in data.keys() & _whole_fields(cls)
+            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
+        }
+        return {**data, **quoted} if quoted else data
+
     def require_one_way(self) -> None:
         """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
         for ways in self.ways:
             given = {name for way in ways for name in way if getattr(self, name) is not None}
             if not any(given == set(way) for way in ways):
                 raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+
+
+@lru_cache(maxsize=256)
+def _whole_fields(kind: type[BaseModel]) -> frozenset[str]:
+    """Return the fields of a parameter set that may hold a whole number."""
+    return frozenset(name for name, info in kind.model_fields.items() if _may_be_whole(info.annotation))
+
+
+def _may_be_whole(annotation: Any) -> bool:
+    return annotation is int or any(map(_may_be_whole, get_args(annotation)))
 
 
 def said(ways: Ways) -> str:
@@ -105,6 +130,10 @@ def unit_of(parameters: type[BaseModel], name: str) -> str | None:
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
+#: Bytes of a file beyond which it is no table to tell of.
+LARGEST_TABLE = 10**7
+
+
 class DataFile(BaseModel):
     """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
 
@@ -112,6 +141,13 @@ class DataFile(BaseModel):
     name: str
     path: str
     sha256: str
+
+    def read_bytes(self) -> bytes:
+        """Return the file's content; DataError if it has changed since the campaign was read."""
+        content = Path(self.path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != self.sha256:
+            raise DataError(f"{self.path}: changed since the campaign was read")
+        return content
 
     def read_text(self) -> str:
         """Return the file's text.
@@ -121,9 +157,7 @@ class DataFile(BaseModel):
         DataError
             If the file has changed since the campaign was read, or is no text in UTF-8.
         """
-        content = Path(self.path).read_bytes()
-        if hashlib.sha256(content).hexdigest() != self.sha256:
-            raise DataError(f"{self.path}: changed since the campaign was read")
+        content = self.read_bytes()
         try:
             return content.decode("utf-8-sig")
         except UnicodeDecodeError as error:
@@ -133,7 +167,7 @@ class DataFile(BaseModel):
 
     def notes(self) -> tuple[str, ...]:
         """Return columns and ranges of a table, as it has them; nothing of any other file."""
-        return _notes_of_file(self)
+        return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 @lru_cache(maxsize=64)
@@ -226,6 +260,24 @@ class Output:
         """The companion ``<name>_error``: the estimated absolute discretisation error, in the unit of the output."""
         meaning = f"estimated absolute discretisation error, {self.long_name}"
         return Output(f"{self.name}_error", self.unit, meaning, self.dims, self.default)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A dimensionless number that a user can ask for beside the outputs of a model.
+
+    Parameters
+    ----------
+    name, meaning : str
+        As in conditions and tables; the meaning in one line.
+    formula : str
+        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
+        `mdr_dask.questions.expression` reads it.
+    """
+
+    name: str
+    formula: str
+    meaning: str
 
 
 @dataclass(frozen=True)
@@ -359,6 +411,8 @@ class Model(Generic[P]):
         What one part of a parameter set has to say by itself is told by its method `notes`.
     compiling : float
         Seconds that its kernels take to compile, the first time on a machine.
+    numbers : tuple of Number
+        Dimensionless numbers of its cases.
     """
 
     name: str
@@ -375,6 +429,7 @@ class Model(Generic[P]):
     units: Callable[[P], dict[str, str]] = lambda _: {}
     notes: Callable[[Sequence[P]], tuple[str, ...]] = lambda _: ()
     compiling: float = 0.0
+    numbers: tuple[Number, ...] = ()
 
     @property
     def companions(self) -> dict[str, Output]:

@@ -29,7 +29,7 @@ class Plot:
     summary : str
         One line: what against what, and the figure of the thesis it redraws.
     draw : callable, mapping of str to Dataset -> Figure
-        Takes the groups of a store as :class:`mdr_dask.fit.base.Fit` does. Axes carry units, the title what bars mean
+        Takes the groups of a store as :class:`mdr_dask.fits.base.Fit` does. Axes carry units, the title what bars mean
         and what is held fixed; `mdr_dask.plots.style.leave_out` says what is not drawn.
     """
 

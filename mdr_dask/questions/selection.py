@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.models.base import Status
+from mdr_dask.questions.columns import Columns, fixed_words
 from mdr_dask.units import to_si
 
 if TYPE_CHECKING:
@@ -69,6 +70,14 @@ def select_all(
     return chosen
 
 
+def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
+    """Keep the cases for which a condition on means over realisations holds; the others become NaN, and not needed."""
+    truth = Columns(dataset).truth(condition)
+    masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
+    status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
+    return dataset.assign(masked | {"status": status.transpose(*dataset["status"].dims)})
+
+
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
     """Return the group of a series; the only one if none is named."""
     names = ", ".join(datasets)
@@ -116,7 +125,7 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name in dataset.dims and name not in dataset.coords:
         return dataset[name].assign_attrs(units="1")
     fixed = {key: coord for key, coord in dataset.coords.items() if coord.ndim == 0}
-    fixed |= {key: DataArray(word) for key, word in _words(dataset).items() if key not in dataset.coords}
+    fixed |= {key: DataArray(word) for key, word in fixed_words(dataset).items()}
     varied = [str(key) for key, coord in dataset.coords.items() if coord.ndim == 1]
     if name in varied:
         return dataset[name]
@@ -126,14 +135,6 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
     known = [*varied, *(str(dim) for dim in dataset.dims if dim not in dataset.coords)]
     hint = did_you_mean(name, [*known, *map(str, fixed)])
     raise DataError(f"no axis {name!r} in this study{hint or '; known: ' + ', '.join(known)}")
-
-
-def _words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the words among the fixed parameters, nested names joined by ``_``."""
-    import pandas as pd
-
-    flat = pd.json_normalize(json.loads(dataset.attrs.get("parameters", "{}")), sep="_")
-    return {str(name): str(value) for name, (value,) in flat.items() if isinstance(value, str | bool)}
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, Coordinate, Model, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Block, Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -147,10 +147,13 @@ def positions(parameters: EhlLineParameters) -> FloatArray:
     return np.linspace(parameters.profile_start, parameters.profile_end, parameters.profile_points)
 
 
+distinct = deferred("mdr_dask.models.ehl_line.solve", "distinct")
+
+
 def seconds(block: Block[EhlLineParameters]) -> float:
     """Return the estimated time of `compute`: a solution takes some 20 ms, more for a tighter accuracy."""
     accuracy = block.accuracy or ACCURACY
-    return 0.02 * block.cases * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
+    return 0.02 * float(distinct(block)) * float(np.clip((ACCURACY / accuracy) ** 1.2, 0.5, 30.0))
 
 
 def memory(_: Block[EhlLineParameters]) -> float:
@@ -173,7 +176,18 @@ MODEL = Model(
     seconds=seconds,
     whole=("slide_roll_ratio", "eyring_stress"),
     coordinates=coordinates,
-    distinct=deferred("mdr_dask.models.ehl_line.solve", "distinct"),
+    distinct=distinct,
     memory=memory,
+    numbers=(
+        Number("load_parameter", "line_load / (2 * contact_modulus * radius)", "load parameter W = w/(E' R)"),
+        Number(
+            "speed_parameter",
+            "viscosity * mean_velocity / (2 * contact_modulus * radius)",
+            "speed parameter U = eta0 u/(E' R)",
+        ),
+        Number("material_parameter", "2 * contact_modulus * pressure_viscosity", "material parameter G = alpha E'"),
+        Number("moes_load", "load_parameter * (2 * speed_parameter) ** -0.5", "Moes' load parameter M"),
+        Number("moes_lubricant", "material_parameter * (2 * speed_parameter) ** 0.25", "Moes' lubricant parameter L"),
+    ),
     compiling=7.0,
 )

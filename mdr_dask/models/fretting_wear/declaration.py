@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, NamedFile, Number, Output, Parameters, Ways, deferred, quantity
 from mdr_dask.tables import Column, read_table
 
 
@@ -101,7 +101,7 @@ class LoadStep(Parameters):
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
 
 
-_OSCILLATION = ("shear_modulus", "friction", "amplitude")
+_OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
@@ -112,6 +112,7 @@ class FrettingWear(Parameters):
         "method": "write wear_rule: exact, fast or limit; exact is the default",
         "tolerance": "write accuracy",
         "load": "write normal_force",
+        "shear_modulus": "write effective_shear_modulus: it is G* of the pair, G of one body elsewhere",
         "modulus": "write contact_modulus",
         "curvature_radius": "write indenter: {shape: parabola, radius: ...}",
         "angle": "write indenter: {shape: cone, angle: ...}",
@@ -149,7 +150,7 @@ class FrettingWear(Parameters):
         "m", "amplitude U0 of the tangential oscillation", usual="1 um", gt=0, default=None
     )
     contact_modulus: float | None = quantity("Pa", "contact modulus E*", usual="115 GPa", gt=0, default=None)
-    shear_modulus: float | None = quantity(
+    effective_shear_modulus: float | None = quantity(
         "Pa", "effective shear modulus G* of the pair", usual="90 GPa", gt=0, default=None
     )
     friction: float | None = quantity("1", "coefficient of friction", usual="0.6", gt=0, default=None)
@@ -294,7 +295,7 @@ def units(parameters: FrettingWear) -> dict[str, str]:
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=4,
+    version=5,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,
@@ -302,11 +303,19 @@ MODEL = Model(
     seconds=deferred(_SOLVE, "seconds"),
     whole=(
         *("cycles", "path", "wear_coefficient", "hardness"),
-        *("friction", "amplitude", "shear_modulus", "contact_modulus", "depth", "normal_force"),
+        *("friction", "amplitude", "effective_shear_modulus", "contact_modulus", "depth", "normal_force"),
         *("indenter.radius", "indenter.angle", "indenter.coefficient"),
     ),
     coordinates=coordinates,
     distinct=deferred(_SOLVE, "distinct"),
     units=units,
+    numbers=(
+        Number("stick_share", "stick_border / contact_radius", "stick radius over the radius of the wear scar"),
+        Number(
+            "archard_share",
+            "wear_volume * hardness / (4 * wear_coefficient * normal_force * amplitude * cycles)",
+            "worn volume over that of gross slip by Archard's law",
+        ),
+    ),
     compiling=5.0,
 )

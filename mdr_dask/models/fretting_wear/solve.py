@@ -84,17 +84,18 @@ def seconds(block: Block[FrettingWear]) -> float:
     """Estimate the time of a block."""
     parameters, size = block.parameters, block.cases * len(block.realisations)
     if _is_plain(block):
-        return 0.01 + 3e-5 * size
+        return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
     finer = (1e-3 / parameters.accuracy) ** 0.6
-    each = {"limit": 3e-3, "fast": 6e-3, "exact": 0.03 * finer}[parameters.wear_rule]
+    each = {"limit": 1e-3, "fast": 1e-3, "exact": 0.03 * finer}[parameters.wear_rule]
     if parameters.hold == "force":
         each = {"limit": 0.3 * finer, "fast": 0.03, "exact": 0.5 * finer}[parameters.wear_rule]
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
     solves = moments if parameters.wear_rule == "fast" else _count(numbers.exponent, numbers.level)
-    return float(0.01 + each * solves + 4e-3 * moments + 5e-5 * size)
+    moment = 4e-3 if parameters.wear_rule == "exact" else 7e-4
+    return float(0.01 + each * solves + moment * moments + 5e-5 * size)
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:

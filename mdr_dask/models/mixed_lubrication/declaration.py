@@ -9,7 +9,18 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Block, Coordinate, Model, NamedFile, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import (
+    Block,
+    Coordinate,
+    Model,
+    NamedFile,
+    Number,
+    Output,
+    Parameters,
+    Ways,
+    deferred,
+    quantity,
+)
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
 from mdr_dask.models.parts.surface import Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
@@ -255,6 +266,9 @@ OUTPUTS = (
 )
 
 
+DRAWN = {output.name for output in OUTPUTS if output.dims}
+
+
 def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     """Return the angles of a trace and the places, in half widths, of the profiles."""
     angles = 2 * np.pi * np.arange(parameters.trace_points) / parameters.trace_points
@@ -265,11 +279,12 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
 
 
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from points, cases and creep."""
+    """Estimate the time of a block from points, cases, creep, drawn places and the solutions of the film."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    lines = 0.06 * float(millions.max())
-    return len(block.realisations) * (lines + float(np.sum(millions * np.where(creep, 0.06, 0.002))))
+    case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
+    films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
+    return films + len(block.realisations) * float(0.06 * millions.max() + np.sum(millions * case))
 
 
 MODEL = Model(
@@ -293,5 +308,14 @@ MODEL = Model(
         "film_thickness",
     ),
     coordinates=coordinates,
+    numbers=(
+        Number(
+            "load_parameter",
+            "normal_force / (roller_width * contact_modulus * roller_radius)",
+            "load parameter W = w/(E' R) of the pair, E' = 2 E* and R half the radius of a roller",
+        ),
+        Number("film_over_layer", "film / layer_thickness", "film over the critical thickness of the boundary layer"),
+        Number("touching_share", "contact_length / (2 * contact_half_width)", "contact length over the Hertzian width"),
+    ),
     compiling=2.0,
 )

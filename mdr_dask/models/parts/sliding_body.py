@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.models.base import Number, Parameters, Ways, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material, frequencies
 from mdr_dask.models.parts.measured_line import line_of
@@ -18,6 +18,20 @@ from mdr_dask.units import shown
 
 #: What a generated line has and a measured surface brings with it.
 GENERATED = ("hurst", "rms_roughness", "rolloff_wavelength", "longest_wavelength")
+#: Dimensionless numbers of a Kelvin body on a generated line.
+NUMBERS = (
+    Number("deborah", "velocity * relaxation_time / length", "Deborah number v tau / L"),
+    Number(
+        "load_number",
+        "normal_force / (shear_modulus * rms_roughness * length)",
+        "load number F_N / (G h L) (thesis eq. 3.20)",
+    ),
+    Number(
+        "velocity_number",
+        "velocity * relaxation_time * rms_slope / (sqrt(2) * rms_roughness)",
+        "velocity number v tau s / (sqrt 2 h), s the rms slope (thesis eq. 3.19)",
+    ),
+)
 
 
 class SlidingBody(Parameters):

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mdr_dask.models.base import Model, Output, deferred, quantity
-from mdr_dask.models.parts.sliding_body import SlidingBody, frequency_notes
+from mdr_dask.models.base import Model, Number, Output, deferred, quantity
+from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 
 
 class SlidingFriction(SlidingBody):
@@ -47,5 +47,13 @@ MODEL = Model(
     distinct=deferred(SOLVE, "distinct"),
     notes=frequency_notes,
     memory=deferred(SOLVE, "memory"),
+    numbers=(
+        *NUMBERS,
+        Number(
+            "scaled_friction",
+            "friction_coefficient / (sqrt(2) * rms_slope)",
+            "friction over sqrt 2 times the rms slope",
+        ),
+    ),
     compiling=20.0,
 )

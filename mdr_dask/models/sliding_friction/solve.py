@@ -20,9 +20,10 @@ from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say
-NODE_LINE, NODE_STEPPED, NODE_SWEPT = 2.5e-8, 5e-10, 1.3e-8  # seconds for every node of a line and of a solution
-POINT_LINE, POINT_SAMPLED = 1.2e-7, 1.5e-8  # and for every Nyquist point gone along from node to node
-NODE_ARM, NODE_GENERAL, GENERAL = 1e-8, 1e-7, 3e-4  # for every node and arm of a general solid, and to begin with
+NODE_LINE, NODE_SWEPT = 2.5e-8, 1.3e-8  # seconds for every node of a line and of a solution
+STEPPED_LINE, NODE_STEPPED = 1.1e-7, 1.2e-8  # the same of the papers' steps
+POINT_LINE, POINT_SAMPLED = 1.8e-7, 1.6e-8  # and for every Nyquist point gone along from node to node
+NODE_ARM, NODE_GENERAL, GENERAL = 5e-9, 6e-8, 3e-4  # for every node and arm of a general solid, and to begin with
 ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
 
 #: Outputs that have errors, and the column of a steady state that each is.
@@ -177,8 +178,9 @@ def _seconds_of_line(
     grid = 4 if auto else int(oversampling)
     checks = 3.5 if auto or any(f"{output}_error" in block.outputs for output in COLUMNS) else 1
     nodes = points * grid
-    sweep = NODE_STEPPED * nodes if scheme == "backward_euler" else NODE_SWEPT * points * grid**0.25
-    return checks * (NODE_LINE * nodes + solves * sweep)
+    if scheme == "backward_euler":
+        return float(checks * nodes * (STEPPED_LINE + solves * NODE_STEPPED))
+    return float(checks * (NODE_LINE * nodes + solves * NODE_SWEPT * points * grid**0.25))
 
 
 def memory(block: Block[SlidingFriction]) -> float:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
-from mdr_dask.models.base import Coordinate, Model, Output, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, Number, Output, deferred, quantity
 from mdr_dask.models.parts.loading_history import Jump, Protocol
 from mdr_dask.models.parts.material import solid_of
-from mdr_dask.models.parts.sliding_body import SlidingBody, frequency_notes
+from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid
@@ -92,6 +92,14 @@ MODEL = Model(
     seconds=deferred(SOLVE, "seconds"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
+    numbers=(
+        *NUMBERS,
+        Number(
+            "relative_jump",
+            "friction_coefficient_jump / friction_coefficient_before",
+            "immediate change of the friction over the friction before",
+        ),
+    ),
     notes=frequency_notes,
     compiling=28.0,
 )

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, inlined
 from mdr_dask.physics.mdr.transforms import gauss
 
 
-@dataclass(frozen=True, eq=False)
-class Panels:
-    """Nodes and matrices on [0, 1]; node 0 is left out (functions may jump there), node 1 is the last.
+class Mesh(NamedTuple):
+    """Panels that carry a piecewise polynomial from 0 on; node 0 is left out (functions may jump there).
 
     Parameters
     ----------
@@ -30,6 +30,31 @@ class Panels:
         Nodes that each panel adds: the interior Lobatto points and its right end.
     nodes : array, shape (n,)
         All nodes, increasing.
+    barycentric : array, shape (panels, order + 1)
+        Weights of the interpolation inside each panel (the first uses the last `order` of them).
+    """
+
+    edges: FloatArray
+    order: int
+    nodes: FloatArray
+    barycentric: FloatArray
+
+    def extended(self, end: float) -> Mesh:
+        """Return the mesh with one more panel, up to an end."""
+        last = self.edges[-1]
+        local = (self.nodes[-self.order :] - self.edges[-2]) / (last - self.edges[-2])
+        nodes = np.append(self.nodes, last + (end - last) * local)
+        return Mesh(np.append(self.edges, end), self.order, nodes, np.vstack([self.barycentric, self.barycentric[-1:]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """Nodes and matrices on [0, 1]; node 1 is the last.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The panels, with n nodes.
     inner : array, shape (n, n)
         (1/pi) int_0^z u(z') / sqrt(z - z') dz'.
     full : array, shape (n, n)
@@ -40,19 +65,19 @@ class Panels:
         u'(z) at the nodes, each from the panel that ends at or holds it.
     weights : array, shape (n,)
         int_0^1 u dz.
-    barycentric : array, shape (panels, order + 1)
-        Weights of the interpolation inside each panel (the first uses the last `order` of them).
     """
 
-    edges: FloatArray
-    order: int
-    nodes: FloatArray
+    mesh: Mesh
     inner: FloatArray
     full: FloatArray
     outer: FloatArray
     slope: FloatArray
     weights: FloatArray
-    barycentric: FloatArray
+
+    @property
+    def nodes(self) -> FloatArray:
+        """All nodes, increasing."""
+        return self.mesh.nodes
 
 
 @lru_cache(maxsize=64)
@@ -88,7 +113,7 @@ def graded_panels(left: int, right: int, order: int) -> Panels:
         distance = scaled[:, None] - scaled + np.eye(members.size)
         barycentric[panel, -members.size :] = 1.0 / np.prod(distance, axis=1)
     inner, full, outer, slope = matrices
-    return Panels(edges, order, nodes, inner, full, outer, slope, weights, barycentric)
+    return Panels(Mesh(edges, order, nodes, barycentric), inner, full, outer, slope, weights)
 
 
 def panel_members(panel: int, order: int) -> NDArray[np.intp]:
@@ -134,54 +159,47 @@ def _add_panel(
     outer[np.ix_(rows, members)] += 2.0 / np.pi * (last - first) * np.einsum("k,rkm->rm", weight, slope)
 
 
-def interpolate(panels: Panels, values: FloatArray, places: FloatArray) -> FloatArray:
-    """Return the piecewise polynomial through `values`, shape (n,), at places in [0, 1), and zero beyond."""
+def interpolate(mesh: Mesh, values: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the piecewise polynomial through `values`, shape (n,), at places on the mesh, and zero beyond."""
     result = np.zeros_like(places)
-    _interpolate(panels.edges, panels.nodes, panels.barycentric, panels.order, values, places, result)
+    _interpolate(mesh, values, places, result)
     return result
 
 
-def interpolate_weighted(panels: Panels, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
+def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray) -> FloatArray:
     """Return the sum of shares[k] times the polynomial through rows[k] at all the nodes times stretch[k]."""
-    result, row, places = np.zeros((3, panels.nodes.size))
-    _weighted(panels.edges, panels.nodes, panels.barycentric, panels.order, rows, shares, stretch, places, row, result)
+    result = np.zeros(mesh.nodes.size)
+    _weighted(mesh, rows, shares, stretch, result)
     return result
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _weighted(edges, nodes, barycentric, order, rows, shares, stretch, places, row, result):  # type: ignore[no-untyped-def]
+@compiled
+def _weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray, result: FloatArray) -> None:
     for k in range(shares.size):
-        for node in range(nodes.size):
-            places[node] = nodes[node] * stretch[k]
-            row[node] = 0.0
-        _interpolate(edges, nodes, barycentric, order, rows[k], places, row)
-        for node in range(nodes.size):
-            result[node] += shares[k] * row[node]
+        for node in range(mesh.nodes.size):
+            result[node] += shares[k] * value_at(mesh, rows[k], mesh.nodes[node] * stretch[k])
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _interpolate(
-    edges: FloatArray,
-    nodes: FloatArray,
-    barycentric: FloatArray,
-    order: int,
-    values: FloatArray,
-    places: FloatArray,
-    result: FloatArray,
-) -> None:
+@compiled
+def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: FloatArray) -> None:
     for number in range(places.size):
-        place = places[number]
-        if place >= 1.0:
-            continue
-        panel = min(max(np.searchsorted(edges, place, side="right") - 1, 0), edges.size - 2)
-        above, below = 0.0, 0.0
-        for member in range(0 if panel > 0 else 1, order + 1):
-            node = panel * order + member - 1
-            distance = place - nodes[node]
-            if distance == 0.0:
-                above, below = values[node], 1.0
-                break
-            share = barycentric[panel, member] / distance
-            above += share * values[node]
-            below += share
-        result[number] = above / below
+        result[number] = value_at(mesh, values, places[number])
+
+
+@inlined
+def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
+    """Return the piecewise polynomial through `values` at a place on the mesh, and zero beyond."""
+    if place >= mesh.edges[-1]:
+        return 0.0
+    order = mesh.order
+    panel = min(max(int(np.searchsorted(mesh.edges, place, side="right")) - 1, 0), mesh.edges.size - 2)
+    above, below = 0.0, 0.0
+    for member in range(0 if panel > 0 else 1, order + 1):
+        node = panel * order + member - 1
+        distance = place - mesh.nodes[node]
+        if distance == 0.0:
+            return float(values[node])
+        share = mesh.barycentric[panel, member] / distance
+        above += share * values[node]
+        below += share
+    return float(above / below)

@@ -175,6 +175,8 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
             return gap
         if gap <= -start:
             return -level
+        if gap > 0.25 * start:  # nothing cancels
+            return math.pow(start + gap, n) - level
         return level * math.expm1(n * math.log1p(gap / start))
     if abs(gap) >= 0.02:
         return _piece(image, start + gap, 0) - level

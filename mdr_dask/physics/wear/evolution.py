@@ -65,6 +65,8 @@ class Resolution(NamedTuple):
         How much wider the steps' accuracy is.
     fewer : int
         Nodes that each panel, and halvings that each end, has less.
+    thinned : int
+        Most nodes that a panel may have less.
     rough : tuple of float
         How much wider the accuracy of two rougher solutions is, which tell the error.
     slowness : float
@@ -74,6 +76,7 @@ class Resolution(NamedTuple):
     accuracy: float
     wider: float = 1.0
     fewer: int = 0
+    thinned: int = 2
     rough: tuple[float, float] = (8.0, 64.0)
     slowness: float = 1.0
 
@@ -93,12 +96,12 @@ class Resolution(NamedTuple):
         levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
         order = 4 if self.accuracy > 3e-5 else 6
         left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
-        return graded_panels(left, right, order - self.fewer)
+        return graded_panels(left, right, order - min(self.fewer, self.thinned))
 
     def panels_of_a_punch(self) -> Panels:
         """Return panels for a pressure that tends to a jump at the edge."""
         halvings = round(2.0 * max(-np.log10(self.accuracy), 2.0)) - self.fewer
-        return graded_panels(halvings + 1, halvings + 4, 4 - self.fewer)
+        return graded_panels(halvings + 1, halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
         """Return the resolution for a finer accuracy."""

@@ -160,18 +160,18 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
     def height(radius: FloatArray) -> FloatArray:
         result, z = profile.height(radius), place(radius)
         scar = (z > 0.0) & (z < 1.0)
-        result[scar] += np.sqrt(z[scar]) * np.maximum(interpolate(panels, rooted, z[scar]), 0.0)
+        result[scar] += np.sqrt(z[scar]) * np.maximum(interpolate(panels.mesh, rooted, z[scar]), 0.0)
         return result
 
     def nodal(values: FloatArray, x: FloatArray) -> FloatArray:
-        return interpolate(panels, values, np.clip(place(x), 0.0, 1.0 - 1e-15).ravel()).reshape(x.shape)
+        return interpolate(panels.mesh, values, np.clip(place(x), 0.0, 1.0 - 1e-15).ravel()).reshape(x.shape)
 
     scar = Scar(
         c,
         a,
         lambda x: np.asarray(eta * nodal(y, x) - profile.rise(x - c, c)),
         lambda x: np.asarray(2.0 * eta * x / width * nodal(slope, x) - profile.image_slope(x)),
-        tuple(float(x) for x in np.sqrt(c * c + width * panels.edges[1:-1])),
+        tuple(float(x) for x in np.sqrt(c * c + width * panels.mesh.edges[1:-1])),
     )
     sticking = 2.0 * virgin_load(profile, c)
     slipping = float(np.sqrt(width) * eta * panels.weights @ ((1.0 - y) * factor))
@@ -225,7 +225,7 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
         def function(place: FloatArray) -> FloatArray:
             share = place**2 / width
-            within = interpolate(panels, values, np.minimum(share, 1.0 - 1e-15))
+            within = interpolate(panels.mesh, values, np.minimum(share, 1.0 - 1e-15))
             return np.where(share < 1.0, within, beyond)
 
         return function

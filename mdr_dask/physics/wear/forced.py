@@ -6,6 +6,7 @@ See `mdr_dask.physics.wear.forced_slip` for the equations; the force kept is tha
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,18 +16,8 @@ from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.evolution import Dense, Resolution, integral_along, march, settled
-from mdr_dask.physics.wear.forced_slip import ForcedSlip, Pressed, forced_slip, rising
-from mdr_dask.physics.wear.worn import (
-    Scar,
-    Worn,
-    contact_pressure,
-    largest_wear,
-    virgin_load,
-    worn_height,
-    worn_image,
-    worn_profile,
-    worn_volume,
-)
+from mdr_dask.physics.wear.forced_slip import ForcedSlip, Pressed, forced_slip, onward, rising
+from mdr_dask.physics.wear.worn import Scar, Worn, contact_pressure, virgin_load, worn_by, worn_height, worn_image
 
 
 class Settings(NamedTuple):
@@ -48,6 +39,8 @@ class Settings(NamedTuple):
         Accuracy beyond which steps do not follow the border.
     rougher : tuple of float
         How much wider the accuracy of the two rougher solutions is.
+    thinned : int
+        Most nodes that their panels have less: the border of the worst must follow the accuracy too.
     slowness : float
         How much more slowly than usual the error falls from them.
     least_edge_error : float
@@ -61,7 +54,8 @@ class Settings(NamedTuple):
     latest_jump: float = 1e3
     torn: float = 1e-2
     coarsest: float = 1e-3
-    rougher: tuple[float, float] = (2.0, 4.0)
+    rougher: tuple[float, float] = (4.0, 8.0)
+    thinned: int = 1
     slowness: float = 2.0
     least_edge_error: float = 0.1
 
@@ -102,7 +96,8 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
 
 def forced_resolution(accuracy: float) -> Resolution:
     """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
-    return Resolution(min(accuracy, SETTINGS.coarsest), rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
+    finest = min(accuracy, SETTINGS.coarsest)
+    return Resolution(finest, thinned=SETTINGS.thinned, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
@@ -143,7 +138,7 @@ def _until_jump(profile: Profile, stick_radius: float, resolution: Resolution) -
     panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
     problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
     moving, start = problem.move(settled(problem))
-    last, size = panels.order - 1, panels.nodes.size
+    last, size = panels.mesh.order - 1, panels.nodes.size
 
     def is_torn(moment: Pressed) -> bool:
         return bool(np.min(moment.unknowns[: size - 1]) < -SETTINGS.torn)
@@ -207,27 +202,18 @@ def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
             )
         high = min(1.5 * high, profile.largest_radius)
     scar = virgin._replace(radius=bisect(excess, border, high))
-    return Worn(
-        contact_radius=scar.radius,
-        stick_border=border,
-        depth=depth,
-        normal_force=2.0 * (virgin_load(profile, c) + eta * problem.virgin_load),
-        wear_volume=worn_volume(scar),
-        worn_depth=largest_wear(scar),
-        height=worn_profile(profile, scar),
-        image=worn_image(profile, scar),
-        pressure=contact_pressure(profile, scar, border, depth, border),
-    )
+    force = 2.0 * (virgin_load(profile, c) + eta * problem.virgin_load)
+    return worn_by(profile, scar, border, border, depth, force)
 
 
 def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, steps: int) -> Worn:
     """Turn the nodal values at one time into a worn contact."""
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.virgin.inner_radius
     unknowns = dense.unknowns(time)
-    y, width, deeper, place = problem.split(unknowns)
-    before = dense.history[max(dense.steps(time) - 1, 0)].path
-    path = np.append(before, [[place], [deeper]], axis=1)
-    moment = Pressed(time, unknowns, dense.gathered(time), path, panels.nodes)
+    y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
+    before = dense.history[max(dense.steps(time) - 1, 0)]
+    path = onward(before.path, problem.place(unknowns))
+    moment = replace(before, time=time, unknowns=unknowns, gathered=dense.gathered(time), path=path)
     frozen, slope = _frozen(problem, path), panels.slope @ y
     border, a, depth = problem.radius(max(place, 0.0)), problem.radius(place + width), 1.0 + eta * deeper
     square = problem.virgin.virgin_width
@@ -245,7 +231,7 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
 
     def nodal(values: FloatArray, x: FloatArray) -> FloatArray:
         z = np.clip((x - border) * (x + border) / (square * width), 0.0, 1.0 - 1e-15)
-        return interpolate(panels, values, z.ravel()).reshape(x.shape)
+        return interpolate(panels.mesh, values, z.ravel()).reshape(x.shape)
 
     def change(x: FloatArray) -> FloatArray:
         slipping = depth - 1.0 + eta * nodal(y, x)
@@ -256,9 +242,9 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
         slipping = 2.0 * eta * x / (square * width) * nodal(slope, x)
         return np.asarray(np.where(x < border, frozen.slope(x), slipping) - profile.image_slope(x))
 
-    breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + square * width * panels.edges[1:-1])))
+    breaks = (*_breaks(c, border), *(float(x) for x in np.sqrt(border**2 + square * width * panels.mesh.edges[1:-1])))
     scar = Scar(c, a, change, change_slope, breaks)
-    load = problem.slipping_load(unknowns) + problem.sticking_load(before, place, deeper)
+    load = problem.slipping_load(unknowns) + problem.sticking_load(before, problem.place(unknowns))
     abscissa, weight = gauss(24)
     annulus = max(place, 0.0) * float(worn(place * abscissa) @ weight)
     fine = np.sqrt(c * c + square * (place + width) * np.linspace(0.0, 1.0, 200, endpoint=False))

@@ -10,6 +10,7 @@ alone, it is found once for a few dozen places; any other place follows it. a is
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,17 +20,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.rules import THESIS_XI, limit_radius
-from mdr_dask.physics.wear.worn import (
-    Scar,
-    Worn,
-    contact_pressure,
-    largest_wear,
-    virgin_load,
-    worn_height,
-    worn_image,
-    worn_profile,
-    worn_volume,
-)
+from mdr_dask.physics.wear.worn import Scar, Worn, virgin_load, worn_by, worn_height
 
 
 class Settings(NamedTuple):
@@ -101,19 +92,9 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     scar = whole._replace(radius=bisect(fall, 1.0, high) if cycles > 0.0 else 1.0)
     reached = scar.radius > 1.0
     edge = bisect(lambda x: float(share(np.array(x))[()]) - 1.0, border, scar.radius) if reached else 1.0
-    depth = 1.0 + eta * rise
-    return Worn(
-        contact_radius=scar.radius,
-        stick_border=border,
-        depth=depth,
-        normal_force=2.0 * (virgin_load(profile, c) + eta * load),
-        wear_volume=worn_volume(scar),
-        worn_depth=largest_wear(scar),
-        height=worn_profile(profile, scar),
-        image=worn_image(profile, scar),
-        pressure=contact_pressure(profile, scar, edge, depth, border),
-        relative_error=SETTINGS.error,
-    )
+    force = 2.0 * (virgin_load(profile, c) + eta * load)
+    worn = worn_by(profile, scar, border, edge, 1.0 + eta * rise, force)
+    return replace(worn, relative_error=SETTINGS.error)
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray, float]:

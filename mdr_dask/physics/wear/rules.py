@@ -41,8 +41,8 @@ class Settings(NamedTuple):
         Widths of the pieces next to the stick border, where the rule builds a layer as thin as what is left.
     least : float
         Floor of what is left by the fast rule: the layer must not become thinner than numbers are.
-    scar : float
-        Error of the integral that is zero at the scar's radius, over eta.
+    scar, end : float
+        Error of the integral that is zero at the scar's radius, over eta, and in the end of all wear.
     error : float
         Error of every output over its largest value: that of the rule's own equation, no more.
     """
@@ -51,6 +51,7 @@ class Settings(NamedTuple):
     layer_growth: float = 30.0
     least: float = 1e-30
     scar: float = 1e-10
+    end: float = 1e-13
     error: float = 2e-6
 
 
@@ -68,6 +69,24 @@ class Rule(NamedTuple):
     rest: float
 
 
+class Quadrature(NamedTuple):
+    """Gauss nodes on [0, 1], and the ends of the pieces that they are used in: c, three near it, and 1."""
+
+    abscissa: FloatArray
+    weight: FloatArray
+    cuts: FloatArray
+
+
+class Bracket(NamedTuple):
+    """Two ends between which a falling function has a root, its values there, and the newer end, -1 or 1."""
+
+    low: float
+    low_value: float
+    high: float
+    high_value: float
+    newer: int = 0
+
+
 def limit_radius(profile: Profile, stick_radius: float) -> float:
     """Return a(c): the root of int_c^a (1 - g0) / sqrt(a^2 - x^2) dx = 0 (thesis eq. 6.10, exact).
 
@@ -77,7 +96,7 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
         Without partial slip, or if the scar would reach beyond the table of the profile.
     """
     check_stick_radius(stick_radius)
-    radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, np.empty(5), *_nodes()))
+    radius = float(_limit_radius(_rule(profile, stick_radius, 0.0), profile.largest_radius, _quadrature()))
     if np.isnan(radius):
         raise ValueError(
             f"the contact reaches beyond the table, which ends at r = {profile.largest_radius:.4g} contact radii; "
@@ -126,7 +145,7 @@ def limit_cases(exponent: ArrayLike, stick_radius: ArrayLike) -> tuple[FloatArra
     """
     n, c = (np.array(part, dtype=float) for part in np.broadcast_arrays(exponent, stick_radius))
     result = np.empty((3, n.size))
-    _limits(n.ravel(), c.ravel(), _NO_TABLE, np.empty(5), *_nodes(), result)
+    _limits(np.stack([n.ravel(), c.ravel()]), _NO_TABLE, _quadrature(), result)
     radius, volume, force = result.reshape((3, *n.shape))
     return radius, volume, force
 
@@ -147,9 +166,9 @@ def fast_cases(
         As :func:`fast` has them.
     """
     parts = np.broadcast_arrays(exponent, stick_radius, cycles, xi, limit_radius)
-    n, c, cycles_flat, xi_flat, limits = (np.array(part, dtype=float).ravel() for part in parts)
-    result = np.empty((3, n.size))
-    _fasts(n, c, cycles_flat, xi_flat, limits, _NO_TABLE, np.empty(5), *_nodes(), result)
+    cases = np.array([np.array(part, dtype=float).ravel() for part in parts])
+    result = np.empty((3, cases.shape[1]))
+    _fasts(cases, _NO_TABLE, _quadrature(), result)
     radius, volume, force = result.reshape((3, *parts[0].shape))
     return radius, volume, force
 
@@ -174,8 +193,8 @@ def printed_parabola_limit(stick_radius: ArrayLike) -> FloatArray:
     return np.asarray(np.sqrt(2.0 + half**2) - half)
 
 
-def _nodes() -> tuple[FloatArray, FloatArray]:
-    return gauss(SETTINGS.nodes)
+def _quadrature() -> Quadrature:
+    return Quadrature(*gauss(SETTINGS.nodes), np.empty(5))
 
 
 def _rule(profile: Profile, c: float, rest: float) -> Rule:
@@ -185,8 +204,8 @@ def _rule(profile: Profile, c: float, rest: float) -> Rule:
 
 def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
     """Turn the rule into a worn contact whose load ends at an edge."""
-    nodes, cuts = _nodes(), np.empty(5)
-    radius, volume, force = _numbers(rule, radius, cuts, *nodes)
+    quadrature = _quadrature()
+    radius, volume, force = _numbers(rule, radius, quadrature)
     c, eta, rest = rule.c, rule.eta, rule.rest
 
     def change(x: FloatArray) -> FloatArray:
@@ -204,11 +223,11 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
         result = profile.height(r)
         inside = (r > c) & (r < radius)
         worn = np.empty(int(np.sum(inside)))
-        _heights(rule, r[inside], cuts, *nodes, worn)
+        _heights(rule, r[inside], quadrature, worn)
         result[inside] += np.maximum(worn, 0.0)
         return result
 
-    scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in cuts[1:] if cut > c))
+    scar = Scar(c, radius, change, slope, tuple(float(cut) for cut in quadrature.cuts[1:] if cut > c))
     return Worn(
         contact_radius=radius,
         stick_border=c,
@@ -223,25 +242,33 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
     )
 
 
-@compiled
-def _narrowed(
-    low: float, low_value: float, high: float, high_value: float, side: int, x: float, value: float
-) -> tuple[float, float, float, float, int]:
-    """Return a bracket of a falling function, its values and its newer end, -1 or 1: false position by Illinois."""
+@inlined
+def _between(bracket: Bracket) -> float:
+    """Return the root of the straight line through both ends."""
+    low, low_value, high, high_value, _ = bracket
+    return (low * high_value - high * low_value) / (high_value - low_value)
+
+
+@inlined
+def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
+    """Return the bracket with one more value, by the Illinois rule of false position."""
+    low, low_value, high, high_value, newer = bracket
     if value > 0.0:
-        return x, value, high, 0.5 * high_value if side == -1 else high_value, -1
-    return low, 0.5 * low_value if side == 1 else low_value, x, value, 1
+        return Bracket(x, value, high, 0.5 * high_value if newer == -1 else high_value, -1)
+    return Bracket(low, 0.5 * low_value if newer == 1 else low_value, x, value, 1)
 
 
 @inlined
 def _change(rule: Rule, gap: float) -> float:
     """Return g - g0 at c + gap."""
     rise = image_rise(rule.image, rule.c, rule.level, gap)
+    if rule.rest == 0.0:
+        return rule.eta - rise
     if rule.c + gap > 1.0:
         return (rise - rule.eta) * (rule.rest - 1.0)
     start = rise / rule.eta
     left = start + (1.0 - start) * rule.rest
-    return rule.eta * start * (1.0 - start) * (1.0 - rule.rest) / left if left > 0.0 else rule.eta
+    return rule.eta * start * (1.0 - start) * (1.0 - rule.rest) / left
 
 
 @compiled
@@ -254,7 +281,9 @@ def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
-    if rule.image.knots.size == 0:
+    if rule.rest == 0.0:
+        high = 0.0
+    elif rule.image.knots.size == 0:
         high = rule.c * math.expm1(math.log1p(level / rule.level) / rule.image.exponent)
     else:
         for _ in range(60):
@@ -270,89 +299,84 @@ def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
 
 
 @compiled
-def _scar_integral(
-    rule: Rule, radius: float, moment: int, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
-) -> float:
+def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadrature) -> float:
     """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx in pieces between the cuts."""
-    total = 0.0
+    abscissa, weight, cuts = quadrature
+    total, end = 0.0, _angle(cuts[0], radius)
     for piece in range(cuts.size):
-        low = cuts[piece]
-        high = min(cuts[piece + 1], radius) if piece + 1 < cuts.size else radius
-        if high <= low:
+        last = piece + 1 == cuts.size or cuts[piece + 1] >= radius
+        if not last and cuts[piece + 1] <= cuts[piece]:
             continue
-        begin = math.atan2(math.sqrt((radius - high) * (radius + high)), high)
-        end = math.atan2(math.sqrt((radius - low) * (radius + low)), low)
+        begin = 0.0 if last else _angle(cuts[piece + 1], radius)
+        part = 0.0
         for k in range(abscissa.size):
             angle = begin + (end - begin) * abscissa[k]
-            gap = max(radius * math.cos(angle) - rule.c, 0.0)
-            term = _change(rule, gap) * weight[k] * (end - begin)
+            term = _change(rule, max(radius * math.cos(angle) - rule.c, 0.0)) * weight[k]
             if moment == 1:
                 term *= (radius * math.sin(angle)) ** 2
-            total += term
+            part += term
+        total += (end - begin) * part
+        if last:
+            break
+        end = begin
     return total
 
 
+@inlined
+def _angle(x: float, radius: float) -> float:
+    """Return arccos(x / R) without cancellation near x = R."""
+    return math.atan2(math.sqrt((radius - x) * (radius + x)), x)
+
+
 @compiled
-def _heights(
-    rule: Rule, radii: FloatArray, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray, result: FloatArray
-) -> None:
+def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: FloatArray) -> None:
     """Put f - f0 at radii beyond c."""
     for k in range(radii.size):
-        result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, cuts, abscissa, weight)
+        result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, quadrature)
 
 
 @compiled
-def _scar_radius(
-    rule: Rule, low: float, high: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
-) -> float:
-    """Return the root of the scar's integral between 1 and a radius, or that radius if there is none."""
-    low_value = _scar_integral(rule, low, 0, cuts, abscissa, weight)
-    high_value = _scar_integral(rule, high, 0, cuts, abscissa, weight)
-    if not high_value < 0.0 < low_value:
-        return high
-    error = 1e-16 if rule.rest == 0.0 else SETTINGS.scar
-    radius, side = high, 0
+def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
+    """Return the root of the scar's integral in a bracket, or its higher end if there is none."""
+    if not bracket.high_value < 0.0 < bracket.low_value:
+        return bracket.high
+    error = SETTINGS.end if rule.rest == 0.0 else SETTINGS.scar
+    radius = _between(bracket)
     for _ in range(100):
-        last = radius
-        radius = (low * high_value - high * low_value) / (high_value - low_value)
-        value = _scar_integral(rule, radius, 0, cuts, abscissa, weight)
-        if abs(value) < error * rule.eta or abs(radius - last) < 4e-16 * radius or high - low <= 1e-15 * high:
+        value = _scar_integral(rule, radius, 0, quadrature)
+        bracket, last = _narrowed(bracket, radius, value), radius
+        radius = _between(bracket)
+        if abs(value) < error * rule.eta or abs(radius - last) < 4e-16 * radius:
             break
-        low, low_value, high, high_value, side = _narrowed(low, low_value, high, high_value, side, radius, value)
     return radius
 
 
 @compiled
-def _limit_radius(rule: Rule, largest: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray) -> float:
+def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
     """Return a(c) of a rule with nothing left, NaN if it lies beyond the largest radius."""
-    _put_cuts(rule, cuts)
+    _put_cuts(rule, quadrature.cuts)
     low, high = 1.0, min(1.5, largest)
-    while _scar_integral(rule, high, 0, cuts, abscissa, weight) > 0.0:
+    low_value, high_value = _scar_integral(rule, low, 0, quadrature), _scar_integral(rule, high, 0, quadrature)
+    while high_value > 0.0:
         if high == largest:
             return np.nan
-        low, high = high, min(1.5 * high, largest)
-    return _scar_radius(rule, low, high, cuts, abscissa, weight)
+        low, low_value, high = high, high_value, min(1.5 * high, largest)
+        high_value = _scar_integral(rule, high, 0, quadrature)
+    return _scar_radius(rule, Bracket(low, low_value, high, high_value, 0), quadrature)
 
 
 @compiled
-def _numbers(
-    rule: Rule, limit: float, cuts: FloatArray, abscissa: FloatArray, weight: FloatArray
-) -> tuple[float, float, float]:
+def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
     """Return scar radius, volume and normal force; put the cuts."""
+    abscissa, weight, cuts = quadrature
     _put_cuts(rule, cuts)
-    radius = limit if rule.rest == 0.0 else _scar_radius(rule, 1.0, limit, cuts, abscissa, weight)
-    volume = 4.0 * _scar_integral(rule, radius, 1, cuts, abscissa, weight)
-    load, worn = 0.0, 0.0
-    for k in range(abscissa.size):
-        x = rule.c * abscissa[k] ** 4  # smooths a power at the axis
-        load += (
-            weight[k]
-            * 4.0
-            * rule.c
-            * abscissa[k] ** 3
-            * (rule.eta - image_rise(rule.image, rule.c, rule.level, x - rule.c))
-        )
-    for piece in range(4):
+    radius = limit
+    if rule.rest > 0.0:
+        first, last = _scar_integral(rule, 1.0, 0, quadrature), _scar_integral(rule, limit, 0, quadrature)
+        radius = _scar_radius(rule, Bracket(1.0, first, limit, last, 0), quadrature)
+    volume = 4.0 * _scar_integral(rule, radius, 1, quadrature)
+    load, worn = _sticking_load(rule, abscissa, weight), 0.0
+    for piece in range(4 if rule.rest > 0.0 else 0):  # in the end all of the slip zone is worn off
         width = cuts[piece + 1] - cuts[piece]
         for k in range(abscissa.size):
             gap = cuts[piece] - rule.c + width * abscissa[k]
@@ -362,38 +386,34 @@ def _numbers(
 
 
 @compiled
-def _limits(
-    n: FloatArray,
-    c: FloatArray,
-    no_table: Image,
-    cuts: FloatArray,
-    abscissa: FloatArray,
-    weight: FloatArray,
-    result: FloatArray,
-) -> None:
-    for case in range(n.size):
-        rule = _power_rule(no_table, n[case], c[case], 0.0)
-        radius = _limit_radius(rule, np.inf, cuts, abscissa, weight)
-        result[0, case], result[1, case], result[2, case] = _numbers(rule, radius, cuts, abscissa, weight)
+def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> float:
+    """Return int_0^c (1 - g0) dx."""
+    if rule.image.knots.size == 0:
+        return rule.c * (1.0 - rule.level / (rule.image.exponent + 1.0))
+    load = 0.0
+    for k in range(abscissa.size):
+        share = weight[k] * 4.0 * rule.c * abscissa[k] ** 3  # x = c t^4 smooths a power at the axis
+        place = rule.c * abscissa[k] ** 4
+        load += share * (rule.eta - image_rise(rule.image, rule.c, rule.level, place - rule.c))
+    return load
 
 
 @compiled
-def _fasts(
-    n: FloatArray,
-    c: FloatArray,
-    cycles: FloatArray,
-    xi: FloatArray,
-    limit: FloatArray,
-    no_table: Image,
-    cuts: FloatArray,
-    abscissa: FloatArray,
-    weight: FloatArray,
-    result: FloatArray,
-) -> None:
-    for case in range(n.size):
-        rest = max(math.exp(-xi[case] * cycles[case] / limit[case]), SETTINGS.least)
-        rule = _power_rule(no_table, n[case], c[case], rest)
-        result[0, case], result[1, case], result[2, case] = _numbers(rule, limit[case], cuts, abscissa, weight)
+def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
+    """Put radius, volume and force of cases (n, c)."""
+    for k in range(cases.shape[1]):
+        rule = _power_rule(no_table, cases[0, k], cases[1, k], 0.0)
+        radius = _limit_radius(rule, np.inf, quadrature)
+        result[0, k], result[1, k], result[2, k] = _numbers(rule, radius, quadrature)
+
+
+@compiled
+def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
+    """Put radius, volume and force of cases (n, c, N, xi, a(c))."""
+    for k in range(cases.shape[1]):
+        n, c, cycles, xi, limit = cases[0, k], cases[1, k], cases[2, k], cases[3, k], cases[4, k]
+        rule = _power_rule(no_table, n, c, max(math.exp(-xi * cycles / limit), SETTINGS.least))
+        result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
 
 
 @compiled

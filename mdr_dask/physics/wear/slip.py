@@ -6,16 +6,17 @@ that width over the virgin one, so that contacts next to full stick are as well 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import CubicSpline
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, inlined
 from mdr_dask.physics.mdr.half_integrals import Panels, interpolate_weighted
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
@@ -57,7 +58,7 @@ class FixedBorder(ABC):
         widths = np.array([moment.unknowns[last] for moment in past])
 
         def known(unknowns: FloatArray) -> FloatArray:
-            return interpolate_weighted(self.panels, memories, shares, unknowns[last] / widths)
+            return interpolate_weighted(self.panels.mesh, memories, shares, unknowns[last] / widths)
 
         return known
 
@@ -84,33 +85,41 @@ class LogTable(NamedTuple):
     def __call__(self, squares: FloatArray) -> FloatArray:
         """Return ln s0 where r^2 - c^2 > 0 has the values `squares`."""
         result = np.empty(squares.size)
-        _look_up(self.first, self.step, self.coefficients, squares.ravel(), result)
+        _look_up(self, squares.ravel(), result)
         return result.reshape(squares.shape)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _slip_rows(first, step, coefficients, width, nodes, slip, stress, share, known):  # type: ignore[no-untyped-def]
-    """Turn the slip into the residual of `PartialSlip`, in place."""
-    last = nodes.size - 1
-    for i in range(nodes.size):
-        place = np.log(width * nodes[i]) - first
-        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
-        local, virgin = place - cell * step, coefficients[0, cell]
-        for power in range(1, 4):
-            virgin = virgin * local + coefficients[power, cell]
-        slip[i] = np.log(max(slip[i], 1e-300)) - virgin
-        if i < last:
-            slip[i] -= known[i] + share * stress[i]
+@inlined
+def log_slip(table: LogTable, square: float) -> float:
+    """Return ln s0 at one r^2 - c^2."""
+    place = math.log(square) - table.first
+    cell = min(max(int(place / table.step), 0), table.coefficients.shape[1] - 1)
+    local, k = place - cell * table.step, table.coefficients
+    return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _look_up(first, step, coefficients, squares, result):  # type: ignore[no-untyped-def]
+@compiled
+def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
     for i in range(squares.size):
-        place = np.log(squares[i]) - first
-        cell = min(max(int(place / step), 0), coefficients.shape[1] - 1)
-        local = place - cell * step
-        k = coefficients[:, cell]
-        result[i] = ((k[0] * local + k[1]) * local + k[2]) * local + k[3]
+        result[i] = log_slip(table, squares[i])
+
+
+class _Step(NamedTuple):
+    """One step of `PartialSlip`: its length over the root of the width, the places in squared radii, what was known."""
+
+    share: float
+    squares: FloatArray
+    known: FloatArray
+
+
+@compiled
+def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
+    """Turn the slip into the residual of `PartialSlip`, in place; in the last row s is continuous at the edge."""
+    last = slip.size - 1
+    for i in range(slip.size):
+        slip[i] = math.log(max(slip[i], 1e-300)) - log_slip(table, step.squares[i])
+        if i < last:
+            slip[i] -= step.known[i] + step.share * stress[i]
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +163,7 @@ class PartialSlip(FixedBorder):
         """Return ln s - ln s0 - known - theta p / eta; the last row says that s is continuous at the edge."""
         y, factor = self.image(unknowns)
         slip, stress, width = self.panels.inner @ (y * factor), self.panels.outer @ y, self.width(unknowns)
-        share = theta / np.sqrt(width)
-        _slip_rows(*self.virgin_slip, width, self.panels.nodes, slip, stress, share, known)
+        _slip_rows(self.virgin_slip, _Step(theta / np.sqrt(width), width * self.panels.nodes, known), stress, slip)
         return np.asarray(slip)
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:

@@ -243,6 +243,21 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
     return stress
 
 
+def worn_by(profile: Profile, scar: Scar, border: float, edge: float, depth: float, normal_force: float) -> Worn:
+    """Return the contact with a scar that sticks up to a border and carries its load up to an edge."""
+    return Worn(
+        contact_radius=scar.radius,
+        stick_border=border,
+        depth=depth,
+        normal_force=normal_force,
+        wear_volume=worn_volume(scar),
+        worn_depth=largest_wear(scar),
+        height=worn_profile(profile, scar),
+        image=worn_image(profile, scar),
+        pressure=contact_pressure(profile, scar, edge, depth, border),
+    )
+
+
 def largest_wear(scar: Scar) -> float:
     """Return the largest f - f0."""
     r = scar.border + (scar.radius - scar.border) * np.linspace(0.0, 1.0, 201)[1:-1]

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from references.literal_wear import literal
+from scipy.integrate import quad
 
 from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
@@ -77,12 +78,40 @@ def test_every_step_conserves_energy_while_the_border_moves():
     abscissa, weight = gauss(40)
     whole = np.pi * problem.virgin.virgin_width * problem.eta
     for moment in moments:
-        _, width, _, border = moving.split(moment.unknowns)
+        border, width, _ = moving.place(moment.unknowns)
         slipping = width * (moving.panels.weights @ moment.gathered)
         stuck = max(border, 0.0) * float(weight @ moving.frozen_depth(moment.path, max(border, 0.0) * abscissa))
         volumes.append(whole * (slipping + stuck))
     np.testing.assert_allclose(np.diff(volumes), np.diff(energy), atol=5e-6)  # of steps of 2e-5
     np.testing.assert_allclose(volumes, energy, atol=1e-5)  # gathered over them
+
+
+def test_the_rise_of_the_plateau_is_the_integral_along_the_path():
+    """(2/pi) int arccos(b / r) dd over straight pieces of b^2, short ones and one that ends at the place."""
+    problem = forced_slip(PARABOLA, 0.455, graded_panels(4, 4, 4), 3.0)
+    rng = np.random.default_rng(3)
+    path = np.cumsum(np.append([[0.0], [0.0]], rng.uniform(0.0, 0.02, (2, 12)) ** 2, axis=1), axis=1)
+    places = path[0, -1] + np.array([0.0, 1e-6, 1e-3, 0.1, 2.0])
+    found = problem.plateau_rise(path, places)
+
+    def angle(q, border):
+        return np.arccos(
+            np.sqrt(
+                (problem.body.square + problem.body.width * border) / (problem.body.square + problem.body.width * q)
+            )
+        )
+
+    for q, rise in zip(places, found, strict=True):
+        pieces = [
+            (d1 - d0) * quad(lambda t, a=b0, b=b1, q=q: angle(q, a + (b - a) * t), 0.0, 1.0, epsabs=1e-14)[0]
+            for (b0, d0), (b1, d1) in pairwise(path.T)
+        ]
+        assert rise == pytest.approx(2.0 / np.pi * sum(pieces), rel=2e-5)
+    cut = 0.5 * (path[0, 5] + path[0, 6])
+    part = np.append(path[:, :6], [[cut], [0.5 * (path[1, 5] + path[1, 6])]], axis=1)
+    rise = problem.plateau_rise(part, np.array([cut]))[0]
+    virgin = np.exp(problem.virgin.virgin_slip(problem.body.width * np.array([cut])))[0]
+    assert problem.frozen_depth(path, np.array([cut]))[0] == pytest.approx(rise - virgin, rel=1e-12)
 
 
 def test_convergence_with_the_tolerance():

@@ -1,0 +1,170 @@
+"""Answers to questions on a terminal, in a pipe, or in a file; rows are written as they are made."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
+
+from mdr_dask.cli.options import tell
+from mdr_dask.cli.printing import print_aligned, print_left, titled, with_error, with_interval
+from mdr_dask.cli.writing import require_suffix, writing
+from mdr_dask.errors import DataError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from mdr_dask.questions.table import Table
+
+FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
+
+
+def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
+    """Print a table: aligned and at most so many rows of it, or all of it as CSV, JSON or lines of JSON.
+
+    `join` puts means and their errors into one column for a reader.
+    """
+    if form == "table":
+        _print_aligned(answer, limit, join)
+    else:
+        _write_text(answer, form, sys.stdout)
+
+
+def write_answer(answer: Table, path: Path) -> int:
+    """Write a table into a file, whose end says in which form; return the number of rows."""
+    rows = 0
+
+    def counted() -> Iterator[pd.DataFrame]:
+        nonlocal rows
+        for frame in answer.frames:
+            rows += len(frame)
+            yield frame
+
+    counting = replace(answer, frames=counted())
+    with writing(path):
+        if path.suffix == ".parquet":
+            _write_parquet(counting, path)
+        else:
+            with path.open("w", encoding="utf-8", newline="") as stream:
+                _write_text(counting, path.suffix[1:], stream)
+    return rows
+
+
+def check_target(path: Path) -> None:
+    """Refuse a file of another kind, the store of a study, and Parquet where it cannot be written."""
+    from mdr_dask.store import is_study
+
+    require_suffix(path, FILES)
+    if path.suffix == ".zarr" and is_study(str(path)):
+        raise click.UsageError(f"expected a place for the answer, got the store of a study: {str(path)!r}")
+    if path.suffix == ".parquet":
+        _pyarrow()
+
+
+def _print_aligned(answer: Table, limit: int, join: bool) -> None:
+    widths: list[int] = []
+    printed = 0
+    for frame in answer.frames:
+        shown = frame[: limit - printed] if limit else frame
+        widths = _print_frame(shown, answer.units, widths, join)
+        printed += len(shown)
+        if limit and printed >= limit:
+            more = len(shown) < len(frame) or next(answer.frames, None) is not None
+            print_left(answer.total - printed if answer.total is not None else None if more else 0)
+            return
+    if not widths:
+        _print_frame(_frame(answer), answer.units, widths, join)
+        tell("no rows")
+
+
+def _print_frame(frame: pd.DataFrame, units: dict[str, str], widths: list[int], join: bool) -> list[int]:
+    columns = {str(name): frame[name].tolist() for name in frame}
+    columns = _joined(columns) if join else columns
+    titles = [titled(name, units[name] if name in units else units[f"{name}_mean"]) for name in columns]
+    return print_aligned(titles, list(columns.values()), widths, head=not widths)
+
+
+def _joined(columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``."""
+    outputs = [name.removesuffix("_mean") for name in columns if name.endswith("_mean")]
+    joined, left_out = {}, set()
+    for name, values in columns.items():
+        output = name.removesuffix("_mean")
+        if output in outputs and output != name:
+            errors = [f"{output}_{part}" for part in ("standard_error", "grid_error") if f"{output}_{part}" in columns]
+            ends = [f"{output}_{part}" for part in ("low", "high") if f"{output}_{part}" in columns]
+            join = with_error if errors else with_interval
+            parts = zip(values, *(columns[each] for each in errors or ends), strict=True)
+            joined[output] = [join(*part) for part in parts]
+            left_out |= {*(errors or ends)}
+        elif name not in left_out:
+            joined[name] = values
+    return joined
+
+
+def _write_text(answer: Table, form: str, stream: TextIO) -> None:
+    if form == "csv":
+        titles = [titled(name, unit) for name, unit in answer.units.items()]
+        stream.write(_frame(answer).set_axis(titles, axis=1).to_csv(index=False, lineterminator="\n"))
+        for frame in answer.frames:
+            frame.to_csv(stream, header=False, index=False, na_rep="nan", lineterminator="\n")
+        return
+    if form == "json":
+        stream.write(f'{{"units": {json.dumps(answer.units)}, "rows": [')
+    before = "\n" if form == "json" else ""
+    for frame in answer.frames:
+        lines = _json_lines(frame)
+        if form == "json":
+            stream.write(before + ",\n".join(lines))
+            before = ",\n"
+        else:
+            stream.writelines(f"{line}\n" for line in lines)
+    if form == "json":
+        stream.write("\n]}\n")
+
+
+def _frame(answer: Table) -> pd.DataFrame:
+    """Return a frame without rows."""
+    import pandas as pd
+
+    return pd.DataFrame(columns=list(answer.units))
+
+
+def _json_lines(frame: pd.DataFrame) -> Iterator[str]:
+    """Yield every row as an object of JSON, made of columns of texts."""
+    template = "{" + ", ".join(json.dumps(str(name)).replace("%", "%%") + ": %s" for name in frame) + "}"
+    return (template % values for values in zip(*(_json_texts(frame[name].tolist()) for name in frame), strict=True))
+
+
+def _json_texts(values: Sequence[Any]) -> list[str]:
+    if values and isinstance(values[0], float):
+        return [repr(value) if math.isfinite(value) else "null" for value in values]
+    texts = {value: json.dumps(value) for value in set(values)}
+    return [texts[value] for value in values]
+
+
+def _pyarrow() -> Any:
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        raise DataError("writing .parquet needs pyarrow: pip install 'mdr_dask[parquet]'") from None
+    return pyarrow
+
+
+def _write_parquet(answer: Table, path: Path) -> None:
+    """Write row groups as the frames come, the unit of every column in the metadata of its field."""
+    arrow = _pyarrow()
+    first = next(answer.frames, _frame(answer))
+    schema = arrow.Schema.from_pandas(first, preserve_index=False).remove_metadata()
+    for index, name in enumerate(schema.names):
+        schema = schema.set(index, schema.field(name).with_metadata({"units": answer.units[name]}))
+    with arrow.parquet.ParquetWriter(path, schema) as writer:
+        for frame in chain([first], answer.frames):
+            writer.write_table(arrow.Table.from_pandas(frame, schema, preserve_index=False))

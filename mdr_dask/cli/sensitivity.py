@@ -1,0 +1,69 @@
+"""The command that says which input matters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
+from mdr_dask.cli.printing import print_json, print_rows, table, with_intervals
+from mdr_dask.cli.results import Reading, store_argument
+from mdr_dask.cli.writing import FIGURES, require_suffix, writing
+
+
+@click.command(cls=Reading)
+@store_argument
+@click.argument("output")
+@series_option
+@select_option
+@click.option(
+    "--figure", "-o", type=click.Path(path_type=Path), help="Draw the indices: FILE.png, FILE.pdf or FILE.svg."
+)
+@json_option
+@csv_option
+def sensitivity(
+    store: str, output: str, series: str | None, selections: tuple[str, ...], figure: Path | None, form: str | None
+) -> None:
+    """Say which input matters: Sobol indices of an output of a sampled study, with 95 % intervals.
+
+    First order is the share of the variance that an input explains alone, total with all its interactions. Total
+    indices need the design of a campaign with `sampling: {saltelli: n}`; first-order ones take any sampled design.
+
+    \b
+    mdr-dask sensitivity results/rolling.zarr breakthrough_probability
+    mdr-dask sensitivity results/rolling.zarr film_ratio -o sensitivity.png
+    """
+    from mdr_dask import store as room
+    from mdr_dask.fits.sensitivity import sobol_indices
+    from mdr_dask.plots.sensitivity import sensitivity as drawn
+    from mdr_dask.questions import selection
+
+    require_suffix(figure, FIGURES)
+    dataset = selection.select(selection.group(room.datasets(store), series), selections, tell)
+    found = sobol_indices(selection.outputs(dataset, (output,)), output)
+    rows, units = table(found)
+    if form == "json":
+        print_json({"rows": rows, **found.attrs})
+    else:
+        shown = (rows, units) if form else with_intervals(rows, units)
+        print_rows(*shown, form or "table")
+    for sentence in _sentences(found.attrs):
+        tell(sentence)
+    if figure is not None:
+        with writing(figure):
+            drawn(found).savefig(figure, dpi=150)
+        tell(str(figure))
+
+
+def _sentences(attributes: dict[str, object]) -> list[str]:
+    left = attributes["left_out"]
+    return [
+        *([f"{left} of {attributes['cases']} cases have no value and are left out"] if left else []),
+        *(
+            ["one realisation: the scatter of lines, where there is any, counts as an interaction"]
+            if attributes["realisations"] == 1
+            else []
+        ),
+        str(attributes["advice"]),
+    ]

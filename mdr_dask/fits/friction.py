@@ -1,0 +1,522 @@
+"""The laws of sliding friction fitted to a store; intervals by bootstrap over realisations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import bootstrap
+from mdr_dask.aggregation import companion
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import FitError
+from mdr_dask.fits.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces import shapes as indenter
+
+Series = Mapping[str, xr.Dataset]
+Variables = dict[str, xr.Variable]
+
+MODELS = ("sliding_friction",)
+ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
+LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
+FLAT = 0.05  # of the largest friction that still counts as plateau
+TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fits/test_friction_coverage.py chose them
+BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
+LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
+
+
+def spectral_slope(data: xr.Dataset) -> xr.DataArray:
+    """Return the spectral rms slope: from the store, or from the parameters of a line without roll-off."""
+    if "rms_slope" in data:
+        return data["rms_slope"].mean("realisation")
+    unit = xr.apply_ufunc(
+        lambda hurst, points: roughness.spectral_slope(roughness.amplitudes(int(points) // 2, float(hurst))),
+        data["hurst"],
+        data["points"],
+        vectorize=True,
+    )
+    slope: xr.DataArray = unit * data["rms_roughness"] / data["length"]
+    return slope
+
+
+def _require_kelvin(data: xr.Dataset) -> None:
+    missing = [name for name in ("shear_modulus", "relaxation_time", "rms_roughness", "length") if name not in data]
+    if missing:
+        raise FitError(f"the laws hold for a Kelvin body on a generated line: the store has no {', '.join(missing)}")
+
+
+def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+    _require_kelvin(data)
+    slope = spectral_slope(data)
+    force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
+    velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
+    return xr.DataArray(force), xr.DataArray(velocity)
+
+
+def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+    """Return mu / slope, F_N / (G h L) and v tau slope / (sqrt 2 h)."""
+    return data["friction_coefficient"] / spectral_slope(data), *loads_and_velocities(data)
+
+
+def one_value(data: xr.Dataset, name: str) -> float:
+    """Return a parameter of which a law has one value; raise FitError where the cases of a sampled study differ."""
+    values = data[name]
+    if values.size != 1:
+        raise FitError(
+            f"expected one {name}, or an axis of its own for it, got {values.size} values of a sampled study: "
+            "each has constants of its own"
+        )
+    return float(values.item())
+
+
+def constant(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
+    """Return a constant and the ends of its interval."""
+    low, high = bootstrap.interval(stack, count, positive)
+    names = {name: stack[0], f"{name}_low": low, f"{name}_high": high}
+    return {key: xr.Variable((), value, {"units": "1", "long_name": long_name}) for key, value in names.items()}
+
+
+def holds(sentence: str) -> Variables:
+    """Return the sentence that says whether a law holds."""
+    return {"law_holds": xr.Variable((), sentence, LAW_HOLDS)}
+
+
+def measure(name: str, value: float, long_name: str) -> Variables:
+    """Return a number without an interval."""
+    return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
+
+
+def _groups(value: xr.DataArray, inner: list[str]) -> Iterator[dict[str, Any]]:
+    """Yield a selection for every point of the dimensions that are not `inner`."""
+    outer = [str(dim) for dim in value.dims if dim not in inner]
+    for index in np.ndindex(*(value.sizes[dim] for dim in outer)):
+        yield dict(zip(outer, index, strict=True))
+
+
+def each(
+    series: Series,
+    inner: Callable[[xr.Dataset], list[str]],
+    fit: Callable[[xr.Dataset], Variables],
+    *outputs: str,
+) -> xr.Dataset:
+    """Fit every point of the dimensions of a series that the fit does not use up.
+
+    Parameters
+    ----------
+    series : mapping of str to Dataset
+        One series.
+    inner : callable
+        Returns the dimensions that the fit uses up.
+    fit : callable
+        Returns the variables of one point.
+    *outputs : str
+        Outputs that the fit needs; the coefficient of friction if none is named.
+    """
+    data = next(iter(series.values()))
+    needed = outputs or ("friction_coefficient",)
+    missing = [name for name in needed if name not in data]
+    if missing:
+        raise FitError(f"expected the outputs {', '.join(needed)} in the store, got none of {', '.join(missing)}")
+    data, parts = data.load(), []
+    for where in _groups(data[needed[0]], ["realisation", *inner(data)]):
+        part = data.isel(where)
+        point = {key: part.coords.get(key, index) for key, index in where.items()}
+        parts.append(xr.Dataset(fit(part), coords=point).expand_dims(list(where)))
+    return cast(xr.Dataset, xr.combine_by_coords(parts, combine_attrs="override"))
+
+
+def _varying(data: xr.Dataset, *names: str) -> list[str]:
+    """Return the dimensions that any of some parameters vary along."""
+    return sorted({str(dim) for name in names if name in data.coords for dim in data[name].dims})
+
+
+def _load_axes(data: xr.Dataset) -> list[str]:
+    return _varying(data, "normal_force", "shear_modulus", "rms_roughness")
+
+
+def zone_one_axes(data: xr.Dataset) -> list[str]:
+    """Return the dimensions along which loads and velocities vary."""
+    return [*_load_axes(data), *_varying(data, "velocity", "relaxation_time")]
+
+
+class Table(NamedTuple):
+    """An output over its scale and its error, shape (cases, realisations), and columns of numbers beside them."""
+
+    friction: FloatArray
+    error: FloatArray
+    columns: tuple[FloatArray, ...]
+
+    def stack(self, used: Any = slice(None)) -> FloatArray:
+        """Return the stack of the means of some cases, with their errors."""
+        means = bootstrap.means(self.friction[used].T)
+        if not np.any(self.error[used] > 0):
+            return means
+        known = ~np.isnan(self.error[used])
+        error = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        return np.concatenate([means, bootstrap.moved(means[0], error)])
+
+    def count(self, used: Any = slice(None)) -> int:
+        """Return the least number of realisations that any of some cases has."""
+        return int(np.isfinite(self.friction[used]).sum(axis=1).min())
+
+    def mean(self) -> FloatArray:
+        """Return the mean of every case; NaN where no realisation has any."""
+        mean: FloatArray = bootstrap.means(self.friction.T)[0]
+        return mean
+
+
+def table_of(
+    data: xr.Dataset, scale: xr.DataArray, *columns: xr.DataArray, output: str = "friction_coefficient"
+) -> Table:
+    """Flatten the cases of an output over a scale, realisations last."""
+    values = data[output]
+    error = companion(data, output)
+    friction, errors, *others = xr.broadcast(values / scale, (0 * values if error is None else error) / scale, *columns)
+    cases = [dim for dim in friction.dims if dim != "realisation"]
+    count = friction.sizes["realisation"]
+    flat = [
+        np.asarray(column.transpose(*cases, "realisation").values, dtype=np.float64).reshape(-1, count)
+        for column in (friction, errors, *others)
+    ]
+    return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
+
+
+def _region_one(rate: FloatArray) -> int | None:
+    """Return where friction begins to go with the velocity: the lowest one, but for the floor of the papers' method."""
+    if rate.size == 1:
+        return 0
+    linear = np.flatnonzero(np.abs(rate[1:] / rate[:-1] - 1) < LINEAR)
+    return int(linear[0]) if linear.size else None
+
+
+def _zone_one(data: xr.Dataset) -> Variables:
+    """Fit log (mu / v) over log force in zone 1, at the low end of the velocities."""
+    forces, velocities = loads_and_velocities(data)
+    table = table_of(data, spectral_slope(data), forces, velocities)
+    force, velocity = table.columns
+    rate = table.mean() / (np.sqrt(2) * velocity)
+    used = []
+    for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & (rate > 0)]):
+        same = np.flatnonzero((force == load) & (rate > 0))
+        same = same[np.argsort(velocity[same])]
+        at = _region_one(rate[same])
+        if at is not None:
+            used.append(same[at])
+    if len(used) < 3:
+        raise FitError(
+            f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]} and velocities down to region I,"
+            f" got {len(used)}: add lower loads or velocities"
+        )
+    x, count = np.log(force[used]), table.count(used)
+    design = np.vstack([-x, np.ones(x.size)])
+    found = fitted(
+        lambda logs: logs @ np.linalg.pinv(design),
+        lambda logs, constants: logs - constants @ design,
+        np.log(table.stack(used) / (np.sqrt(2) * velocity[used])),
+        count,
+    )
+    alpha, offset = found.constants.T
+    worst = f"F_N / (G h L) = {np.exp(x[np.argmax(np.abs(found.departures))]):.2g}"
+    return {
+        **constant("alpha", alpha, count, "exponent of the force in zone 1"),
+        **measure("alpha_stated", laws.alpha(one_value(data, "hurst")), "H / (1 + H)"),
+        **constant("beta", np.exp(offset), count, "factor of the law of zone 1", positive=True),
+        **measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
+        **measure("loads", len(used), "number of loads in zone 1"),
+        **holds(law_holds(found.departures, found.chance, 2, worst)),
+    }
+
+
+def _plateau(data: xr.Dataset) -> Variables:
+    """Return the top of a parabola through the points about the largest friction, over the logarithm of velocity."""
+    _, velocities = loads_and_velocities(data)
+    table = table_of(data, spectral_slope(data), velocities)
+    known = np.flatnonzero(np.isfinite(table.mean()))
+    velocity = table.columns[0][known]
+    if velocity.size < 3:
+        raise FitError("expected three velocities or more with friction, for a maximum over them")
+    order = np.argsort(velocity)
+    x, count = np.log(velocity[order]), table.count(known)
+    stack = table.stack(known[order])
+    for drop in TOPS:
+        near = _about_the_top(stack[0], drop)
+        top, at, rise, left = _parabola(x[near], stack[:, near])
+        if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
+            continue
+        break
+    unbiased = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
+    if left.shape[1] > 3:
+        errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
+    else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest
+        errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
+    top = np.concatenate([top, errors]) + (unbiased - top[0])
+    ends = bootstrap.interval(rise, count)
+    verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])))
+    flat = x[stack[0] > (1 - FLAT) * stack[0].max()]
+    found = constant("plateau", top, count, "largest friction coefficient over rms slope")
+    if verdict.startswith("no:"):
+        found |= {f"plateau_{end}": xr.Variable((), np.nan, found["plateau"].attrs) for end in ("low", "high")}
+    return {
+        **found,
+        **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
+        **measure("plateau_velocity", float(np.exp(at[0])), "v tau slope / (sqrt 2 h) of the largest friction"),
+        **measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
+        **holds(verdict),
+    }
+
+
+def _smoothed(mean: FloatArray) -> FloatArray:
+    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
+    smooth = mean.copy()
+    for _ in range(2):
+        smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
+    return smooth
+
+
+def _about_the_top(mean: FloatArray, drop: float) -> slice:
+    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+    smooth = _smoothed(mean)
+    at = int(np.argmax(smooth))
+    low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
+    right = at + int(low[0]) if low.size else mean.size
+    low = np.flatnonzero(smooth[:at] <= (1 - drop) * smooth[at])
+    left = int(low[-1]) + 1 if low.size else 0
+    middle = min(max(at, 1), mean.size - 2)
+    return slice(min(left, middle - 1), max(right, middle + 2))
+
+
+def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the top of the parabola through every row, its place, its logarithmic slope there, and what is left."""
+    centre, half = x.mean(), np.ptp(x) / 2
+    u = (x - centre) / half
+    design = np.vstack([np.ones_like(u), u, u**2])
+    constants = rows @ np.linalg.pinv(design)
+    level, tilt, bend = constants.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = np.where(bend < 0, -tilt / (2 * bend), np.copysign(np.inf, tilt))
+    at = np.clip(inside, u.min(), u.max())
+    top = level + tilt * at + bend * at**2
+    return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
+
+
+def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -> str:
+    """Say whether the largest friction is a plateau or top, or lies at an end of the velocities and changes there."""
+    inside = x[0] < at < x[-1] and abs(rise) < 1e-9
+    change = f"d ln mu / d ln v = {rise:.2g} ({ends[0]:.2g}, {ends[1]:.2g})"
+    if inside:
+        return f"yes: friction falls to both sides of v tau slope / (sqrt 2 h) = {np.exp(at):.2g}"
+    if abs(rise) <= FLAT:
+        return f"yes: friction is level at the end of the velocities, {change}"
+    end = "still rises at the largest velocity" if rise > 0 else "still falls at the lowest velocity"
+    if np.isfinite(ends[0]) and ends[0] <= 0 <= ends[1]:
+        return f"not tested: the scatter leaves open whether friction {end}, {change}"
+    return f"no: the plateau is not reached, friction {end}, {change}"
+
+
+def _least_squares(
+    model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 40
+) -> FloatArray:
+    """Fit the data of every row, shape (rows, points), by Levenberg and Marquardt's steps; return (rows, constants)."""
+    size = np.eye(len(start))
+    constants = np.tile(np.array(start), (data.shape[0], 1))
+    damping = np.full(data.shape[0], 1e-6)
+    value = model(constants)
+    cost = np.sum((data - value) ** 2, axis=1)
+    for _ in range(steps):
+        jacobian = np.stack([(model(constants + shift) - value) / 1e-6 for shift in 1e-6 * size], axis=-1)
+        normal = np.swapaxes(jacobian, 1, 2) @ jacobian
+        normal = normal + (damping * np.einsum("sii->s", normal) + 1e-12)[:, None, None] * size
+        gradient = np.swapaxes(jacobian, 1, 2) @ (data - value)[..., None]
+        step = np.clip(np.linalg.solve(normal, gradient)[..., 0], -0.3, 0.3)
+        trial = model(constants + step)
+        cost_there = np.sum((data - trial) ** 2, axis=1)
+        better = cost_there <= cost
+        constants = np.where(better[:, None], constants + step, constants)
+        value, cost = np.where(better[:, None], trial, value), np.where(better, cost_there, cost)
+        damping = np.clip(np.where(better, damping / 10, damping * 10), 1e-9, 1e9)
+        if np.abs(step).max() < 1e-9:
+            break
+    return constants
+
+
+def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
+    """Return how far a law is from the data, both in units of the plateau sqrt 2 slope."""
+    away = np.abs(departures)
+    rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
+    return {
+        **measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
+        **measure(f"largest_error{suffix}", largest, f"largest error of the law over its plateau, {which}"),
+    }
+
+
+def peak_velocity(velocity: FloatArray, mean: FloatArray) -> float:
+    """Return the velocity of the largest friction, where region IV begins."""
+    order = np.argsort(velocity)
+    return float(velocity[order][np.argmax(_smoothed(mean[order]))])
+
+
+def _interpolation(data: xr.Dataset) -> Variables:
+    """Fit alpha and beta of eq. 3.18 to regions I to III."""
+    forces, velocities = loads_and_velocities(data)
+    table = table_of(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
+    force, velocity = table.columns
+    mean = np.nan_to_num(table.mean())
+    peak = {load: peak_velocity(velocity[force == load], mean[force == load]) for load in np.unique(force)}
+    used = (force >= LAW_FROM) & (velocity <= np.array([peak[load] for load in force])) & (mean > 0)
+    if np.count_nonzero(used) < 5:
+        raise FitError(
+            f"expected five cases with F_N / (G h L) above {LAW_FROM} below region IV, got {int(used.sum())}"
+        )
+    force, velocity, count = force[used], velocity[used], table.count(used)
+
+    def model(constants: FloatArray) -> FloatArray:
+        law: FloatArray = laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:]))
+        return law
+
+    hurst = one_value(data, "hurst")
+    start = (laws.alpha(hurst), float(np.log(laws.BETA)))
+    stack = table.stack(used)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
+    )
+    at = int(np.argmax(np.abs(found.departures)))
+    worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
+    return {
+        **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
+        **measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
+        **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
+        **_law_error(found.departures, "", "constants fitted"),
+        **_law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
+        **measure("cases", int(used.sum()), "number of cases fitted"),
+        **holds(law_holds(found.departures, found.chance, 2, worst)),
+    }
+
+
+def _body(data: xr.Dataset) -> tuple[Any, float]:
+    """Return coefficient and exponent of the line c |x|^n of a store's indenter."""
+    if "indenter_angle" in data.coords:
+        return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
+    if "indenter_radius" in data.coords:
+        return 1 / data["indenter_radius"], 2.0
+    if "indenter_coefficient" in data.coords and data["indenter_exponent"].ndim == 0:
+        exponent = one_value(data, "indenter_exponent")
+        return indenter.mapped(exponent) * data["indenter_coefficient"], exponent
+    raise FitError("expected a store with an indenter: cone, parabola or power")
+
+
+def _half_width(data: xr.Dataset) -> Any:
+    """Return the half width of the static contact without roughness."""
+    coefficient, exponent = _body(data)
+    load = data["normal_force"] / (4 * data["shear_modulus"])
+    return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
+
+
+def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
+    """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
+    _require_kelvin(data)
+    low = laws.indenter_low(
+        _half_width(data),
+        data["velocity"],
+        data["relaxation_time"],
+        data["shear_modulus"],
+        data["normal_force"],
+        slope,
+    )
+    return xr.DataArray(low / (np.sqrt(2) * slope))
+
+
+def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
+    """Return where the law of rough indenters is meant to hold.
+
+    The body is flat against the roughness and pressed in by more than its rms height, and the velocity is not beyond
+    that of the largest friction, where region IV begins.
+    """
+    coefficient, exponent = _body(data)
+    width = _half_width(data)
+    flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= BODY * slope
+    deep = coefficient * width**exponent >= data["rms_roughness"]
+    within = flat & deep
+    if "velocity" in data["friction_coefficient"].dims:
+        mean = data["friction_coefficient"].mean("realisation").fillna(0.0)
+        within = within & (data["velocity"] <= mean.idxmax("velocity"))
+    return xr.DataArray(within)
+
+
+def _indenter(data: xr.Dataset) -> Variables:
+    """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
+    slope = spectral_slope(data)
+    table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
+    xi, within = table.columns
+    known = (table.mean() > 0) & np.isfinite(xi) & (xi > 0)
+    used = (within > 0) & known
+    measured = measure("cases", int(used.sum()), "number of cases within the law")
+    if np.count_nonzero(used) < 3:
+        errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
+        names = ["exponent", "exponent_low", "exponent_high", *errors]
+        reason = (
+            f"not tested: {used.sum()} of {known.sum()} cases within the law, three are needed; in the others the body"
+            f" is steep against the roughness or barely pressed in, or the velocity lies beyond the largest friction"
+        )
+        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason)
+    xi, count = xi[used], table.count(used)
+    logs = np.log(table.stack(used))
+
+    def model(constants: FloatArray) -> FloatArray:
+        law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
+        return law
+
+    start = (math.log(laws.INDENTER_EXPONENT),)
+    found = fitted(
+        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count
+    )
+    of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
+    worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
+    return {
+        **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
+        **_law_error(of_plateau, "", "exponent fitted"),
+        **_law_error(np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "exponent 1.5"),
+        **measured,
+        **holds(law_holds(found.departures, found.chance, 1, worst)),
+    }
+
+
+def _indenter_axes(data: xr.Dataset) -> list[str]:
+    return [str(dim) for dim in data["friction_coefficient"].dims if dim not in ("realisation", "hurst")]
+
+
+FITS: tuple[Fit, ...] = (
+    Fit(
+        "zone_one",
+        MODELS,
+        "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
+        lambda series: each(series, zone_one_axes, _zone_one),
+        apart=True,
+    ),
+    Fit(
+        "plateau",
+        MODELS,
+        "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
+        lambda series: each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
+        apart=True,
+    ),
+    Fit(
+        "interpolation",
+        MODELS,
+        "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
+        lambda series: each(series, zone_one_axes, _interpolation),
+        apart=True,
+    ),
+    Fit(
+        "indenter",
+        MODELS,
+        "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
+        lambda series: each(series, _indenter_axes, _indenter),
+        apart=True,
+    ),
+)

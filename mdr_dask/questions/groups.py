@@ -1,0 +1,130 @@
+"""Means over cases: one row for each value, or each combination of values, of the axes that are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.models.base import Status
+from mdr_dask.questions.columns import COUNTS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CASES = "cases"
+
+
+def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None = None) -> xr.Dataset:
+    """Average every output over the cases of each group, and keep the scatter over realisations.
+
+    The mean of a group is the mean of its cases' means, each case counted once. Realisations are common to all cases,
+    so that these means scatter together: realisation r of a group is ``m + R u_r``, where ``u_r`` is the sum over its
+    cases c of ``(x_cr - m_c) / (n_c C)``. Mean and standard error of these R numbers are those of the group, also where
+    cases have different numbers n_c of realisations; where all have the same, they are plain means over the cases.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        A group of a study.
+    by : sequence of str
+        Axes, or columns of a sampled study.
+    kept : DataArray of bool, optional
+        The cases that take part.
+
+    Returns
+    -------
+    Dataset
+        With the dimension ``group`` in place of those of the cases, the axes in `by` as coordinates along it, and the
+        variables ``cases`` and ``state_counts``. The grid error of a group is the mean of those of its cases.
+    """
+    import xarray as xr
+
+    dims = [str(dim) for dim in dataset["status"].dims if dim != "realisation"]
+    axes = [str(name) for name, axis in dataset.coords.items() if axis.ndim == 1 and axis.dims[0] in dims]
+    for axis in by:
+        if axis not in axes:
+            raise DataError(f"expected axes to group by, got {axis!r}{did_you_mean(axis, axes)}")
+    rows = np.arange(prod(dataset.sizes[dim] for dim in dims))
+    if kept is not None:
+        like = dataset["status"].isel(realisation=0, drop=True)
+        rows = np.flatnonzero(kept.broadcast_like(like).transpose(*dims).to_numpy())
+    codes, members = _members(dataset, by, dims, rows)
+    errors = {array.attrs.get("ancillary_variables") for array in dataset.data_vars.values()}
+    found: dict[str, Any] = {CASES: ("group", members.sizes, {"units": "1"})}
+    for name, array in dataset.data_vars.items():
+        values = array.transpose(*dims, ..., "realisation")
+        shape = values.shape[len(dims) :]
+        flat = values.to_numpy().reshape(-1, prod(shape[:-1]), shape[-1])
+        if name == "status":
+            each = [members.sums((flat == state).sum(axis=-1)[:, 0], int) for state in Status]
+            found[COUNTS] = (("group", "state"), np.stack(each, axis=-1), {})
+        else:
+            reduced = (_errors if name in errors else _common)(flat, members).reshape(-1, *shape)
+            found[str(name)] = (("group", *values.dims[len(dims) :]), reduced, array.attrs)
+    coords: dict[str, Any] = {str(key): axis for key, axis in dataset.coords.items() if not {*axis.dims} & {*dims}}
+    for name, labels in zip(by, codes, strict=True):
+        coords[name] = ("group", labels, dataset[name].attrs)
+    return xr.Dataset(found, coords, dataset.attrs)
+
+
+@dataclass(frozen=True)
+class _Members:
+    """The cases of every group: all of them, sorted by group, and where each group begins."""
+
+    order: NDArray[np.intp]
+    starts: NDArray[np.intp]
+
+    @property
+    def sizes(self) -> NDArray[np.intp]:
+        """Number of cases of every group."""
+        return np.diff(self.starts, append=self.order.size)
+
+    def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
+        """Return the sums over the cases of every group, from values with the cases first."""
+        if not self.order.size:
+            return np.zeros((0, *values.shape[1:]), dtype)
+        return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))
+
+
+def _members(
+    dataset: xr.Dataset, by: Sequence[str], dims: Sequence[str], rows: NDArray[np.intp]
+) -> tuple[list[NDArray[Any]], _Members]:
+    """Return the values of the axes in every group, and the cases of every group."""
+    places = np.unravel_index(rows, [dataset.sizes[dim] for dim in dims])
+    labels = [np.unique(dataset[name].to_numpy(), return_inverse=True) for name in by]
+    shape = [values.size for values, _ in labels]
+    along = [of[places[dims.index(str(dataset[name].dims[0]))]] for name, (_, of) in zip(by, labels, strict=True)]
+    code = np.ravel_multi_index(along, shape)
+    order = np.argsort(code, kind="stable")
+    present, starts = np.unique(code[order], return_index=True)
+    each = np.unravel_index(present, shape)
+    return [values[k] for (values, _), k in zip(labels, each, strict=True)], _Members(rows[order], starts)
+
+
+def _common(values: FloatArray, members: _Members) -> FloatArray:
+    """Return the realisations of every group (see `averaged`); shape (groups, ..., realisations)."""
+    there = np.isfinite(values)
+    number = there.sum(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        means = np.where(there, values, 0.0).sum(axis=-1, keepdims=True) / number
+        cases = members.sums(number > 0)
+        level = members.sums(np.where(number > 0, means, 0.0)) / cases
+        spread = members.sums(np.where(there, (values - means) / number, 0.0)) / cases
+    taken = members.sums(there) > 0
+    return np.where(taken, level + taken.sum(axis=-1, keepdims=True) * spread, np.nan)
+
+
+def _errors(values: FloatArray, members: _Members) -> FloatArray:
+    """Return the mean error of every group, the same for all its realisations."""
+    each = _common(np.abs(values), members)
+    there = np.isfinite(each)
+    with np.errstate(invalid="ignore"):
+        level = np.where(there, each, 0.0).sum(axis=-1, keepdims=True) / there.sum(axis=-1, keepdims=True)
+    return np.where(there, level, np.nan)

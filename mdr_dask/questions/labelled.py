@@ -1,0 +1,61 @@
+"""A study as labelled arrays: the answer to a question as it goes into NetCDF and Zarr."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+from mdr_dask.aggregation import aggregate
+from mdr_dask.errors import DataError
+from mdr_dask.questions.columns import COUNTS, STATUS, WORDS, Columns, counts, needed
+from mdr_dask.questions.expression import parse
+from mdr_dask.questions.groups import CASES, averaged
+from mdr_dask.questions.selection import Tell, outputs, select, where
+from mdr_dask.questions.units import in_units
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from mdr_dask.questions.table import Question
+
+
+def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
+    """Answer a question with arrays; cases that the condition leaves out are NaN.
+
+    Parameters
+    ----------
+    dataset, question, tell
+        As in `mdr_dask.questions.table.table`.
+
+    Returns
+    -------
+    Dataset
+        Statistics and the counts of states along ``state``, or single results and their ``status``.
+
+    Raises
+    ------
+    DataError
+        If the question names what is not there, or asks for an order, which arrays have not.
+    """
+    if question.sort:
+        raise DataError("expected a table for rows in an order: .csv, .jsonl or .parquet, got labelled arrays")
+    if question.group_by and question.statistics is None:
+        raise DataError("expected statistics of groups, got single realisations; leave out one of the two")
+    columns = [name for name in question.columns if name not in dataset.coords]
+    shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)])
+    used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])
+    data = select(dataset[list(dict.fromkeys([*shown.data_vars, *used, STATUS]))], question.selections, tell)
+    if question.group_by:
+        kept = Columns(data).truth(question.where) if question.where else None
+        data = averaged(data, question.group_by, kept)
+    elif question.where:
+        data = where(data, question.where)
+    made = Columns(data)
+    numbers = {name: made.column(name) for name in columns if name not in data}
+    if question.statistics is None:
+        found = data[[*shown.data_vars, STATUS]]
+    else:
+        states = counts(data).assign_coords(state=("state", WORDS)).assign_attrs(units="1")
+        found = aggregate(data[[*shown.data_vars]], question.statistics).assign({COUNTS: states})
+        found = found.assign({CASES: data[CASES]} if CASES in data else {})
+    return in_units(found.assign(numbers), question.units)

@@ -1,0 +1,259 @@
+"""A study as a table: rows made a box at a time, so that forty of a million cost what forty cost."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdr_dask.aggregation import QUANTILES, aggregate
+from mdr_dask.errors import DataError
+from mdr_dask.questions.columns import COUNTS, REALISATIONS, STATUS, Columns, needed
+from mdr_dask.questions.expression import parse
+from mdr_dask.questions.groups import CASES, averaged
+from mdr_dask.questions.selection import Tell, outputs, select
+from mdr_dask.questions.units import in_units
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+MEANS = ("mean", "standard_error", "grid_error")
+#: Rows that are made at a time, and a study of how many bytes is read as a whole.
+ROWS, WHOLE = 2**16, 2**26
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a user wants to see of a group of a study.
+
+    Parameters
+    ----------
+    outputs : tuple of str
+        Outputs; all that have no dimension of their own if none is named.
+    selections : tuple of str
+        As `mdr_dask.questions.selection.select` takes them.
+    where : str
+        A condition on means over realisations, or on single results if `statistics` is None.
+    group_by : tuple of str
+        Axes: one row for each combination of their values, averaged over all other cases.
+    sort : tuple of str
+        Columns or formulas, the first one first; a leading ``-`` is descending. What is not there comes last.
+    columns : tuple of str
+        Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; all axes and outputs if none.
+    units : mapping of str to str
+        Units of columns, others are SI.
+    statistics : tuple of str, optional
+        Over realisations; None for a row for each result.
+    """
+
+    outputs: tuple[str, ...] = ()
+    selections: tuple[str, ...] = ()
+    where: str = ""
+    group_by: tuple[str, ...] = ()
+    sort: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
+    statistics: tuple[str, ...] | None = MEANS
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows that come in frames, and the units of their columns.
+
+    `total` is the number of rows there are, None where that is not known before the last frame.
+    """
+
+    frames: Iterator[pd.DataFrame]
+    units: dict[str, str]
+    total: int | None
+
+
+def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
+    """Answer a question with rows.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        A group of a study, as :func:`mdr_dask.store.datasets` opens it.
+    question : Question
+        What is wanted.
+    limit : int
+        Most rows that will be looked at, 0 for all: no more work is done than they need.
+    tell : callable, str -> object
+        As in `mdr_dask.questions.selection.select`.
+
+    Returns
+    -------
+    Table
+        Without an order asked for, rows are made while the frames are read, and memory does not grow with them.
+
+    Raises
+    ------
+    DataError
+        If the question names what is not there, before any row is made.
+    """
+    maker = _Maker(dataset, question, tell)
+    units = maker.units()
+    if question.sort:
+        ordered = maker.ordered(limit)
+        return Table(iter([ordered[0]]), units, ordered[1])
+    total = prod(maker.sizes.values())
+    if question.where and not question.group_by:
+        return Table(maker.frames(ROWS), units, None)
+    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, total)
+
+
+class _Maker:
+    """Makes frames of one question, box by box."""
+
+    def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
+        raw = question.statistics is None
+        if raw and question.group_by:
+            raise DataError("expected statistics of groups, got single realisations; leave out one of the two")
+        texts = [question.where, *question.sort, *question.columns]
+        named = [name for text in texts if text for name in parse(text).names]
+        shown = outputs(dataset, question.outputs) if question.outputs or not question.columns else dataset[[]]
+        errors = {shown[name].attrs.get("ancillary_variables") for name in shown.data_vars}
+        self._question, self._raw = question, raw
+        self._outputs = [str(name) for name in shown.data_vars if raw or name not in errors]
+        used = [name for name in dict.fromkeys([*self._outputs, *needed(dataset, named)]) if name != STATUS]
+        wanted = outputs(dataset, used).data_vars if used else ()
+        data = select(_numbered(dataset[[*wanted, STATUS]]), question.selections, tell)
+        kept = Columns(data).truth(question.where) if question.where and question.group_by else None
+        self._data = averaged(data, question.group_by, kept) if question.group_by else data
+        own = [str(dim) for dim in self._data.sizes if raw or dim != "realisation"]
+        self._dims = [dim for dim in own if dim != "state"]
+        self.sizes = {dim: self._data.sizes[dim] for dim in self._dims}
+
+    def units(self) -> dict[str, str]:
+        """Return the units of the columns; whatever is wrong with the question is found here."""
+        rows = self._rows(dict.fromkeys(self._dims, slice(0, 1)))
+        self._kept(rows)
+        self._keys(rows)
+        return self._frame(rows)[1]
+
+    def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
+        """Yield the rows in the order of the axes, so many at a time or somewhat more."""
+        for rows in self._boxes(most, whole):
+            if rows.sizes["row"]:
+                yield self._frame(rows)[0]
+
+    def ordered(self, limit: int) -> tuple[pd.DataFrame, int]:
+        """Return the first rows in the order asked for, all if there is no limit, and the number of all rows."""
+        import pandas as pd
+
+        keys = [f" {number}" for number in range(len(self._question.sort))]  # no column is called so
+        best, total = pd.DataFrame(), 0
+        for rows in self._boxes(ROWS, whole=True):
+            total += rows.sizes["row"]
+            order = pd.DataFrame(dict(zip(keys, self._keys(rows), strict=True))).sort_values(keys, kind="stable")
+            order = order[:limit] if limit else order
+            frame, _ = self._frame(rows.isel(row=order.index.to_numpy()))
+            best = pd.concat([best, frame.assign(**{key: order[key].to_numpy() for key in keys})], ignore_index=True)
+            if limit:
+                best = best.sort_values(keys, kind="stable")[:limit]
+        return best.sort_values(keys, kind="stable").drop(columns=keys), total
+
+    def _boxes(self, most: int, whole: bool) -> Iterator[xr.Dataset]:
+        """Yield the rows that the condition keeps."""
+        if whole and self._data.nbytes <= WHOLE:
+            self._data = self._data.load()
+        chunks = next((array.encoding.get("chunks") for array in self._data.data_vars.values()), None) or ()
+        for box in boxes(self.sizes, max(most, min(prod(chunks), ROWS) if whole else most), chunks):
+            rows = self._rows(box)
+            yield rows.isel(row=np.flatnonzero(self._kept(rows)))
+
+    def _rows(self, box: Mapping[str, slice]) -> xr.Dataset:
+        part = self._data.isel(dict(box))
+        return (part.stack(row=self._dims, create_index=False) if self._dims else part.expand_dims("row")).load()
+
+    def _kept(self, rows: xr.Dataset) -> Any:
+        if not self._question.where or self._question.group_by:
+            return np.ones(rows.sizes["row"], dtype=bool)
+        return np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])
+
+    def _keys(self, rows: xr.Dataset) -> list[Any]:
+        columns = Columns(rows)
+        values = [np.asarray(columns.evaluate(text).array) for text in self._question.sort]
+        return [np.broadcast_to(value, rows.sizes["row"]) for value in values]
+
+    def _names(self, rows: xr.Dataset) -> list[str]:
+        """Return the columns of the table."""
+        if self._question.columns:
+            return list(dict.fromkeys([*self._question.columns, *self._outputs]))
+        along = [str(name) for name, coord in rows.coords.items() if coord.dims == ("row",)]
+        axes = sorted(along, key=lambda name: self._dims.index(name) if name in self._dims else len(self._dims))
+        grouped = [CASES] if self._question.group_by else []
+        counted = [REALISATIONS] if rows.sizes.get("realisation", 1) > 1 and not (self._raw or grouped) else []
+        return [*axes, *grouped, *self._outputs, *counted, STATUS]
+
+    def _frame(self, rows: xr.Dataset) -> tuple[pd.DataFrame, dict[str, str]]:
+        """Return rows as a frame, and the units of its columns."""
+        import pandas as pd
+        import xarray as xr
+
+        columns, found = Columns(rows), dict[str, xr.DataArray]()
+        for name in self._names(rows):
+            if name in self._data.data_vars and "realisation" in rows[name].dims and name not in (STATUS, COUNTS):
+                error = rows[name].attrs.get("ancillary_variables")
+                pair = rows[[name, error] if error in rows else [name]]
+                reduced = aggregate(pair, self._question.statistics or ())
+                found |= {str(key): array for key, array in reduced.data_vars.items()}
+            else:
+                found[name] = columns.column(name)
+        wide = in_units(xr.Dataset({}, rows.coords).drop_vars(rows.coords).assign(found), self._question.units)
+        flat = {key: value for name in found for key, value in _flattened(wide[name], name).items()}
+        units = {key: str(value.attrs.get("units", "1")) for key, value in flat.items()}
+        size = rows.sizes["row"]
+        return pd.DataFrame({key: np.broadcast_to(value.to_numpy(), size) for key, value in flat.items()}), units
+
+
+def _numbered(dataset: xr.Dataset) -> xr.Dataset:
+    """Give a dimension without values, such as the cases of a sampled study, numbers from 0."""
+    bare = [dim for dim in dataset.dims if dim not in dataset.coords]
+    return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
+
+
+def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
+    """Return the columns of a statistic that has several numbers."""
+    if "bound" in array.dims:
+        return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
+    if "quantile" in array.dims:
+        return {f"{name}_{share:g}": array.isel(quantile=k) for k, share in enumerate(QUANTILES)}
+    return {name: array}
+
+
+def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
+    """Cut a grid into boxes that follow each other as its rows do.
+
+    Parameters
+    ----------
+    sizes : mapping of str to int
+        Lengths of the dimensions, the slowest first.
+    most : int
+        Most points of a box.
+    chunks : sequence of int
+        Lengths of the chunks; boxes that are longer end with one.
+    """
+    dims, inner = list(sizes), 1
+    cut = len(dims)
+    while cut and inner * sizes[dims[cut - 1]] <= most:
+        cut -= 1
+        inner *= sizes[dims[cut]]
+    if not cut:
+        yield {}
+        return
+    cut -= 1
+    step = max(1, most // inner)
+    if cut < len(chunks) and step > chunks[cut]:
+        step -= step % chunks[cut]
+    for place in product(*(range(sizes[dim]) for dim in dims[:cut])):
+        for start in range(0, sizes[dims[cut]], step):
+            outer = {dim: slice(k, k + 1) for dim, k in zip(dims, place, strict=False)}
+            yield outer | {dims[cut]: slice(start, start + step)}

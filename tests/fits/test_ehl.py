@@ -1,0 +1,83 @@
+"""Film exponents: exact on a power law, and near the known ones on films that were solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from mdr_dask.errors import FitError
+from mdr_dask.fits.ehl import film_exponents
+
+
+def power_law(W: np.ndarray, U: np.ndarray, G: np.ndarray, scatter: float = 0.0) -> xr.Dataset:
+    film = 2.922 * W[:, None, None] ** -0.166 * U[None, :, None] ** 0.692 * G[None, None, :] ** 0.47
+    film = film * np.exp(scatter * np.random.default_rng(7).normal(size=film.shape))
+    dims = ("load_parameter", "speed_parameter", "material_parameter")
+    return xr.Dataset(
+        {"central_film": ((*dims, "realisation"), film[..., None])},
+        coords=dict(zip(dims, (W, U, G), strict=True)) | {"contact_modulus": 1.15e11},
+    )
+
+
+GRID = (np.geomspace(1e-5, 1e-4, 3), np.geomspace(1e-12, 1e-10, 4), np.array([2000.0, 4000.0, 8000.0]))
+
+
+def test_power_law_is_recovered() -> None:
+    fit = film_exponents({"map": power_law(*GRID)}).sel(series="map")
+    for name, value in (("load", -0.166), ("speed", 0.692), ("material", 0.47), ("factor", 2.922)):
+        assert float(fit[f"central_{name}"]) == pytest.approx(value, rel=1e-9)
+    assert float(fit["central_worst"]) < 1e-12
+    assert str(fit["law_holds"].item()).startswith("yes: ")
+
+
+def test_a_bent_law_is_named_and_its_interval_is_wide() -> None:
+    """The speed exponent goes from 0.4 to 1 over the map, as from an elastic to a rigid contact."""
+    speeds = np.geomspace(1e-13, 1e-9, 9)
+    data = power_law(GRID[0], speeds, GRID[2])
+    logarithm = np.log(speeds / 1e-11)
+    bend = np.exp(0.3 / 9.2 / 2 * logarithm**2)[None, :, None, None]
+    fit = film_exponents({"": data.assign(central_film=data["central_film"] * bend)})
+    assert str(fit["law_holds"][0].item()).startswith("no: departs by")
+    straight = film_exponents({"": data})
+    assert str(straight["law_holds"][0].item()).startswith("yes")
+    assert fit["central_speed_high"][0] - fit["central_speed_low"][0] > 0.08  # 0.02 by scatter alone
+
+
+def test_interval_holds_the_exponent_at_its_rate() -> None:
+    """Of 200 noisy maps 95 % hold the speed exponent; 3 sigma of that count is 4.6 points."""
+    inside = 0
+    for seed in range(200):
+        data = power_law(*GRID)
+        noise = np.exp(0.03 * np.random.default_rng(seed).normal(size=data["central_film"].shape))
+        fit = film_exponents({"": data.assign(central_film=data["central_film"] * noise)})
+        inside += bool(fit["central_speed_low"][0] <= 0.692 <= fit["central_speed_high"][0])
+    assert abs(inside / 200 - 0.95) < 0.046
+
+
+def test_what_is_not_varied_has_no_exponent() -> None:
+    one = power_law(GRID[0][:1], GRID[1], GRID[2]).isel(load_parameter=0)
+    fit = film_exponents({"": one})
+    assert np.isnan(fit["central_load"]).all()
+    assert float(fit["central_speed"][0]) == pytest.approx(0.692)
+
+
+def test_other_axes_make_maps_of_their_own() -> None:
+    one = power_law(*GRID)
+    both = xr.concat([one, 2 * one], dim="viscosity_law").assign_coords(viscosity_law=["barus", "roelands"])
+    fit = film_exponents({"map": both})
+    assert fit["series"].values.tolist() == ["map viscosity_law=barus", "map viscosity_law=roelands"]
+    np.testing.assert_allclose(fit["central_factor"], [2.922, 2 * 2.922], rtol=1e-9)
+
+
+def test_failed_cases_are_left_out() -> None:
+    data = power_law(*GRID)
+    data["central_film"][0, 0, 0] = np.nan
+    assert float(film_exponents({"": data})["central_speed"][0]) == pytest.approx(0.692, rel=1e-9)
+
+
+def test_too_little_is_said() -> None:
+    with pytest.raises(FitError, match="more points than constants"):
+        film_exponents({"": power_law(GRID[0][:1], GRID[1][:2], GRID[2][:1])})
+    with pytest.raises(FitError, match="expected a series with central_film or minimum_film"):
+        film_exponents({"": xr.Dataset()})

@@ -1,0 +1,249 @@
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from mdr_dask.errors import DataError
+from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, read_table, rereferenced
+
+DATA = Path(__file__).parents[1] / "data" / "dma"
+EXPONENT = -0.15
+
+
+def law(force, velocity):
+    """Thesis eq. 3.43 with mu_low ~ (F v^EXPONENT)^(-2/3)."""
+    low = (force * velocity**EXPONENT) ** (-2 / 3)
+    return (1 + low**-1.5) ** (-1 / 1.5)
+
+
+def store(realisations=3, noise=0.01):
+    random = np.random.default_rng(0)
+    force, velocity = np.geomspace(1, 100, 15), np.geomspace(1e-3, 1, 7)
+    exact = law(force[:, None], velocity)[..., None]
+    values = exact * (1 + noise * random.standard_normal((15, 7, realisations)))
+    values[0, 0, 0] = np.nan
+    return xr.Dataset(
+        {
+            "friction_coefficient": (("normal_force", "velocity", "realisation"), values, {"units": "1"}),
+            "status": (("normal_force", "velocity", "realisation"), np.ones(values.shape, np.int8)),
+        },
+        coords={
+            "normal_force": ("normal_force", force, {"units": "N"}),
+            "velocity": ("velocity", velocity, {"units": "m/s"}),
+            "shear_modulus": 1e6,
+        },
+    )
+
+
+def test_store_gives_the_exponent_it_was_made_with():
+    (fit,) = FITS
+    result = fit.compute({"": store()})
+    assert float(result["power_exponent_low"]) < EXPONENT < float(result["power_exponent_high"])
+    assert float(result["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    assert result["shift_factor"].dims == ("velocity",)
+    assert set(result.dims) == {"velocity"}  # one row for every velocity
+    whole = master_curve(friction_of_roughness({"": store()}))
+    assert whole["curve_abscissa"].attrs["units"] == "N"
+    assert whole.sizes["point"] == 15 * 7
+
+
+def test_friction_of_a_smooth_body_is_taken_off():
+    rough, smooth = store(), store(noise=0.0)
+    bulk = 0.1 * smooth["velocity"] ** 0.3 * xr.ones_like(smooth["friction_coefficient"])
+    rough["friction_coefficient"] = rough["friction_coefficient"] + bulk
+    smooth["friction_coefficient"] = bulk
+    series = {
+        "rough": rough.assign_coords(rms_roughness=1e-5),
+        "smooth": smooth.assign_coords(rms_roughness=0.0),
+    }
+    (fit,) = FITS
+    assert float(fit.compute(series)["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    alone = fit.compute({"rough": series["rough"]})
+    assert abs(float(alone["power_exponent"]) - EXPONENT) > 0.02
+
+
+def test_store_without_the_axes_is_refused():
+    with pytest.raises(DataError, match="roughness that varies normal_force and velocity"):
+        FITS[0].compute({"": store().isel(velocity=0)})
+
+
+def test_frame_of_columns_with_other_names():
+    force, velocity = (a.ravel() for a in np.meshgrid(np.geomspace(1, 100, 12), [1e-3, 1e-2, 1e-1]))
+    frame = pd.DataFrame({"Load": force, "Speed": velocity, "COF": law(force, velocity)})
+    result = master_curve(frame, reference=1e-3)
+    assert result.attrs["ordinate"] == "COF"
+    assert result["shift_factor"].sel(Speed=1e-3) == 0
+    np.testing.assert_allclose(result["shift_factor"], EXPONENT * np.array([0, 1, 2]), atol=0.02)
+
+
+def test_measured_moduli_with_units_row_and_scattering_temperatures():
+    table = read_table(DATA / "freq_user_raw.csv")
+    assert table.attrs["units"] == {"f": "Hz", "E_stor": "MPa", "E_loss": "MPa", "T": "C", "Set": "-"}
+    result = master_curve(table, abscissa="f", ordinate="E_stor", group="T")
+    assert result.sizes["T"] == 21
+    assert np.all(np.diff(result["shift_factor"]) < 0)  # warmer is slower: log10 a_T falls with temperature
+    assert float(result["arrhenius_activation_energy"]) > 0
+    assert float(result["wlf_c1"]) > 0
+    assert master_curve(table)["T"].equals(result["T"])  # columns found by their names
+
+
+def test_time_and_frequency_give_the_same_law():
+    """The relaxation table is the storage modulus over 1/f: same shifts with the other sign, same a_T."""
+    time = master_curve(read_table(DATA / "time_user_raw.csv"), abscissa="t", group="T")
+    frequency = master_curve(read_table(DATA / "freq_user_raw.csv"), abscissa="f", group="T")
+    np.testing.assert_allclose(time["shift_factor"], -frequency["shift_factor"], atol=0.05)
+    energies = [float(c["arrhenius_activation_energy"]) for c in (time, frequency)]
+    assert energies[0] == pytest.approx(energies[1], rel=0.02)
+
+
+def test_saved_curves_can_be_rereferenced(tmp_path):
+    curve = master_curve(store()[["friction_coefficient"]])
+    velocity = float(curve["velocity"][1])
+    again = rereferenced(xr.Dataset.from_dict(curve.to_dict()), velocity)
+    direct = master_curve(store()[["friction_coefficient"]], reference=velocity)
+    for name in ("shift_factor", "shift_factor_error", "curve_abscissa", "power_exponent"):
+        np.testing.assert_allclose(again[name], direct[name], rtol=1e-6, atol=1e-9)
+    assert again["curve_abscissa"].attrs["measured_low"] == pytest.approx(1.0)
+
+
+def test_bootstrap_is_kept_and_referenced_anew():
+    curve = master_curve(store()[["friction_coefficient"]], draws=5)
+    assert curve["draws"].shape == (5, 7)
+    velocity = float(curve["velocity"][1])
+    moved = rereferenced(curve, velocity)
+    assert np.all(moved["draws"].sel(velocity=velocity) == 0)
+    assert moved["shift_factor_bootstrap"].sel(velocity=velocity) == 0
+    assert np.all(moved["shift_factor_bootstrap"].drop_sel(velocity=velocity) > 0)
+
+
+def test_a_reference_between_velocities_follows_their_logarithm():
+    exact = store(noise=0.0)[["friction_coefficient"]]
+    middle = float(np.sqrt(exact["velocity"][2] * exact["velocity"][3]))
+    for curve in (master_curve(exact, reference=middle), rereferenced(master_curve(exact), middle)):
+        law_says = EXPONENT * np.log10(curve["velocity"] / middle)
+        np.testing.assert_allclose(curve["shift_factor"], law_says, atol=0.01)
+        assert curve.attrs["reference"] == middle
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a line of names and at least one line of values"),
+        ("a,b\n", "expected a line of names and at least one line of values"),
+        ("1,2\n3,4\n", "expected names of columns, got numbers"),
+        ("a,b\n1,2\n3,x\n", "table.csv:3:3: expected a number, got 'x'"),
+        ("a,b\n1,2\n3\n", "table.csv:3:1: expected 2 values as in line 1, got 1"),
+    ],
+)
+def test_tables_that_cannot_be_read(tmp_path, text, message):
+    (tmp_path / "table.csv").write_text(text)
+    with pytest.raises(DataError, match=message):
+        read_table(tmp_path / "table.csv")
+
+
+def test_comments_semicolons_and_spaces_are_understood(tmp_path):
+    for separator in (";", "\t", " "):
+        (tmp_path / "table.csv").write_text(
+            f"# made up\nforce{separator}mu\n\n1{separator}0.5\n% more\n2{separator}0.25\n"
+        )
+        assert read_table(tmp_path / "table.csv").to_numpy().tolist() == [[1, 0.5], [2, 0.25]]
+
+
+def test_tables_that_are_ambiguous_or_incomplete_are_refused():
+    frame = pd.DataFrame({"force": [1.0, 2, 1, 2], "mu": [1.0, 2, 3, 4], "velocity": [1.0, 1, 2, 2]})
+    with pytest.raises(DataError, match="the curve at velocity = 1, temperature = 1 needs two or more distinct points"):
+        master_curve(frame.assign(temperature=[1.0, 2, 3, 4]))
+    with pytest.raises(DataError, match="varies in 'force' too"):
+        master_curve(frame.rename(columns={"velocity": "frequency"}).assign(T=[1.0, 1, 2, 2]), "frequency", "mu", "T")
+    with pytest.raises(DataError, match="expected columns for 'hardness'"):
+        master_curve(frame, ordinate="hardness")
+    with pytest.raises(DataError, match="must be positive"):
+        master_curve(frame.assign(mu=[1.0, -1, 1, 1]))
+    with pytest.raises(DataError, match="must lie between 1 and 2, got 50"):
+        master_curve(frame, reference=50.0)
+    with pytest.raises(DataError, match="two or more values of 'velocity', got one value"):
+        master_curve(frame.assign(velocity=1.0))
+
+
+def two_groups():
+    """Friction over force at four velocities and five temperatures: shifts -0.15 log v and Arrhenius."""
+    force, velocity, kelvin = (
+        a.ravel() for a in np.meshgrid(np.geomspace(1, 100, 15), np.geomspace(1e-3, 1, 4), np.linspace(280, 320, 5))
+    )
+    energy = 2e4 / (8.31446261815324 * np.log(10)) * (1 / kelvin - 1 / 300)
+    scatter = 1 + 0.003 * np.random.default_rng(0).standard_normal(force.size)
+    mu = law(force * 10**energy, velocity) * scatter
+    return pd.DataFrame({"force": force, "velocity": velocity, "temperature": kelvin, "mu": mu})
+
+
+def test_velocity_and_temperature_give_a_shift_each():
+    result = master_curve(two_groups())
+    assert result.attrs["second"] == "temperature"
+    assert float(result["power_exponent_low"]) < EXPONENT < float(result["power_exponent_high"])
+    assert float(result["power_exponent"]) == pytest.approx(EXPONENT, abs=0.01)
+    assert float(result["arrhenius_activation_energy"]) == pytest.approx(2e4, rel=0.1)
+    assert result.attrs["probability"] > 1e-3
+    moved = rereferenced(result, 1.0)
+    assert float(moved["shift_factor"].sel(velocity=1.0)) == 0
+    assert moved["second_factor"].identical(result["second_factor"])
+    again = moved["point_abscissa"] / 10 ** moved["point_shift"]
+    np.testing.assert_allclose(np.unique(again.round(6)), np.unique(two_groups()["force"].round(6)), rtol=1e-5)
+
+
+def test_vertical_factors_of_two_groups_are_sums_too():
+    """Friction that rises by 1 % a kelvin besides: points taken back by both sums are those of the table."""
+    table = two_groups()
+    table["mu"] *= 1.01 ** (table["temperature"] - 300)
+    result = master_curve(table, vertical=True)
+    truth = -np.log10(1.01) * (result["temperature"] - 300)
+    bars = 4 * result["second_vertical_factor_error"] + 1e-9
+    assert np.all(np.abs(result["second_vertical_factor"] - truth) < bars)
+    assert np.all(np.abs(result["vertical_factor"]) < 4 * result["vertical_factor_error"] + 1e-9)
+    for curve in (result, rereferenced(result, 1.0)):
+        mu = curve["point_ordinate"] / 10 ** curve["point_rise"]
+        np.testing.assert_allclose(np.sort(mu), np.sort(table["mu"]), rtol=1e-9)
+
+
+def plateau(temperatures, points, noise=0.005):
+    """Modulus over frequency that runs into a plateau; neighbours of ten kelvin lie 1.4 decades apart."""
+    random, rows = np.random.default_rng(0), []
+    for kelvin in temperatures:
+        frequency = np.geomspace(0.1, 10, points)
+        modulus = 1 / (1 + frequency * 10 ** (0.14 * (kelvin - 300.0)))
+        rows.extend((f, m, kelvin) for f, m in zip(frequency, modulus, strict=True))
+    table = pd.DataFrame(rows, columns=["frequency", "modulus", "temperature"])
+    return table.assign(modulus=table["modulus"] * (1 + noise * random.standard_normal(len(table))))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_rows_without_a_finite_number_are_counted(bad):
+    table = plateau(np.arange(290.0, 340.0, 10), 12)
+    table.loc[[3, 20], "modulus"] = bad
+    table.loc[40, "frequency"] = np.nan
+    whole = master_curve(table)
+    assert whole.sizes["point"] == len(table) - 3
+    assert whole.attrs["left_out"] == (
+        "3 of 60 rows are left out, which have no finite number: 'frequency' in 1, 'modulus' in 2"
+    )
+    assert master_curve(plateau(np.arange(290.0, 340.0, 10), 12)).attrs["left_out"] == ""
+
+
+@pytest.mark.parametrize(
+    "temperatures", [[300.0, 310.0, 320.0, 330.0], [300.0, 310.0, 350.0], [300.0, 304.0, 330.0, 331.0]]
+)
+def test_two_points_a_curve_are_groups_of_their_own(temperatures):
+    """Set temperatures that occur twice each are no scatter about one, however they are spaced."""
+    table = plateau(temperatures, 2)
+    assert master_curve(table, reference=temperatures[1])["temperature"].to_numpy().tolist() == temperatures
+
+
+def test_what_a_plateau_does_not_tell_is_said():
+    table = plateau(np.arange(230.0, 351.0, 10), 15)
+    curve = master_curve(table, reference=300.0)
+    assert curve.attrs["undetermined"].startswith("not determined between 230 and ")
+    truth = 0.14 * (curve["temperature"] - 300)
+    assert np.all((curve["shift_factor_low"] <= truth) & (truth <= curve["shift_factor_high"]))
+    told = master_curve(plateau(np.arange(300.0, 351.0, 10), 15))
+    assert told.attrs["undetermined"] == ""

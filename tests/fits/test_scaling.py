@@ -1,0 +1,153 @@
+"""Growth and slope of the contact, and the collapse of curves: planted truths, wrong laws, and the model itself."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from friction_store import store
+
+from mdr_dask.errors import FitError
+from mdr_dask.fits.friction import numbers
+from mdr_dask.fits.scaling import FITS, contact_slope_law
+from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
+
+FIT = {fit.name: fit for fit in FITS}
+LEAST = 0.92
+G, RMS, LENGTH, TAU, SLOPE, POINTS = 1e7, 5e-7, 0.02, 1e-3, 0.1, 400
+LINES = pytest.mark.parametrize("lines", [5, 10, 30])
+
+
+def planted(axes, lines, studies, hurst=0.5, **outputs):
+    """Return studies whose outputs are functions of force number and velocity number, that lines scatter about."""
+    rng = np.random.default_rng(12)
+    base = {"shear_modulus": G, "rms_roughness": RMS, "length": LENGTH, "relaxation_time": TAU, "points": POINTS}
+    coords = base | {"hurst": hurst, "normal_force": 1.0, "velocity": 1e-6} | axes
+    data = xr.Dataset(coords={name: (name, value) if np.ndim(value) else value for name, value in coords.items()})
+    force = laws.force_number(data.normal_force, G, RMS, LENGTH)
+    velocity = laws.velocity_number(data.velocity, TAU, SLOPE, RMS)
+    force, velocity = xr.broadcast(force, velocity)
+    shape = (studies, *force.shape, lines)
+    for name, law in outputs.items():
+        shared = 0.05 * rng.standard_normal((studies, *(1 for _ in force.shape), lines))
+        scatter = 1 + shared + 0.03 * rng.standard_normal(shape)
+        data[name] = (("study", *force.dims, "realisation"), np.asarray(law(force, velocity))[..., None] * scatter)
+    data["rms_slope"] = xr.full_like(data[next(iter(outputs))], SLOPE)
+    return data
+
+
+def coverage(found, name, truth):
+    return float(((found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])).mean())
+
+
+def judged(found, verdict):
+    return float(found["law_holds"].str.startswith(verdict).mean())
+
+
+LOADS = {"normal_force": np.geomspace(1e-3, 3e-2, 8)}
+
+
+@LINES
+def test_growth_of_the_contact(lines):
+    data = planted(LOADS, lines, 300, contact_fraction=lambda force, _: 0.3 * force**0.6)
+    found = FIT["contact_growth"].compute({"": data})
+    assert coverage(found, "exponent", 0.6) >= LEAST
+    assert coverage(found, "factor", 0.3) >= LEAST
+    assert judged(found, "yes") >= LEAST
+    data = planted(LOADS, lines, 10, contact_fraction=lambda force, _: 0.3 * force**0.6 * (1 + (force > 0.05)))
+    found = FIT["contact_growth"].compute({"": data})
+    assert judged(found, "no: departs") == 1
+    assert np.all(found["exponent_high"] - found["exponent_low"] > 0.1)
+
+
+@pytest.mark.parametrize("hurst", [0.0, 0.5, 0.9, 1.0])
+def test_slope_in_contact_by_its_integral(hurst):
+    """Eq. 3.21 as a sum over the waves of a line that are shorter than the contact."""
+    amplitude = roughness.amplitudes(2000, hurst)
+    slope = roughness.spectral_slope(amplitude)
+    for fraction in (1.0, 0.3, 0.03):
+        part = np.where(np.arange(1, 2001) * fraction >= 1, amplitude, 0.0)
+        # integral and sum differ at their lower ends: one wave of few for H = 1
+        expected = roughness.spectral_slope(part) / slope
+        assert contact_slope_law(np.array(fraction), hurst, 4000) == pytest.approx(expected, abs=0.05)
+    assert np.isnan(contact_slope_law(np.array(1e-4), hurst, 4000))
+
+
+@LINES
+def test_slope_in_contact(lines):
+    def fraction(force, _):
+        return 0.5 * force**0.6
+
+    def slope(force, _):
+        return 0.9 * SLOPE * contact_slope_law(fraction(force, _), 0.9, POINTS)
+
+    data = planted(LOADS, lines, 300, 0.9, contact_fraction=fraction, contact_slope=slope)
+    found = FIT["contact_slope"].compute({"": data})
+    assert coverage(found, "factor", 0.9) >= LEAST
+    assert coverage(found, "power", 1.0) >= LEAST
+    assert judged(found, "yes") >= LEAST
+    data = planted(LOADS, lines, 10, 0.9, contact_fraction=fraction, contact_slope=lambda force, _: SLOPE * force**0.2)
+    found = FIT["contact_slope"].compute({"": data})
+    assert judged(found, "no: departs") == 1
+    assert np.all(found["factor_high"] - found["factor_low"] > 0.1)
+
+
+CURVES = {"normal_force": np.geomspace(0.01, 10, 4), "velocity": np.geomspace(1e-7, 1e-1, 19)}
+RIGHT, UP = 0.7, 0.2  # powers of the load by which the curves are shifted
+
+
+def scaled(force, velocity):
+    """Return eq. 3.22 with a form that is none of the program's laws."""
+    x = velocity * 300 / force**RIGHT
+    return force**UP * x / (1 + x**0.7) ** (1 / 0.7)
+
+
+@LINES
+def test_curves_collapse_and_tell_their_shifts(lines):
+    found = FIT["collapse"].compute({"": planted(CURVES, lines, 150, friction_coefficient=scaled)})
+    decades = np.log10(found["force_number"] / found["force_number"].isel(curve=2))
+    assert coverage(found, "horizontal", -RIGHT * decades) >= LEAST
+    assert coverage(found, "vertical", -UP * decades) >= LEAST
+    assert judged(found, "yes") == 1
+    assert np.all(found["collapsed"] > 0.99)
+
+
+@LINES
+def test_curves_of_different_form_do_not_collapse(lines):
+    def different(force, velocity):
+        x = velocity * 300
+        return x / (1 + x ** (0.2 + 2 * (force > 1))) ** (1 / (0.2 + 2 * (force > 1)))
+
+    found = FIT["collapse"].compute({"": planted(CURVES, lines, 5, friction_coefficient=different)})
+    assert judged(found, "no: departs") == 1
+
+
+def test_straight_curves_have_no_shifts_that_are_told_apart():
+    found = FIT["collapse"].compute({"": planted(CURVES, 10, 2, friction_coefficient=lambda force, v: force**-0.3 * v)})
+    assert np.all(np.isnan(found["horizontal_low"]))
+    assert np.all(np.isnan(found["vertical_high"]))
+    assert np.all(np.isfinite(found["horizontal"]))
+
+
+def test_the_model_follows_its_statics():
+    axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(0.01, 0.3, 6) * 0.1, "velocity": [1e-7, 1e-6]}
+    outputs = ("friction_coefficient", "contact_fraction", "contact_slope", "rms_slope")
+    data = store(axes, realisations=12, outputs=outputs, points=2000)
+    found = FIT["contact_growth"].compute({"": data})
+    assert np.all(np.abs(found["exponent"] - found["exponent_stated"]) < 0.06)
+    # eq. 3.12 is exact where nothing flies: at the lowest velocity
+    assert found["mu_over_law"].values == pytest.approx(1.0, abs=0.01)
+    assert np.all((found["slope_in_contact"] > 0.7) & (found["slope_in_contact"] < 1.1))
+    wide = FIT["contact_slope"].compute({"": data})
+    assert np.all(np.isfinite(wide["factor"]))
+    assert numbers(data)[1].size == 6
+
+
+def test_what_cannot_be_fitted_says_why():
+    data = planted(LOADS, 5, 1, contact_fraction=lambda force, _: 0.3 * force**0.6).isel(study=0)
+    with pytest.raises(FitError, match="contact_slope"):
+        FIT["contact_slope"].compute({"": data})
+    with pytest.raises(FitError, match="expected three loads"):
+        FIT["contact_growth"].compute({"": data.isel(normal_force=slice(2))})
+    curves = planted(CURVES, 5, 1, friction_coefficient=scaled)
+    with pytest.raises(FitError, match="expected two loads"):
+        FIT["collapse"].compute({"": curves.isel(normal_force=[0])})

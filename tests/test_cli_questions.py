@@ -1,0 +1,151 @@
+"""show and aggregate in every form: the same rows, whatever they are written as; bounded memory and one sentence."""
+
+import csv
+import io
+import json
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from planted import SLIDING, make
+
+from mdr_dask.cli import main
+
+ASKED = ("friction_coefficient", "--where", "velocity > 5 mm/s", "--sort", "-friction_coefficient")
+COLUMNS = ["normal_force", "velocity", "friction_coefficient_mean", "friction_coefficient_standard_error"]
+COLUMNS += ["friction_coefficient_grid_error", "realisations", "status"]
+FORCES = "  normal_force: [0.1 N, 1 N, 10 N]\n  velocity: {geometric: [1 mm/s, 1 m/s, 7]}\n"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """A planted study in which the first case and the last result failed."""
+    folder = tmp_path_factory.mktemp("questions")
+    make(folder, SLIDING + FORCES, failed=True)
+    return str(folder / "study.zarr")
+
+
+@pytest.fixture
+def expected(study):
+    data = xr.open_zarr(study)
+    mean = data.friction_coefficient.mean("realisation").to_series().rename("mean").reset_index()
+    kept = mean[mean.velocity > 5e-3].sort_values("mean", ascending=False, na_position="last")
+    return kept.to_numpy()
+
+
+def told(capsys, *arguments):
+    assert main([*arguments]) == 0
+    return capsys.readouterr()
+
+
+def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
+    frames = {}
+    frames["csv"] = pd.read_csv(io.StringIO(told(capsys, "show", study, *ASKED, "--csv").out))
+    frames["csv"].columns = [title.partition(" [")[0] for title in frames["csv"]]
+    document = json.loads(told(capsys, "show", study, *ASKED, "--json").out)
+    assert document["units"]["velocity"] == "m/s"
+    frames["json"] = pd.DataFrame(document["rows"])
+    lines = told(capsys, "show", study, *ASKED, "--jsonl").out.splitlines()
+    frames["jsonl"] = pd.DataFrame([json.loads(line) for line in lines])
+    for suffix in ("csv", "json", "jsonl", "parquet"):
+        path = tmp_path / f"rows.{suffix}"
+        assert told(capsys, "show", study, *ASKED, "-o", str(path)).out.startswith(f"{path}: {len(expected)} rows of ")
+    assert (tmp_path / "rows.csv").read_text() == told(capsys, "show", study, *ASKED, "--csv").out
+    assert json.loads((tmp_path / "rows.json").read_text()) == document
+    assert (tmp_path / "rows.jsonl").read_text().splitlines() == lines
+    frames["parquet"] = pd.read_parquet(tmp_path / "rows.parquet")
+    for form, frame in frames.items():
+        assert list(frame) == COLUMNS, form
+        np.testing.assert_array_equal(frame[COLUMNS[:3]].to_numpy(dtype=float), expected, err_msg=form)
+        assert frame["status"].value_counts().to_dict() == {"done": len(frame) - 1, "1 failed": 1}, form
+    import pyarrow.parquet
+
+    assert pyarrow.parquet.read_schema(tmp_path / "rows.parquet").field("velocity").metadata[b"units"] == b"m/s"
+
+
+def test_a_table_for_a_reader_is_cut_and_says_by_how_much(study, expected, capsys):
+    streams = told(capsys, "show", study, *ASKED, "--limit", "3")
+    lines = streams.out.splitlines()
+    assert lines[0].split() == [
+        "normal_force",
+        "[N]",
+        "velocity",
+        "[m/s]",
+        "friction_coefficient",
+        "realisations",
+        "status",
+    ]
+    assert [float(line.split()[0]) for line in lines[1:]] == expected[:3, 0].tolist()
+    assert all(" +- " in line and line.endswith("done") for line in lines[1:])
+    assert streams.err == f"... {len(expected) - 3} more rows (--limit 0 prints all)\n"
+    whole = told(capsys, "show", study, *ASKED, "--limit", "0")
+    assert len(whole.out.splitlines()) == len(expected) + 1
+    assert not whole.err
+    assert told(capsys, "show", study, "--limit", "4").err == "... 17 more rows (--limit 0 prints all)\n"
+    assert told(capsys, "show", study, "--where", "velocity > 1 mm/s", "--limit", "4").err.startswith("... more rows")
+    none = told(capsys, "show", study, "--where", "velocity > 1 km/s")
+    assert (len(none.out.splitlines()), none.err) == (1, "no rows\n")
+
+
+def test_single_results_tell_what_became_of_them(study, capsys):
+    out = told(capsys, "show", study, "rms_slope", "--realisations", "--csv").out
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert len(rows) == 84
+    assert {(row["status"], row["rms_slope"] == "nan") for row in rows} == {("done", False), ("failed", True)}
+
+
+def test_aggregates_are_brief_for_a_reader_and_complete_for_a_program(study, capsys):
+    head, *rows = told(
+        capsys, "aggregate", study, "friction_coefficient", "--group-by", "normal_force"
+    ).out.splitlines()
+    assert "friction_coefficient_standard_deviation" in head
+    assert len(rows) == 3
+    assert all("(" in row for row in rows)
+    titles = told(capsys, "aggregate", study, "friction_coefficient", "--csv").out.splitlines()[0].split(",")
+    assert {"friction_coefficient_low", "friction_coefficient_quantile_0.05", "friction_coefficient_count"} <= {*titles}
+
+
+def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys):
+    path = tmp_path / "answer.nc"
+    arguments = [
+        "--columns",
+        "load_number,friction_coefficient",
+        "--units",
+        "velocity=km/h",
+        "--where",
+        "velocity > 5 mm/s",
+    ]
+    assert "variables over" in told(capsys, "show", study, *arguments, "-o", str(path)).out
+    with xr.open_dataset(path, engine="scipy") as found:
+        assert found.velocity.attrs["units"] == "km/h"
+        assert found.load_number.dims == ("normal_force",)
+        assert found.friction_coefficient_mean.isnull().sum() == 3 * 2
+        assert found.state_counts.sel(state="failed").sum() == 1
+
+
+def test_a_study_with_series_says_which_there_are(tmp_path, capsys):
+    make(
+        tmp_path,
+        SLIDING + "  normal_force: 1 N\n  velocity: 1 m/s\nseries:\n  a: {hurst: [0.3, 0.7]}\n  b: {hurst: [1]}\n",
+    )
+    store = str(tmp_path / "study.zarr")
+    for command in ("show", "aggregate"):
+        assert main([command, store]) == 2
+        assert capsys.readouterr().err == "this study has series, choose one: --series with one of a, b\n"
+    assert len(told(capsys, "show", store, "--series", "a").out.splitlines()) == 3
+
+
+def test_without_pyarrow_parquet_is_one_sentence_and_no_file(study, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    path = tmp_path / "rows.parquet"
+    assert main(["show", study, "-o", str(path)]) == 2
+    assert capsys.readouterr().err == "writing .parquet needs pyarrow: pip install 'mdr_dask[parquet]'\n"
+    assert not path.exists()
+
+
+def test_numbers_of_a_model_are_listed(capsys):
+    assert "normal_force / (shear_modulus * rms_roughness * length)" in told(capsys, "models", "sliding_friction").out
+    document = json.loads(told(capsys, "models", "ehl_line", "--json").out)
+    assert "speed_parameter" in [number["number"] for number in document["numbers"]]
