@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -271,10 +273,14 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
 
 
 def available_memory() -> float:
-    """Return the memory of this machine (or of the limit it was given) in bytes."""
-    from distributed.system import MEMORY_LIMIT
+    """Return the memory of this machine, or of the limit that its control group was given, in bytes."""
+    import psutil
 
-    return float(MEMORY_LIMIT)
+    limits = [psutil.virtual_memory().total]
+    for path in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):  # no such group, or no limit
+            limits.append(int(Path(path).read_text()))
+    return float(min(limits))
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:

@@ -202,10 +202,15 @@ def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
     headings: list[tuple[Cell, ...]] = []
     if not any(_NUMBER.match(cell.text) for cell in rows[0]):
         headings.append(rows.pop(0))
-        if rows and _are_units(rows[0], numeric):
+        if rows and _are_units(rows[0], numeric) and not _are_names_again(headings[0], rows[0]):
             headings.append(rows.pop(0))
     if not rows:
         raise TableError(source, [Problem(1, 1, NO_ROWS)])
+    words = [row for row in rows if numeric and headings and not any(map(_is_entry, row))]
+    if words:
+        raise TableError(
+            source, [row[0].problem(f"expected a line of numbers, got {row[0].text[:60]!r}, ...") for row in words]
+        )
     return Sheet(source, *_units(headings, width), tuple(rows))
 
 
@@ -223,7 +228,7 @@ def numbers(sheet: Sheet) -> FloatArray:
         cell.problem(f"expected a number, got {cell.text[:60]!r}")
         for row in sheet.rows
         for cell in row
-        if not _NUMBER.match(cell.text) and cell.text.lower() not in _MISSING
+        if not _is_entry(cell)
     ]
     if problems:
         raise TableError(sheet.source, problems)
@@ -249,6 +254,15 @@ def described(text: str, source: str) -> str:
         ends = [f"{end:.4g}" for end in (known.min(), known.max())] if known.size else ["nothing"]
         ranges.append(" ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit.strip("-1")])))
     return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
+
+
+def _is_entry(cell: Cell) -> bool:
+    """Return whether a cell holds a number, or says that one is missing."""
+    return bool(_NUMBER.match(cell.text)) or cell.text.lower() in _MISSING
+
+
+def _are_names_again(names: tuple[Cell, ...], row: tuple[Cell, ...]) -> bool:
+    return [cell.text for cell in names] == [cell.text for cell in row]
 
 
 def _are_units(row: tuple[Cell, ...], numeric: bool) -> bool:

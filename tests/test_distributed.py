@@ -1,19 +1,23 @@
 """Worker processes: what dies with them, and what does not."""
 
+import os
+import platform
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import dask
-import distributed  # noqa: F401  (brings its configuration, which the fixture changes)
 import numpy as np
+import psutil
 import pytest
+from distributed import Client
 from test_execute import digests, run, values
 
 from mdr_dask import execute, store, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters
+from mdr_dask.execute import Resources, clusters, executors
+from mdr_dask.models.base import Status
 
 
 @pytest.fixture
@@ -110,3 +114,81 @@ def test_a_cluster_that_cannot_be_started_is_named(toy, url, name):
     resources = Resources(cluster={"class": name, "arguments": {"no_such": 1}})
     with pytest.raises(ClusterError, match=f"cannot start '{name}'"):
         run_on(resources, campaign, url)
+
+
+@pytest.mark.slow
+def test_a_worker_that_does_not_see_the_store_is_told_apart_and_relative_paths_are_seen(
+    toy, tmp_path, workers, monkeypatch
+):
+    """A path by way of this process's own files is another one to a worker."""
+    campaign = toy.campaign(toy.axis("position", [1.0, 2.0]))
+    (tmp_path / "here").mkdir()
+    elsewhere = f"import os; os.chdir({str(tmp_path)!r})\n"
+    workers.cluster["arguments"]["preload"].append(elsewhere)
+    monkeypatch.chdir(tmp_path / "here")
+    assert run_on(workers, campaign, "study.zarr").done == 12
+    folder = os.open(tmp_path, os.O_RDONLY)
+    try:
+        url = f"/proc/self/fd/{folder}/unseen.zarr"
+        sentence = rf"{url}: not seen from {platform.node()}; the workers need a shared file system or a URL"
+        with pytest.raises(StoreError, match=sentence):
+            run_on(workers, campaign, url)
+    finally:
+        os.close(folder)
+    assert not list(tmp_path.glob("study.zarr"))
+
+
+@pytest.mark.slow
+def test_a_client_without_the_credentials_is_refused_and_no_page_is_served_to_others(toy, url, workers):
+    addresses, pages = [], []
+
+    def look(event):
+        if event.name == "block begun":
+            addresses.append(event.facts["worker"])
+            pages.extend(listening_beyond_this_machine())
+            for address in (event.facts["worker"], event.facts["worker"].replace("tls", "tcp")):
+                with pytest.raises((OSError, TypeError, ValueError)):
+                    Client(address, timeout=2)
+
+    execute.run(toy.campaign(toy.axis("position", [1.0])), url, workers, lambda _: None, tell=look)
+    assert [address[:16] for address in addresses] == ["tls://127.0.0.1:"]
+    assert pages == []
+
+
+def listening_beyond_this_machine() -> list[str]:
+    """Return the addresses, other than those of this machine alone, at which this process listens."""
+    return [
+        str(each.laddr)
+        for each in psutil.Process().net_connections("inet")
+        if each.status == psutil.CONN_LISTEN and each.laddr.ip not in ("127.0.0.1", "::1")
+    ]
+
+
+@pytest.mark.parametrize("name", ["os.system", "distributed.Client", "pathlib.Path"])
+def test_nothing_but_a_dask_cluster_is_called(toy, url, tmp_path, name):
+    ran = tmp_path / "ran"
+    resources = Resources(cluster={"class": name, "arguments": {"command": f"touch {ran}"}})
+    with pytest.raises(ClusterError, match=rf"cannot start '{name}': expected a class of Dask clusters"):
+        run_on(resources, toy.campaign(toy.axis("position", [1.0])), url)
+    assert not ran.exists()
+
+
+@pytest.mark.parametrize("retry", [False, True], ids=["first attempt", "retry of failures"])
+def test_a_block_whose_worker_died_untold_is_found_in_the_ledger(toy, url, retry, monkeypatch):
+    """The same task again, as the scheduler would send it to another worker."""
+    campaign = toy.campaign(toy.axis("position", [1.0, 3.0]), fail_above=2.0)
+    if retry:
+        run(campaign, url)
+    sent = []
+    monkeypatch.setattr(executors, "run_block", lambda work: sent.append(work) or task.run_block(work))
+    run(campaign, url, retry_failed=retry)
+    (work,) = sent
+    toy.COMPUTED.clear()
+    again = task.finished(work)
+    assert again is not None
+    assert sum(again.counts) == work.wanted.sum()
+    assert again.counts[Status.FAILED] == 6
+    assert toy.COMPUTED == []
+    assert task.finished(replace(work, attempt=work.attempt + 1)) is None
+    (Path(url) / "status/c/0/0").unlink()  # a record, and no ledger yet
+    assert task.finished(work) is None

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 #: Longest list of values that is shown in full.
 LISTED = 6
 #: Seconds that a run takes to start and to end, whatever is in it.
-START = 1.5
+START = 2.0
 
 
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from importlib import import_module
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import dask
@@ -58,9 +60,9 @@ def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
     """
     word = _LastWord(logging.ERROR)
     with ExitStack() as stack:
-        for names, handler in ((STARTING, word), (ECHOES, logging.NullHandler())):
-            for name in names:
-                stack.enter_context(_taken(logging.getLogger(name), handler))
+        for names, handler in ((ECHOES, logging.NullHandler()), (STARTING, word)):
+            for logger in _loggers(names):
+                stack.enter_context(_taken(logger, handler))
         again = _nothing
         if resources.scheduler is not None:
             tell(Event("connecting", {"scheduler": resources.scheduler}))
@@ -79,6 +81,12 @@ def crew(resources: Resources, tell: Tell) -> Iterator[Crew]:
 
 def _nothing() -> None:
     """Leave a cluster to itself."""
+
+
+def _loggers(names: tuple[str, ...]) -> list[logging.Logger]:
+    """Return loggers and those below them, which Dask gives handlers of their own."""
+    below = [known for known in logging.root.manager.loggerDict for name in names if known.startswith(f"{name}.")]
+    return [logging.getLogger(name) for name in (*names, *below)]
 
 
 @contextmanager
@@ -108,17 +116,23 @@ def _local(workers: int | None) -> dict[str, Any]:
     return {"class": "distributed.LocalCluster", "arguments": arguments}
 
 
-def _started(plan: Mapping[str, Any]) -> Cluster:
+@contextmanager
+def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
     kind = _cluster_class(plan["class"])
-    try:
-        cluster = kind(**_closed_to_others(kind, plan.get("arguments", {})))
-        if "scale" in plan:
-            cluster.scale(**plan["scale"])
-        if "adapt" in plan:
-            cluster.adapt(**{"target_duration": TARGET_DURATION, **plan["adapt"]})
-    except (ImportError, AttributeError, TypeError, ValueError, OSError, RuntimeError) as error:
-        raise ClusterError(f"cannot start {plan['class']!r}: {type(error).__name__}: {error}") from None
-    return cluster
+    with ExitStack() as stack:
+        try:
+            cluster = kind(**_closed_to_others(kind, plan.get("arguments", {}), stack))
+            if "scale" in plan:
+                cluster.scale(**plan["scale"])
+            if "adapt" in plan:
+                cluster.adapt(**{"target_duration": TARGET_DURATION, **plan["adapt"]})
+        except (ImportError, AttributeError, TypeError, ValueError, OSError, RuntimeError) as error:
+            raise ClusterError(f"cannot start {plan['class']!r}: {type(error).__name__}: {error}") from None
+        try:
+            yield cluster
+        finally:
+            with suppress(AssertionError, OSError, RuntimeError, TimeoutError):  # of workers that were never started
+                cluster.close()
 
 
 def _cluster_class(name: str) -> type[Cluster]:
@@ -133,17 +147,20 @@ def _cluster_class(name: str) -> type[Cluster]:
     return found
 
 
-def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any]) -> dict[str, Any]:
+def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: ExitStack) -> dict[str, Any]:
     """Add to the arguments what keeps other users out, unless they say otherwise: TLS, and a page for here alone."""
-    local, queue = issubclass(kind, LocalCluster), hasattr(kind, "job_cls")
     own = dict(arguments)
-    if local:
-        own = {"dashboard_address": DASHBOARD, **own}
-    if queue:
+    if issubclass(kind, LocalCluster):
+        own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
+    elif hasattr(kind, "job_cls"):  # jobs of a queue: they find the keys of their connection in a folder
+        folder = TemporaryDirectory(prefix=".mdr-dask-keys-", dir=".", ignore_cleanup_errors=True)
+        own = {"shared_temp_directory": str(Path(stack.enter_context(folder)).absolute()), **own}
         own["scheduler_options"] = {"dashboard_address": DASHBOARD, **own.get("scheduler_options", {})}
-    if (local or queue) and own.setdefault("security", True) is True:
+    else:
+        return own
+    if own.setdefault("security", True) is True:
         own["security"] = Security.temporary()
-    if own.get("security") is False:
+    if own["security"] is False:
         del own["security"]
     return own
 

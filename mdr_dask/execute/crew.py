@@ -22,7 +22,7 @@ from mdr_dask.task import Outcome, Work, write_off
 #: Seconds between two looks at the cluster.
 LOOK = 1.0
 #: Seconds after which a user is told that there is no worker, and between two such words.
-SILENCE = 4.0
+SILENCE = 3.0
 #: Seconds that a scheduler is given for a short answer.
 ANSWER = 5.0
 KEPT = "what is in the store is kept: run the campaign again"
@@ -130,6 +130,8 @@ class Crew:
             self._had_workers = True
             return
         waited, complaint = now - self._seen, self._last_word()
+        if complaint and not self._had_workers:
+            raise ClusterError(f"the cluster starts no worker: {complaint}")
         why = f" ({complaint})" if complaint else ""
         if waited > self._patience:
             raise ClusterError(f"{what} for {waited:.0f} s{why}; {KEPT}, with more --patience if need be")

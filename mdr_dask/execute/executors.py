@@ -29,7 +29,7 @@ Execute = Callable[[Iterable[Work], Settle], None]
 @contextmanager
 def executor(resources: Resources, tell: Tell) -> Iterator[Execute]:
     """Yield the function that runs tasks on the resources named."""
-    if resources.workers is None and resources.scheduler is None and resources.cluster is None:
+    if not resources.remote:
         yield partial(_run_threads, resources.threads or _cores(), tell)
         return
     from mdr_dask.execute.clusters import crew

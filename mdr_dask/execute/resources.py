@@ -30,3 +30,8 @@ class Resources:
     scheduler: str | None = None
     cluster: Mapping[str, Any] | None = None
     patience: float = 600.0
+
+    @property
+    def remote(self) -> bool:
+        """Whether blocks are run by other processes than this one."""
+        return not (self.workers is None and self.scheduler is None and self.cluster is None)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mdr_dask import store
 from mdr_dask.campaign import Campaign
+from mdr_dask.errors import StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
 from mdr_dask.execute.executors import Execute, executor
@@ -34,6 +35,7 @@ class _Job:
 
     campaign: Campaign
     url: str
+    resources: Resources
     part: Part | None
     retry_failed: bool
     report: Callable[[Progress], None]
@@ -96,7 +98,7 @@ def run(
     """
     _plan(campaign, url)  # what is refused leaves no lock behind
     with store.alone(url) if part is None else store.beside(url, part):
-        job = _Job(campaign, url, part, retry_failed, report, tell)
+        job = _Job(campaign, url, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
             return _run_rounds(job, execute)
 
@@ -148,6 +150,8 @@ def _run_rounds(job: _Job, execute: Execute) -> Progress:
         progress = _begin_round(progress, groups)
         job.report(progress)
         execute(tasks(job.url, groups), settle)
+        if job.resources.remote:
+            _verify(job, current)
         job.tell(Event("round ended", {"realisations": count, "done": progress.done, "failed": progress.failed}))
         if job.part and count < job.campaign.replication.at_most and not _others_are_done(job, job.part, current):
             break
@@ -179,6 +183,15 @@ def _find(job: _Job, current: _Round) -> list[Cells]:
         find_cells(job.url, template, asked, needed, current.realisations, job.retry_failed, own_here)
         for template, asked, needed, own_here in zip(current.layout, current.asked, current.needed, own, strict=True)
     ]
+
+
+def _verify(job: _Job, current: _Round) -> None:
+    """See whether everything that workers wrote has come into the store that is seen from here."""
+    lost = sum(cells.new for cells in _find(replace(job, retry_failed=False), current))
+    if lost:
+        where = "the workers need a shared file system or a URL"
+        raise StoreError(f"{job.url}: {lost} results that workers wrote are not seen from here; {where}")
+    job.tell(Event("verified", {"realisations": current.realisations[1]}))
 
 
 def _others_are_done(job: _Job, part: Part, current: _Round) -> bool:

@@ -130,6 +130,10 @@ def unit_of(parameters: type[BaseModel], name: str) -> str | None:
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
+#: Bytes of a file beyond which it is no table to tell of.
+LARGEST_TABLE = 10**7
+
+
 class DataFile(BaseModel):
     """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
 
@@ -137,6 +141,13 @@ class DataFile(BaseModel):
     name: str
     path: str
     sha256: str
+
+    def read_bytes(self) -> bytes:
+        """Return the file's content; DataError if it has changed since the campaign was read."""
+        content = Path(self.path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != self.sha256:
+            raise DataError(f"{self.path}: changed since the campaign was read")
+        return content
 
     def read_text(self) -> str:
         """Return the file's text.
@@ -146,9 +157,7 @@ class DataFile(BaseModel):
         DataError
             If the file has changed since the campaign was read, or is no text in UTF-8.
         """
-        content = Path(self.path).read_bytes()
-        if hashlib.sha256(content).hexdigest() != self.sha256:
-            raise DataError(f"{self.path}: changed since the campaign was read")
+        content = self.read_bytes()
         try:
             return content.decode("utf-8-sig")
         except UnicodeDecodeError as error:
@@ -158,7 +167,7 @@ class DataFile(BaseModel):
 
     def notes(self) -> tuple[str, ...]:
         """Return columns and ranges of a table, as it has them; nothing of any other file."""
-        return _notes_of_file(self)
+        return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
 
 
 @lru_cache(maxsize=64)

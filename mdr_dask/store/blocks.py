@@ -104,13 +104,17 @@ def _records(series: str) -> str:
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing."""
+    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing.
+
+    Another part may have grown it beyond the shape meanwhile.
+    """
     found = np.full(shape, Status.MISSING, dtype=np.int8)
     if read_json(url, group_name(series, "zarr.json")) is None:
         return found
     with guarded(url, "reading status"):
         status = _open(url, series)["status"]
-        found[tuple(map(slice, status.shape))] = status[...]
+        common = tuple(map(slice, np.minimum(shape, status.shape)))
+        found[common] = status[common]
     return found
 
 

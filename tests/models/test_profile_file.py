@@ -107,7 +107,7 @@ def test_files_of_instruments_are_read_by_surface_topography(tmp_path):
     bare = line_of(ProfileFile.model_validate({"file": str(tmp_path / "bare.nc"), "unit": "mm"}))
     assert bare.length == pytest.approx(64e-3)
     topography.Topography(np.outer(height, height), (64.0, 64.0), unit="um").to_netcdf(str(tmp_path / "map.nc"))
-    with pytest.raises(DataError, match="expected a line scan, got a map of 64 x 64 points: save one of its lines"):
+    with pytest.raises(DataError, match="expected a line scan, got a map of 64 x 64 points: name it by surface"):
         line_of(ProfileFile.model_validate(str(tmp_path / "map.nc")))
     (tmp_path / "noise.nc").write_bytes(b"nothing" * 10)
     with pytest.raises(DataError, match=r"noise.nc: SurfaceTopography cannot read it"):

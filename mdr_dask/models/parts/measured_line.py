@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import hashlib
 from functools import lru_cache
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, ValidationInfo, model_validator
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import NamedFile, quantity
+from mdr_dask.models.base import DataFile, NamedFile, quantity
 from mdr_dask.models.parts.named_by_file import NamedByFile
+from mdr_dask.models.parts.topography import TEXT, topography
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import shown, to_si
+from mdr_dask.units import shown
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.measured import MeasuredLine
-
-TEXT = (".csv", ".txt", ".dat", ".xyz", ".asc", ".tsv")
 
 
 class ProfileFile(NamedByFile):
@@ -73,46 +71,38 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     """
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    x, z = _columns(profile) if profile.file.name.lower().endswith(TEXT) else _topography(profile)
+    x, z = recorded(profile.file, profile.unit)
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
     return measured_line(x, z, profile.detrend, profile.taper, *band)
 
 
-def _columns(profile: ProfileFile) -> tuple[Any, Any]:
+def recorded(file: DataFile, unit: str) -> tuple[FloatArray, FloatArray]:
+    """Return positions and heights of a line, m, as they were recorded.
+
+    Parameters
+    ----------
+    file : DataFile
+        Table of x and z, or a file that SurfaceTopography reads.
+    unit : str
+        Unit of both, where the file does not say.
+
+    Raises
+    ------
+    DataError
+        If the file does not hold a line.
+    """
+    if not file.name.lower().endswith(TEXT):
+        line, metre = topography(file, unit)
+        if line.dim != 1:
+            raise DataError(
+                f"{file.name}: expected a line scan, got a map of {' x '.join(map(str, line.nb_grid_pts))} points: "
+                "name it by surface: {map: ...}"
+            )
+        x, z = line.positions_and_heights()
+        return x * metre, z * metre
     columns = (
-        Column("x", "m", ("position", "distance", "length", "X"), given_unit=profile.unit),
-        Column("z", "m", ("height", "h", "y", "profile"), given_unit=profile.unit),
+        Column("x", "m", ("position", "distance", "length", "X"), given_unit=unit),
+        Column("z", "m", ("height", "h", "y", "profile"), given_unit=unit),
     )
-    table = read_table(profile.file.read_text(), profile.file.name, columns)
+    table = read_table(file.read_text(), file.name, columns)
     return table["x"], table["z"]
-
-
-def _topography(profile: ProfileFile) -> tuple[Any, Any]:
-    try:
-        import SurfaceTopography
-    except ImportError:
-        raise DataError(
-            f"{profile.file.name}: this format needs SurfaceTopography: pip install mdr_dask[formats]"
-        ) from None
-    if hashlib.sha256(Path(profile.file.path).read_bytes()).hexdigest() != profile.file.sha256:
-        raise DataError(f"{profile.file.path}: changed since the campaign was read")
-    try:
-        line = SurfaceTopography.read_topography(profile.file.path)
-    except Exception as problem:  # every reader of every format has errors of its own
-        reason = type(problem).__name__
-        raise DataError(f"{profile.file.name}: SurfaceTopography cannot read it: {reason}") from None
-    if line.dim != 1:
-        raise DataError(
-            f"{profile.file.name}: expected a line scan, got a map of {' x '.join(map(str, line.nb_grid_pts))} points: "
-            "save one of its lines as x, z"
-        )
-    x, z = (line if line.unit is None else line.to_unit("m")).positions_and_heights()
-    if line.unit is not None:
-        return x, z
-    if not profile.unit:
-        raise DataError(f"{profile.file.name}: does not say its unit: give `unit`, such as um")
-    try:
-        scale = to_si(f"1 {profile.unit}", "m")
-    except ValueError as error:
-        raise DataError(f"{profile.file.name}: unit: {error}") from None
-    return x * scale, z * scale

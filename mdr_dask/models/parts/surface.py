@@ -9,43 +9,22 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, NamedFile, Parameters, Ways, quantity
+from mdr_dask.models.base import DataFile, Parameters, Ways, quantity
 from mdr_dask.models.parts.measured_line import ProfileFile
-from mdr_dask.models.parts.named_by_file import NamedByFile
-from mdr_dask.tables import Column, read_table
+from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
-CUT_ERROR = 0.05  # relative, of every point of a tabulated cut
-
-
-class Files(NamedByFile):
-    """Files of one surface; a bare file name stands for them with all options at their defaults."""
-
-    files: tuple[NamedFile, ...] = Field(
-        strict=False, min_length=1, description="one file, or several of the same surface: each realisation takes one"
-    )
-
-    def spectra(self) -> tuple[Spectrum, ...]:
-        """Return the spectrum C2D of every file; DataError if one has none."""
-        raise NotImplementedError
-
-
-class SpectrumTables(Files):
-    """Tables of a spectrum: wave number or wavelength, and C2D, the C1D of the method or the C of a straight cut."""
-
-    def spectra(self) -> tuple[Spectrum, ...]:
-        """Return the spectrum C2D of every table."""
-        return tuple(map(_tabulated, self.files))
-
 
 class Surface(Parameters):
     """A measured surface, in place of a generated one."""
 
-    ways: ClassVar[tuple[Ways, ...]] = ((("spectrum",), ("profile",)),)
+    ways: ClassVar[tuple[Ways, ...]] = ((("spectrum",), ("map",), ("scan",), ("profile",)),)
     spectrum: SpectrumTables | None = Field(default=None, description="table of the spectrum")
+    map: MapFiles | None = Field(default=None, description="areal map")
+    scan: ScanFiles | None = Field(default=None, description="scan of an isotropic surface, a straight cut")
     profile: ProfileFile | None = Field(default=None, description="line that is taken as it is")
     longest_wavelength: float | None = quantity("m", "wavelength above which there is no roughness", default=None, gt=0)
     shortest_wavelength: float | None = quantity(
@@ -75,22 +54,29 @@ class Surface(Parameters):
 
     def notes(self) -> tuple[str, ...]:
         """Return range, rms height and rms gradient of the spectra."""
-        return () if self.profile is not None else tuple(map(_statistics, self.measured.files, spectra_of(self)))
+        if self.profile is not None:
+            return ()
+        told = zip(self.measured.files, self.measured.found(), spectra_of(self), strict=False)
+        return tuple(note for file, found, spectrum in told for note in _notes(self, file, found, spectrum))
 
     @property
     def measured(self) -> Files:
         """What the spectrum comes from."""
-        found: Files | None = self.spectrum
+        found: Files | None = self.spectrum or self.map or self.scan
         assert found is not None
         return found
 
 
-def _statistics(file: DataFile, spectrum: Spectrum) -> str:
+def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -> tuple[str, ...]:
     longest, shortest = spectrum.wavelengths
-    return (
-        f"surface {file.name}: waves of {shown(shortest, 'm')} to {shown(longest, 'm')}, "
+    statistics = (
+        f"waves of {shown(shortest, 'm')} to {shown(longest, 'm')}, "
         f"rms height {shown(spectrum.rms_height(), 'm')}, rms gradient {spectrum.rms_gradient():.3g}"
     )
+    noise = f"waves shorter than {shown(found.resolution, 'm')} are noise"
+    known = surface.shortest_wavelength is not None and surface.shortest_wavelength >= found.resolution
+    noisy = () if not found.resolution or known else (noise if surface.shortest_wavelength else f"{noise}, left out",)
+    return tuple(f"surface {file.name}: {told}" for told in (statistics, *noisy, *found.remarks))
 
 
 def without_exponent(value: Any, surface: str) -> Any:
@@ -109,13 +95,14 @@ def spectra_of(surface: Surface) -> tuple[Spectrum, ...]:
         If a file does not hold one, or the cut-offs lie outside of it.
     """
     return tuple(
-        _within(surface, spectrum, file)
-        for file, spectrum in zip(surface.measured.files, surface.measured.spectra(), strict=True)
+        _within(surface, found, file)
+        for file, found in zip(surface.measured.files, surface.measured.found(), strict=False)
     )
 
 
-def _within(surface: Surface, spectrum: Spectrum, file: DataFile) -> Spectrum:
-    """Return a spectrum between the cut-offs."""
+def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
+    """Return a spectrum between the cut-offs; where none is named it ends where the noise begins."""
+    spectrum = found.spectrum
     ends = surface.longest_wavelength or 0.0, surface.shortest_wavelength or 0.0
     if surface.extrapolate:
         spectrum = spectrum.continued(*ends)
@@ -128,7 +115,7 @@ def _within(surface: Surface, spectrum: Spectrum, file: DataFile) -> Spectrum:
     ]
     if beyond:
         raise DataError("; ".join(f"{file.name}: {sentence}" for sentence in beyond))
-    return spectrum.between(*ends)
+    return spectrum.between(ends[0], ends[1] or min(found.resolution, longest))
 
 
 @lru_cache(maxsize=64)
@@ -143,7 +130,7 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
     import numpy as np
 
     lines = tuple(spectrum.line(length, modes) for spectrum in spectra_of(surface))
-    for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=True):
+    for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):
             longest, shortest = spectrum.wavelengths
             raise DataError(
@@ -152,38 +139,3 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
             )
         line.flags.writeable = False
     return lines
-
-
-def _tabulated(file: DataFile) -> Spectrum:
-    """Return the spectrum of a table."""
-    import numpy as np
-
-    from mdr_dask.physics.surfaces.scans import averaged, of_cut
-    from mdr_dask.physics.surfaces.spectrum import Spectrum
-
-    columns = (
-        Column("wavenumber", "rad/m", ("q", "k", "wave number", "wavevector"), needed=False, above=0),
-        Column("wavelength", "m", ("lambda", "λ"), needed=False, above=0),
-        Column("C2D", "m^4", ("C 2D", "C_iso", "areal spectrum"), needed=False, above=0),
-        Column("C1D", "m^3", ("C 1D", "line spectrum"), needed=False, above=0),
-        Column("C cut", "m^3", ("cut", "C_cut", "scan spectrum"), needed=False, above=0),
-    )
-    table = read_table(file.read_text(), file.name, columns)
-    places = [name for name in ("wavenumber", "wavelength") if name in table]
-    kinds = [name for name in ("C2D", "C1D", "C cut") if name in table]
-    problems = [
-        f"{file.name}: expected one column of {wanted}, got {' and '.join(found) or 'none'}"
-        for wanted, found in (("wavenumber and wavelength", places), ("C2D, C1D and C cut", kinds))
-        if len(found) != 1
-    ]
-    if problems:
-        raise DataError("\n".join(problems))
-    q = table["wavenumber"] if "wavenumber" in table else 2 * np.pi / table["wavelength"]
-    order = np.argsort(q)
-    q, density = q[order], table[kinds[0]][order]
-    try:
-        if kinds == ["C cut"]:
-            return of_cut(averaged(q, density, CUT_ERROR**-2))
-        return Spectrum(q, density / (np.pi * q) if kinds == ["C1D"] else density)
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None

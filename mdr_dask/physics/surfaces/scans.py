@@ -20,6 +20,8 @@ from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # for every decade of the wave number
 BEND = 3.0  # standard deviation that is granted to a change of the slope d log C2D / d log q from bin to bin
+NOISE_SLOPE = -0.5  # a tail of a cut that is flatter is noise: d log C / d log q is -1 of H = 0
+NOISE_TAIL = 0.5  # decades at its end
 STEEPEST = 30.0  # fall d log C / d log q from bin to bin that is an end of the spectrum
 
 
@@ -39,6 +41,11 @@ class Cut(NamedTuple):
     wavenumber: FloatArray
     density: FloatArray
     error: FloatArray
+
+    def until(self, wavenumber: float) -> Cut:
+        """Return the bins up to a wave number, ends included."""
+        kept = self.wavenumber <= wavenumber * (1 + 1e-9)
+        return Cut(*(column[kept] for column in self))
 
 
 def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
@@ -70,14 +77,24 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     return averaged(2 * np.pi / length * waves[:last], power[:last], independent)
 
 
-def averaged(wavenumber: FloatArray, density: FloatArray, independent: float) -> Cut:
-    """Average a spectrum of equidistant wave numbers in logarithmic bins, so that the power of each is kept."""
-    decades = np.log10(wavenumber / wavenumber[0] + 0.5)
-    member = np.floor(decades * BINS).astype(int)
-    _, member, count = np.unique(member, return_inverse=True, return_counts=True)
-    power = np.bincount(member, density)
-    q = np.exp(np.bincount(member, np.log(wavenumber)) / count)
-    return Cut(q, power / count, 1 / np.sqrt(count * independent))
+def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
+    """Average a spectrum in logarithmic bins, so that the power of each is kept.
+
+    Parameters
+    ----------
+    wavenumber, density : array, shape (waves,)
+        Ascending wave numbers, and the spectrum there.
+    independent : float
+        Independent squared amplitudes in every wave counted.
+    count : array, shape (waves,), optional
+        Waves at each wave number; 1 if not given.
+    """
+    count = np.ones(wavenumber.size) if count is None else count
+    bins = np.floor(np.log10(wavenumber / wavenumber[0] + 0.5) * BINS).astype(int)
+    _, member = np.unique(bins, return_inverse=True)
+    total = np.bincount(member, count)
+    q = np.exp(np.bincount(member, count * np.log(wavenumber)) / total)
+    return Cut(q, np.bincount(member, count * density) / total, 1 / np.sqrt(total * independent))
 
 
 def hann_window(points: int) -> FloatArray:

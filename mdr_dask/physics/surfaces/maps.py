@@ -1,0 +1,307 @@
+"""Areal maps: from recorded heights to rings of the isotropic spectrum, straight cuts, slopes and their directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, ndimage, sparse
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.physics.surfaces.areal import wavenumbers
+from mdr_dask.physics.surfaces.scans import Cut, averaged
+from mdr_dask.physics.surfaces.spectrum import Spectrum
+
+Order = Literal["none", "mean", "plane", "parabola"]
+
+LEAST_POINTS = 16  # along each axis
+MOST_MISSING = 0.05  # share of the points that may be filled
+FAR = 12.0  # robust standard deviations, of the distance from the four neighbours, that no roughness reaches
+TELLING = 1e-3  # of the largest ring
+MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
+FLAT = 1e-12  # of the largest height
+ROUNDING = 1e-20  # of the largest ring: what is left by the transform where there are no waves
+HANN_MODES = 0.3  # independent waves of a map under Hann's window, for every wave of the transform
+
+
+class SurfaceMap(NamedTuple):
+    """Heights on a regular grid.
+
+    Parameters
+    ----------
+    height : array, shape (points along x, points along y)
+        Heights, m, positive into the elastomer; NaN where a point is missing.
+    size : tuple of float
+        Lengths along x and y, m: points times spacing.
+    """
+
+    height: FloatArray
+    size: tuple[float, float]
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Distances of points along x and y, m."""
+        return self.size[0] / self.height.shape[0], self.size[1] / self.height.shape[1]
+
+
+def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
+    """Return which points stick out of their four neighbours, by `FAR` times what is usual."""
+    height = surface.height
+    inner = height[1:-1, 1:-1]
+    neighbours = height[2:, 1:-1], height[:-2, 1:-1], height[1:-1, 2:], height[1:-1, :-2]
+    middle, most, least = (neighbours[0].copy() for _ in range(3))
+    for neighbour in neighbours[1:]:
+        middle += neighbour
+        np.maximum(most, neighbour, out=most)
+        np.minimum(least, neighbour, out=least)
+    middle -= most
+    middle -= least
+    away = np.abs(inner - 0.5 * middle)
+    limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
+    found = np.zeros(height.shape, bool)
+    # a point beside an outlier is one itself only if it sticks out nearly as far
+    found[1:-1, 1:-1] = (away > limit) & (limit > 0) & (away > 0.5 * ndimage.maximum_filter(away, 3))
+    return found
+
+
+def filled(surface: SurfaceMap) -> SurfaceMap:
+    """Return a map whose missing points hang between those around them as a soap film does (Laplace).
+
+    Raises
+    ------
+    DataError
+        If there are too few points, or more than `MOST_MISSING` of them are missing.
+    """
+    height = np.asarray(surface.height, dtype=np.float64)
+    if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
+        raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
+    missing = ~np.isfinite(height)
+    count = int(np.count_nonzero(missing))
+    if count > MOST_MISSING * height.size:
+        share = count / height.size
+        raise DataError(f"expected at most {MOST_MISSING:.0%} of missing points, which are filled, got {share:.1%}")
+    return SurfaceMap(_hung(height, missing) if count else height, surface.size)
+
+
+def _hung(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
+    """Return heights whose missing ones are the mean of their neighbours."""
+    number = np.full(height.shape, -1)
+    number[missing] = np.arange(np.count_nonzero(missing))
+    size, diagonal, right = number.max() + 1, np.zeros(number.max() + 1), np.zeros(number.max() + 1)
+    pairs = []
+    for axis in (0, 1):
+        for here, there in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
+            one, other = ((here, slice(None)), (there, slice(None))) if axis == 0 else ((..., here), (..., there))
+            inner = missing[one]
+            row, column = number[one][inner], number[other][inner]
+            diagonal[row] += 1
+            known = column < 0
+            right[row[known]] += height[other][inner][known]
+            pairs.append((row[~known], column[~known]))
+    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    matrix = sparse.diags_array(diagonal) - sparse.coo_array((np.ones(rows.size), (rows, columns)), (size, size))
+    filled_in = height.copy()
+    start = np.full(size, float(np.mean(height[~missing])))
+    filled_in[missing], _ = sparse.linalg.cg(matrix.tocsr(), right, start, rtol=1e-10, maxiter=2000)
+    return filled_in
+
+
+def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
+    """Return a map without its best polynomial: the mean, a plane, or a paraboloid with its mixed term."""
+    if order == "none":
+        return surface
+    x, y = (np.linspace(-1, 1, points) for points in surface.height.shape)
+    powers = {"mean": ((0, 0),), "plane": ((0, 0), (1, 0), (0, 1))}
+    wanted = powers.get(order, (*powers["plane"], (2, 0), (1, 1), (0, 2)))
+    gram = np.array([[np.mean(x ** (a + c)) * np.mean(y ** (b + d)) for c, d in wanted] for a, b in wanted])
+    right = [x**a @ surface.height @ y**b / surface.height.size for a, b in wanted]
+    height = surface.height.copy()
+    for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True):
+        height -= factor * (x**a)[:, None] * y**b
+    return SurfaceMap(height, surface.size)
+
+
+def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
+    """Return Hann's window of the distance from the middle, 0 beyond half the shorter side, of a mean square of one."""
+    x, y = (length * (np.arange(n) - n // 2) / n for n, length in zip(points, size, strict=True))
+    distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
+    window = 0.5 + 0.5 * np.cos(np.pi * distance)
+    return np.asarray(window / np.sqrt(np.mean(window**2)))
+
+
+@dataclass(frozen=True)
+class MapSpectrum:
+    """The spectrum of a map, in rings of the wave vector one step apart.
+
+    Parameters
+    ----------
+    wavenumber : array, shape (rings,)
+        q = k dq, k = 1, 2, ..., with dq = 2 pi over the shorter side; to the Nyquist wave number of the wider spacing.
+    density : array, shape (rings,)
+        C2D, m^4: the power of a ring over its area, so that rms height and gradient are kept.
+    count : array, shape (rings,)
+        Number of waves in each, both signs.
+    independent : float
+        Independent ones for each of them.
+    rms_height : float
+        Of all waves, m.
+    slopes : tuple of float
+        Mean squares of the slopes along x and y, and of their product.
+    angular : complex array, shape (2, rings)
+        Mean of exp(2 i angle) and exp(4 i angle) over the power of each ring: 0 of an isotropic one.
+    cuts : tuple of (array, array)
+        Wave numbers and C_cut, m^3, of straight cuts along x and along y.
+    axes : tuple of float
+        Power of the waves along x and along y over that of their rings, in the middle: 1 of an isotropic surface.
+    """
+
+    wavenumber: FloatArray
+    density: FloatArray
+    count: FloatArray
+    independent: float
+    rms_height: float
+    slopes: tuple[float, float, float]
+    angular: NDArray[np.complex128]
+    cuts: tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+    axes: tuple[float, float]
+
+    @property
+    def rms_gradient(self) -> float:
+        """Return the rms of the gradient, both slopes together."""
+        return float(np.sqrt(self.slopes[0] + self.slopes[1]))
+
+    def spectrum(self) -> Spectrum:
+        """Return C2D between the first ring and the last that hold any power."""
+        there = np.flatnonzero(self.density > ROUNDING * self.density.max(initial=0.0))
+        rings = slice(there[0], there[-1] + 1)
+        return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], ROUNDING * self.density.max()))
+
+    def binned(self) -> Cut:
+        """Return C2D in logarithmic bins with its relative errors."""
+        there = self.density > ROUNDING * self.density.max(initial=0.0)
+        rings = self.wavenumber[there], self.density[there], 0.5 * self.independent, self.count[there]
+        return averaged(*rings)
+
+    def along(self, axis: int) -> Spectrum:
+        """Return the C2D whose line is the straight cut along an axis, 0 for x: for grooves across the motion."""
+        q, cut = self.cuts[axis]
+        there = cut > ROUNDING * cut.max()
+        return Spectrum(q[there], cut[there] / (np.pi * q[there]))
+
+    def anisotropy(self) -> float:
+        """Return how far the rings are from isotropy: 0, to 1 of waves in one direction only; scatter is taken off.
+
+        The larger one of the second and the fourth harmonic of the angle, rms over octaves with enough waves.
+        """
+        there = np.flatnonzero(telling(self.wavenumber, self.density))
+        octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
+        power = self.density[there] * self.wavenumber[there]
+        weight = np.bincount(octave, power)
+        scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
+        sure = scatter <= max(MOST_SCATTER, float(scatter.min()))
+        found = []
+        for harmonic in self.angular[:, there]:
+            sums = np.bincount(octave, power * harmonic.real) + 1j * np.bincount(octave, power * harmonic.imag)
+            found.append(np.mean((np.abs(sums / weight) ** 2 - scatter)[sure]))
+        return float(np.sqrt(max(0.0, *map(float, found))))
+
+
+def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
+    """Return the spectrum of a map without missing points.
+
+    Parameters
+    ----------
+    surface : SurfaceMap
+        Without its trend.
+    hann : bool
+        Whether to window it by `hann_disc`; only a periodic map needs none.
+    """
+    points, size = surface.height.shape, surface.size
+    height = surface.height - surface.height.mean()
+    if not np.ptp(height) > FLAT * np.max(np.abs(surface.height), initial=0.0):
+        raise DataError("expected a rough map, got a flat one")
+    if hann:
+        height *= hann_disc(points, size)
+    waves = fft.rfft2(height, overwrite_x=True)
+    power = np.abs(waves) ** 2 / height.size**2
+    power[0, 0] = 0.0
+    power[:, 1 : (points[1] + 1) // 2] *= 2  # the other half of the plane
+    del waves, height
+    q_x, q_y = wavenumbers(points, size)
+    return _rings(power, q_x, q_y, points, size, HANN_MODES * _disc_share(size) if hann else 1.0)
+
+
+def _disc_share(size: tuple[float, float]) -> float:
+    return min(size) / max(size)
+
+
+def _rings(
+    power: FloatArray,
+    q_x: FloatArray,
+    q_y: FloatArray,
+    points: tuple[int, int],
+    size: tuple[float, float],
+    modes: float,
+) -> MapSpectrum:
+    """Sum squared amplitudes in rings."""
+    step = 2 * np.pi / min(size)
+    last = int(np.pi * min(n / length for n, length in zip(points, size, strict=True)) / step + 1e-9)
+    square_x, square_y = (q_x**2)[:, None], q_y**2
+    ring = np.rint(np.hypot(q_x[:, None], q_y) / step).astype(np.int32)
+    both = np.full(q_y.size, 2.0)
+    both[[0] if points[1] % 2 else [0, -1]] = 1.0
+
+    def summed(weights: FloatArray) -> FloatArray:
+        sums = np.bincount(ring.ravel(), weights.ravel(), minlength=last + 1)
+        return np.asarray(sums[1 : last + 1], dtype=np.float64)
+
+    total = summed(power)
+    count = summed(np.broadcast_to(both, ring.shape))
+    cos = (square_x - square_y) / np.maximum(square_x + square_y, 1e-300)
+    sin = 2 * q_x[:, None] * q_y / np.maximum(square_x + square_y, 1e-300)
+    second = summed(power * cos) + 1j * summed(power * sin)
+    fourth = summed(power * (2 * cos**2 - 1)) + 1j * summed(power * 2 * sin * cos)
+    del cos, sin
+    number = np.arange(1, last + 1)
+    safe = np.where(total > 0, total, 1.0)
+    row, column = np.sum(power, axis=1), np.sum(power, axis=0)
+    slopes = float(row @ q_x**2), float(column @ square_y), float(q_x @ power @ q_y)
+    half = points[0] // 2
+    ahead, back = row[1:half], row[::-1][: half - 1]
+    cuts = _cut(ahead + back, size[0]), _cut(column[1 : (points[1] + 1) // 2], size[1])
+    return MapSpectrum(
+        wavenumber=np.asarray(number * step, dtype=np.float64),
+        density=total / (2 * np.pi * number * step**2),
+        count=count,
+        independent=modes,
+        rms_height=float(np.sqrt(np.sum(power))),
+        slopes=slopes,
+        angular=np.array([second / safe, fourth / safe], dtype=np.complex128),
+        cuts=cuts,
+        axes=(_axis(power[:, 0], ring[:, 0], total, count), _axis(power[0], ring[0], total, count)),
+    )
+
+
+def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
+    """Return which rings tell something of the height or of the gradient, and not of the rounding of a file."""
+    height, gradient = density * wavenumber, density * wavenumber**3
+    return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
+
+
+def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+    """Return wave numbers and two-sided C_cut of the power of both signs."""
+    step = 2 * np.pi / length
+    return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
+
+
+def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
+    """Return the power of waves along an axis over that of a wave of their rings, in the middle over all rings."""
+    number = np.arange(1.0, total.size + 1)
+    alive = number[telling(number, total / number)]
+    inner = (ring >= 4) & np.isin(ring, alive)
+    k = ring[inner] - 1
+    ratio = power[inner] / (total[k] / count[k])
+    return float(np.median(ratio) / np.log(2)) if k.size else 1.0

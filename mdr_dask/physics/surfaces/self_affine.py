@@ -1,0 +1,144 @@
+"""What a measured spectrum says of its surface: Hurst exponent, cut-offs, and where the instrument ends."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.scans import Cut
+
+LEAST_ERROR = 0.05  # relative, of a bin: a spectrum is no power law to better than that
+LEAST_BINS = 5  # of the power law
+LOWEST, HIGHEST = -0.1, 1.2  # Hurst exponents that are looked for
+CHI_SQUARED = 3.84  # of one parameter, 95 %
+STEEPEST, FLATTEST = -6.0, -1.0  # d log C2D / d log q: beyond H = 1 by far, and less than H = 0 has
+ABOVE_NOISE = 2.0  # times the noise that roughness has to be
+
+
+class Interval(NamedTuple):
+    """A value and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+class SelfAffine(NamedTuple):
+    """A power law C2D ~ q^(-2 - 2 H) between two wavelengths, m; None where the data do not reach a cut-off."""
+
+    hurst: Interval
+    longest: Interval | None
+    shortest: Interval | None
+    misfit: float  # rms of log C2D off the law, over the errors
+
+
+def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
+    """Return the wave number beyond which a spectrum is the flat one of noise, infinite if it is not.
+
+    Parameters
+    ----------
+    bins : Cut
+        C2D, or a cut, in logarithmic bins.
+    flattest : float
+        Slope d log C / d log q of a tail that is noise: -1 of C2D, -0.5 of a cut.
+    decades : float
+        Length of the tail.
+    """
+    wavenumber, density = bins.wavenumber, bins.density
+    tail = wavenumber > wavenumber[-1] / 10**decades * (1 - 1e-9)
+    if np.count_nonzero(tail) < 3 or not np.all(density[tail] > 0):
+        return np.inf
+    slope = np.polyfit(np.log(wavenumber[tail]), np.log(density[tail]), 1)[0]
+    if slope < flattest:
+        return np.inf
+    above = np.flatnonzero(density > ABOVE_NOISE * np.mean(density[tail]))
+    return float(wavenumber[above[-1]]) if above.size else float(wavenumber[0])
+
+
+def steep_limit(bins: Cut) -> float:
+    """Return the wave number from which C2D falls more steeply than that of any roughness, infinite if it does not."""
+    wavenumber, density = bins.wavenumber, bins.density
+    there = density > 0
+    x, y = np.log(wavenumber[there]), np.log(density[there])
+    steep = np.diff(y) < STEEPEST * np.diff(x)
+    ends = np.flatnonzero(steep & np.append(steep[1:], True))
+    if not np.all(there):
+        return float(wavenumber[there][ends[0]]) if ends.size else float(wavenumber[there][-1])
+    return float(np.exp(x[ends[0]])) if ends.size else np.inf
+
+
+def fit_self_affine(bins: Cut) -> SelfAffine | None:
+    """Fit a power law with a bend at either end where the data show one; None of too few bins, or no such law.
+
+    Parameters
+    ----------
+    bins : Cut
+        C2D in logarithmic bins, with relative standard errors.
+
+    Returns
+    -------
+    SelfAffine or None
+        Bends are chosen among the bins by the information criterion of Schwarz; intervals are those of the likelihood,
+        widened by the misfit.
+    """
+    wavenumber, density, error = bins
+    if wavenumber.size < LEAST_BINS:
+        return None
+    x, y = np.log(wavenumber), np.log(density)
+    weight = 1 / np.maximum(error, LEAST_ERROR)
+    last = x.size - 1
+    fits = {}
+    for first in range(x.size - LEAST_BINS + 1):
+        for end in range(first + LEAST_BINS - 1, x.size):
+            columns = [np.ones_like(x), np.clip(x, x[first], x[end])]
+            columns += [np.minimum(x - x[first], 0)] if first else []
+            columns += [np.maximum(x - x[end], 0)] if end < last else []
+            fits[first, end] = _least_squares(np.array(columns).T * weight[:, None], y * weight)
+    fits = {ends: fit for ends, fit in fits.items() if LOWEST <= -1 - fit.slope / 2 <= HIGHEST}
+    if not fits:
+        return None
+    full = min(fits.values(), key=lambda fit: fit.chi_squared)
+    scale = max(1.0, full.chi_squared / max(1, x.size - 6))
+    penalty = scale * np.log(x.size)
+    worth = {ends: fit.chi_squared + penalty * (2 * (ends[0] > 0) + 2 * (ends[1] < last)) for ends, fit in fits.items()}
+    first, end = min(worth, key=lambda ends: worth[ends])
+    best = fits[first, end]
+    allowed = [
+        ends
+        for ends, fit in fits.items()
+        if fit.chi_squared <= best.chi_squared + scale * CHI_SQUARED
+        and (ends[0] > 0) == (first > 0)
+        and (ends[1] < last) == (end < last)
+    ]
+    slopes = [
+        fits[ends].slope + sign * 1.96 * np.sqrt(scale) * fits[ends].error for ends in allowed for sign in (-1, 1)
+    ]
+    low, high = -1 - max(slopes) / 2, -1 - min(slopes) / 2
+
+    def wavelength(bend: int, place: int) -> Interval:
+        places = [ends[place] for ends in allowed]
+        step = np.exp(np.mean(np.diff(x)) / 2)
+        ends = 2 * np.pi / wavenumber[[max(places), min(places)]]
+        return Interval(float(2 * np.pi / wavenumber[bend]), float(ends[0] / step), float(ends[1] * step))
+
+    return SelfAffine(
+        Interval(-1 - best.slope / 2, low, high),
+        wavelength(first, 0) if first else None,
+        wavelength(end, 1) if end < last else None,
+        float(np.sqrt(best.chi_squared / x.size)),
+    )
+
+
+class _Fit(NamedTuple):
+    chi_squared: float
+    slope: float  # of the middle
+    error: float
+
+
+def _least_squares(matrix: NDArray[np.float64], right: FloatArray) -> _Fit:
+    found = np.linalg.lstsq(matrix, right, rcond=None)[0]
+    variance = np.linalg.pinv(matrix.T @ matrix)[1, 1]
+    return _Fit(float(np.sum((matrix @ found - right) ** 2)), float(found[1]), float(np.sqrt(variance)))

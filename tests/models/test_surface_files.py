@@ -1,0 +1,139 @@
+"""Files of measured surfaces: every way to write a map or a scan, and what each damage and mistake is told as."""
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mdr_dask.models.parts.surface import Surface, spectra_of
+from mdr_dask.models.parts.surface_files import read_map
+from mdr_dask.physics.surfaces.areal import areal_surface
+from mdr_dask.physics.surfaces.spectrum import self_affine
+
+topography = pytest.importorskip("SurfaceTopography")
+
+LENGTH, POINTS = 2e-3, 256
+SPECTRUM = self_affine(0.7, LENGTH / 4, LENGTH / 64, 1e-6)
+HEIGHT = areal_surface(SPECTRUM, (POINTS, POINTS), (LENGTH, LENGTH), 1, 0)
+CONTEXT = {"to_si": lambda value, unit: float(value.split()[0]) * 1e-6}
+
+
+def surface(directory, **kind):
+    return Surface.model_validate(kind, context=CONTEXT | {"directory": directory})
+
+
+def refused(directory, **kind):
+    with pytest.raises(ValidationError) as caught:
+        surface(directory, **kind)
+    (error,) = caught.value.errors()
+    return error["msg"]
+
+
+def text(rows, separator="\t", mark=".", head=""):
+    lines = (separator.join(f"{1e6 * height:.9g}" for height in row) for row in rows)
+    return head + "\n".join(lines).replace(".", mark) + "\n"
+
+
+def test_every_dialect_of_a_map_is_the_same_map(tmp_path):
+    """Rows along x: tabs, semicolons with decimal commas, commas, blanks, npy and a format of SurfaceTopography."""
+    rows = HEIGHT.T
+    (tmp_path / "tabs.txt").write_text(text(rows))
+    (tmp_path / "german.csv").write_text(text(rows, ";", ",", "# made by an instrument\n"))
+    (tmp_path / "commas.csv").write_text(text(rows, ","))
+    (tmp_path / "blanks.dat").write_text(text(rows, " ", ","))
+    np.save(tmp_path / "map.npy", rows * 1e6)
+    names = ["tabs.txt", "german.csv", "commas.csv", "blanks.dat", "map.npy"]
+    spacing = {"spacing": LENGTH / POINTS, "unit": "um", "window": "none"}
+    found = [surface(tmp_path, map={"files": [name], **spacing}) for name in names]
+    size = LENGTH * 1e3, LENGTH * 1e3
+    topography.Topography(HEIGHT * 1e3, size, unit="mm").to_netcdf(str(tmp_path / "map.nc"))
+    found.append(surface(tmp_path, map={"files": ["map.nc"], "window": "none"}))
+    for one in found:
+        heights = read_map(one.map.files[0], one.map)
+        np.testing.assert_allclose(heights.height, HEIGHT, atol=1e-14)
+        assert heights.size == pytest.approx((LENGTH, LENGTH))
+        (spectrum,) = spectra_of(one)
+        assert spectrum.rms_gradient() == pytest.approx(SPECTRUM.rms_gradient(), rel=0.02)
+
+
+def test_scans_of_a_surface_give_its_spectrum_and_not_their_own(tmp_path):
+    wide = self_affine(0.7, LENGTH / 16, LENGTH / 128, 1e-6)
+    height = areal_surface(wide, (64, 1024), (LENGTH / 16, LENGTH), 1, 0)[::8]
+    place = np.arange(1024) * LENGTH / 1024
+    for k in range(8):
+        rows = "\n".join(f"{x * 1e3:.9g},{1e6 * z:.9g}" for x, z in zip(place, height[k], strict=True))
+        (tmp_path / f"{k}.csv").write_text("x [mm],z [um]\n" + rows)
+    scans = surface(tmp_path, scan={"files": [f"{k}.csv" for k in range(8)]})
+    gradients = [spectrum.rms_gradient() for spectrum in spectra_of(scans)]
+    assert np.sqrt(np.mean(np.square(gradients))) == pytest.approx(wide.rms_gradient(), rel=0.05)
+    own = np.std(np.diff(height, axis=1)) / (LENGTH / 1024)
+    assert own < 0.8 * np.mean(gradients)
+
+
+def test_noise_outliers_and_missing_points_are_told(tmp_path):
+    generator = np.random.default_rng(1)
+    noisy = HEIGHT + 1e-7 * generator.standard_normal(HEIGHT.shape)
+    noisy[40, 50] = noisy[90, 70] = 1e-4
+    noisy[100:104, 100:104] = np.nan
+    np.save(tmp_path / "map.npy", noisy)
+    options = {"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m"}
+    filled = surface(tmp_path, map=options | {"outliers": "fill"})
+    told = " ".join(filled.notes())
+    assert "are noise, left out" in told
+    assert "2 points stuck out of their neighbours and were filled" in told
+    assert "1 points stick out" not in told
+    (spectrum,) = spectra_of(filled)
+    assert spectrum.rms_gradient() == pytest.approx(SPECTRUM.rms_gradient(), rel=0.1)
+    (everything,) = spectra_of(
+        surface(tmp_path, map=options | {"outliers": "fill"}, shortest_wavelength=2 * LENGTH / 250)
+    )
+    assert everything.rms_gradient() > 1.2 * spectrum.rms_gradient()
+    assert "2 points stick out of their neighbours: `outliers: fill`" in " ".join(
+        surface(tmp_path, map=options).notes()
+    )
+
+
+def test_an_anisotropic_map_needs_a_direction(tmp_path):
+    grooves = areal_surface(SPECTRUM, (POINTS, POINTS), (LENGTH, 3 * LENGTH), 1, 0)
+    np.save(tmp_path / "map.npy", grooves.T)
+    options = {"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m", "window": "none"}
+    assert "expected an isotropic surface, got an anisotropy of 0." in refused(tmp_path, map=options)
+    slopes = [spectra_of(surface(tmp_path, map=options | {"direction": axis}))[0].rms_gradient() for axis in "xy"]
+    assert slopes[1] / slopes[0] == pytest.approx(3, rel=0.1)
+    stepped = HEIGHT.copy()
+    stepped[:, 100:] += 2e-5
+    np.save(tmp_path / "map.npy", stepped.T)
+    options["window"] = "hann"
+    assert "waves along y stick out: steps or scan lines?" in refused(tmp_path, map=options)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "more", "message"),
+    [
+        ("map.npy", HEIGHT, {"unit": ""}, "does not say the unit of its heights: give `unit`"),
+        ("map.npy", HEIGHT, {"spacing": None}, "does not say its spacing: give `spacing`"),
+        ("map.npy", HEIGHT, {"unit": "s"}, "unit: "),
+        ("map.npy", HEIGHT[:8], {}, "expected a map of 16 x 16 points or more"),
+        ("map.npy", HEIGHT[0], {}, "expected rows and columns of heights, got 1 dimensions"),
+        ("map.npy", 0 * HEIGHT, {}, "expected a rough map, got a flat one"),
+        ("map.npy", HEIGHT.astype(complex), {}, "expected heights, got numbers of the type complex128"),
+        ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), {}, "expected at most 5% of missing points"),
+        ("map.npy", b"nothing", {}, "expected an array of numpy"),
+        ("map.npy", b"", {}, "expected an array of numpy"),
+        ("map.txt", b"1 2 3\n4 5\n", {}, "expected rows of heights of one length"),
+        ("map.txt", b"1 2 x\n4 5 6\n", {}, "expected rows of heights of one length"),
+        ("map.txt", b"\xff\xfe1 2", {}, "expected text in UTF-8"),
+        ("map.opd", b"nothing", {}, "SurfaceTopography cannot read it"),
+    ],
+)
+def test_a_bad_map_is_one_sentence(tmp_path, name, content, more, message):
+    path = tmp_path / name
+    path.write_bytes(content) if isinstance(content, bytes) else np.save(path, content)
+    options = {"files": [name], "spacing": 1e-6, "unit": "m"} | more
+    assert message in refused(tmp_path, map={key: value for key, value in options.items() if value is not None})
+
+
+def test_a_scan_is_no_map_and_a_map_no_scan(tmp_path):
+    topography.Topography(HEIGHT, (1.0, 1.0), unit="m").to_netcdf(str(tmp_path / "map.nc"))
+    topography.UniformLineScan(HEIGHT[0], 1.0, unit="m").to_netcdf(str(tmp_path / "line.nc"))
+    assert "expected a line scan, got a map" in refused(tmp_path, scan="map.nc")
+    assert "expected a map, got a line scan" in refused(tmp_path, map="line.nc")

@@ -1,0 +1,102 @@
+"""What a user is told when a cluster does not come, goes away, or sees another store; and what is left."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from slow_campaign import make, mdr_dask
+from test_execute import digests
+
+PYTHON = sys.executable
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, value in make(tmp_path, blocks=10, pause=0.2).items():
+        monkeypatch.setenv(name, value)
+    return tmp_path
+
+
+@pytest.fixture
+def start():
+    """Start processes, which are gone after the test."""
+    started = []
+
+    def process(*command, **options):
+        options = {"stderr": subprocess.PIPE, "text": True, "start_new_session": True, **options}
+        started.append(subprocess.Popen(command, **options))
+        return started[-1]
+
+    yield process
+    for each in started:
+        if each.poll() is None:
+            os.killpg(each.pid, signal.SIGKILL)
+        each.wait()
+        if each.stderr:
+            each.stderr.close()
+
+
+def said(process, pattern):
+    """Wait until a process says something on stderr; return what."""
+    for line in process.stderr:
+        if found := re.search(pattern, line):
+            return found[1]
+    raise AssertionError(f"it never said {pattern}")
+
+
+def scheduler(start):
+    head = start(PYTHON, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-show")
+    return head, said(head, r"Scheduler at:\s+(tcp://\S+)")
+
+
+def worker(start, head, address):
+    options = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    process = start(PYTHON, "-m", "distributed.cli.dask_worker", address, *options, stderr=subprocess.DEVNULL)
+    said(head, "(Register worker)")
+    return process
+
+
+def told_by(driver, stop):
+    """Return what a driver says to its end; something is stopped as soon as results have come."""
+    told = []
+    for line in driver.stderr:
+        told.append(line.strip())
+        if re.search(r"[1-9]\d* of 20 results", line) and stop.poll() is None:
+            stop.kill()
+    assert driver.wait() == 2
+    return told
+
+
+def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, start):
+    head, address = scheduler(start)
+    command = ("mdr-dask", "run", "long.yaml", "--scheduler", address, "--log", "log.jsonl")
+    alone = mdr_dask(*command[1:], "--patience", "6")
+    assert alone.returncode == 2
+    assert re.search(r"^no worker yet, waiting for \d s; giving up after 6 s$", alone.stderr, flags=re.M)
+    kept = "what is in the store is kept: run the campaign again"
+    last = alone.stderr.splitlines()[-1]
+    assert re.fullmatch(rf"no worker for \d+ s; {kept}, with more --patience if need be", last)
+
+    first = worker(start, head, address)
+    told = told_by(start(*command, "--patience", "6"), first)
+    assert any(re.match("all workers are gone, waiting for", line) for line in told)
+
+    worker(start, head, address)
+    told += told_by(start(*command), head)
+    assert told[-1] == f"the scheduler went away; {kept}"
+    assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))
+
+    assert mdr_dask("run", "long.yaml", PAUSE="0").returncode == 0
+    assert mdr_dask("run", "long.yaml", "--store", "whole.zarr", PAUSE="0").returncode == 0
+    assert digests("long.zarr") == digests("whole.zarr")
+    events = [json.loads(line)["event"] for line in Path("log.jsonl").read_text().splitlines()]
+    assert {"run begun", "laid out", "block begun", "block done", "worker lost", "block lost"} <= set(events)
+    assert events.count("run broken off") == 3
