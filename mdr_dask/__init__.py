@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mdr_dask.version import __version__
 
 _HOMES = {
+    "Law": "mdr_dask.fits.interpolant",
     "Resources": "mdr_dask.execute",
     "aggregate": "mdr_dask.aggregation",
     "datasets": "mdr_dask.store",
@@ -22,10 +23,11 @@ if TYPE_CHECKING:
     from mdr_dask.aggregation import aggregate
     from mdr_dask.campaign import load, loads
     from mdr_dask.execute import Resources, run
+    from mdr_dask.fits.interpolant import Law
     from mdr_dask.plan import estimate
     from mdr_dask.store import datasets
 
-__all__ = ["Resources", "__version__", "aggregate", "datasets", "estimate", "load", "loads", "run"]
+__all__ = ["Law", "Resources", "__version__", "aggregate", "datasets", "estimate", "load", "loads", "run"]
 
 
 def __getattr__(name: str) -> Any:

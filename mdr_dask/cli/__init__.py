@@ -11,6 +11,7 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures
+from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, plot, show, status
@@ -49,6 +50,7 @@ for command in (
     aggregate,
     fit,
     sensitivity,
+    law,
     plot,
     figures,
     master_curve,
