@@ -9,27 +9,7 @@ from typing import TYPE_CHECKING, Any
 from mdr_dask.version import __version__
 
 _HOMES = {
-<<<<<<< HEAD
-    "Law": "mdr_dask.fits.interpolant",
-    "Resources": "mdr_dask.execute",
-    "aggregate": "mdr_dask.aggregation",
-    "datasets": "mdr_dask.store",
-    "estimate": "mdr_dask.plan",
-    "load": "mdr_dask.campaign",
-    "loads": "mdr_dask.campaign",
-    "run": "mdr_dask.execute",
-}
-
-if TYPE_CHECKING:
-    from mdr_dask.aggregation import aggregate
-    from mdr_dask.campaign import load, loads
-    from mdr_dask.execute import Resources, run
-    from mdr_dask.fits.interpolant import Law
-    from mdr_dask.plan import estimate
-    from mdr_dask.store import datasets
-
-__all__ = ["Law", "Resources", "__version__", "aggregate", "datasets", "estimate", "load", "loads", "run"]
-=======
+    "Law": ("mdr_dask.fits.interpolant", "Law"),
     "Resources": ("mdr_dask.execute", "Resources"),
     "aggregate": ("mdr_dask.studies", "aggregate"),
     "check": ("mdr_dask.studies", "check"),
@@ -44,10 +24,12 @@ __all__ = ["Law", "Resources", "__version__", "aggregate", "datasets", "estimate
 
 if TYPE_CHECKING:
     from mdr_dask.execute import Resources
+    from mdr_dask.fits.interpolant import Law
     from mdr_dask.studies import aggregate, check, fit, master_curve, plot, read, run, table
     from mdr_dask.studies import open_study as open  # noqa: A004
 
 __all__ = [
+    "Law",
     "Resources",
     "__version__",
     "aggregate",
@@ -60,7 +42,6 @@ __all__ = [
     "run",
     "table",
 ]
->>>>>>> main
 
 
 def __getattr__(name: str) -> Any:

@@ -10,7 +10,6 @@ import sys
 import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
-from mdr_dask.cli.figures import figures
 from mdr_dask.cli.figures import figures, plot
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
