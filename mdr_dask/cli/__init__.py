@@ -18,6 +18,7 @@ from mdr_dask.cli.results import aggregate, fit, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
+from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
 BROKE = 3
@@ -56,6 +57,7 @@ for command in (
     plot,
     figures,
     master_curve,
+    surface,
     schema,
 ):
     cli.add_command(command)
