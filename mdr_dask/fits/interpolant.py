@@ -34,7 +34,7 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     Parameters
     ----------
     dataset : Dataset
-        A group of a study that is a grid. Axes of one value become fixed parameters; axes of words are left as they are.
+        A group of a study that is a grid. Axes of one value become fixed parameters; axes of words stay as they are.
     output : str
         One of its outputs.
 
