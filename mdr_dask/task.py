@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import time
@@ -120,19 +119,13 @@ def run_block(work: Work) -> Outcome:
 def finished(work: Work) -> Outcome | None:
     """Return how a task ended that a worker finished before it died untold; None for one that is not finished.
 
-    The record of an attempt is written before the ledger, and says what the ledger then holds.
+    The record of an attempt is written before the ledger, and holds the digest of what the ledger then is.
     """
-    record = store.record(work.place, work.attempt)
-    if record is None:
+    record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
+    if record is None or not store.is_written(work.place, record):
         return None
     _, status = store.read_block(work.place, ())
-    if record.get("ledger") != _fingerprint(status):
-        return None
     return Outcome(_counts(work, status), record["solves"], work.estimate, record["compute_seconds"], 0.0)
-
-
-def _fingerprint(status: NDArray[np.int8]) -> str:
-    return hashlib.blake2b(status.tobytes(), digest_size=16).hexdigest()
 
 
 def _other_version(work: Work) -> str:
@@ -145,9 +138,7 @@ def _other_version(work: Work) -> str:
 def _write(
     work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], record: dict[str, Any]
 ) -> None:
-    store.write_values(work.place, values)
-    store.write_record(work.place, work.attempt, record)
-    store.write_status(work.place, status)
+    store.write_block(work.place, work.attempt, values, status, record)
 
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
@@ -242,7 +233,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
         "compute_seconds": seconds,
         "finished": time.time(),
         "host": platform.node(),
-        "ledger": _fingerprint(status),
+        "kind": kind(),
         "messages": messages,
         "process": os.getpid(),
         "solves": result.solves,
@@ -260,6 +251,23 @@ def _place(work: Work, case: int, number: int) -> list[int]:
 def _describe(block: Block[Any], case: int) -> dict[str, Any]:
     columns = {path: column[case] for path, column in block.columns.items()}
     return {path: value.item() if isinstance(value, np.generic) else str(value) for path, value in columns.items()}
+
+
+@lru_cache(maxsize=1)
+@lru_cache(maxsize=1)
+def kind() -> str:
+    """Return what the last digits of numbers may depend on: the processor, and what computes on it."""
+    from importlib.metadata import version
+
+    import scipy.linalg  # noqa: F401  (brings its own BLAS)
+    from llvmlite import binding
+    from numba.core import config
+    from threadpoolctl import threadpool_info
+
+    blas = sorted({str(found.get("architecture")) for found in threadpool_info() if found["user_api"] == "blas"})
+    programs = [f"{name} {version(name)}" for name in ("numpy", "scipy", "numba")]
+    processor = getattr(config, "CPU_NAME", None) or binding.get_host_cpu_name()
+    return ", ".join([f"processor {processor}", f"BLAS for {' '.join(blas)}", *programs, f"mdr_dask {__version__}"])
 
 
 @lru_cache(maxsize=1)

@@ -14,6 +14,7 @@ from mdr_dask import execute
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
+from mdr_dask.store import files
 
 
 def run(campaign, url, **options):
@@ -21,24 +22,28 @@ def run(campaign, url, **options):
 
 
 class Disk:
-    """Counts what is written to local stores; one write fails, or that one and all behind it."""
+    """Counts the files that are written to local stores, and their names; one act fails, or it and all behind it."""
 
     def __init__(self, monkeypatch) -> None:
         self.writes = 0
         self.fails = lambda number: False
-        write = LocalStore.set
+        for act in ("put", "give_name"):
+            monkeypatch.setattr(files, act, self.counted(getattr(files, act)))
 
-        async def counted(store, key, value):
+        async def refused(*_):
+            raise AssertionError("only whole stages are expected to be written")
+
+        monkeypatch.setattr(LocalStore, "set", refused)
+        monkeypatch.setattr(LocalStore, "set_if_not_exists", refused)
+
+    def counted(self, act):
+        def counting(*arguments):
             self.writes += 1
             if self.fails(self.writes):
                 raise OSError(28, "No space left on device")
-            await write(store, key, value)
+            act(*arguments)
 
-        async def refused(*_):
-            raise AssertionError("only set is expected to write")
-
-        monkeypatch.setattr(LocalStore, "set", counted)
-        monkeypatch.setattr(LocalStore, "set_if_not_exists", refused)
+        return counting
 
 
 @pytest.fixture

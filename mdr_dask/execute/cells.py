@@ -13,7 +13,7 @@ from mdr_dask import store
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex, Template
-from mdr_dask.store import Part, Place
+from mdr_dask.store import Hold, Part, Place
 from mdr_dask.task import Work, versions
 
 
@@ -83,11 +83,12 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
         yield numbers
 
 
-def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
+def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
     place, laid_out = store.absolute(url), store.layout_mark(url)
     if laid_out is None:
         raise StoreError(f"{url}: gone since it was laid out")
+    begun = itertools.count(1)
     for cells in groups:
         template = cells.template
         attempts = store.attempts(url, template.series.name)
@@ -95,8 +96,10 @@ def tasks(url: str, groups: Iterable[Cells]) -> Iterator[Work]:
             region = template.region(index)
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
+                if next(begun) % store.TOGETHER == 0:
+                    store.put_together(url, template.series.name)
                 yield Work(
-                    place=Place(place, template.series.name, index, region, laid_out),
+                    place=Place(place, template.series.name, index, region, laid_out, hold),
                     model=template.campaign.model,
                     versions=versions(template.campaign.model),
                     block=template.block(index),

@@ -19,7 +19,7 @@ from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.plan import Template, templates
 from mdr_dask.replication import needs_more, rounds
-from mdr_dask.store import Part
+from mdr_dask.store import Hold, Part
 from mdr_dask.task import Outcome, Work
 
 Masks = list[NDArray[np.bool_]]
@@ -35,6 +35,7 @@ class _Job:
 
     campaign: Campaign
     url: str
+    hold: Hold
     resources: Resources
     part: Part | None
     retry_failed: bool
@@ -98,10 +99,32 @@ def run(
     """
     check(resources)  # what is refused leaves no lock behind
     _plan(campaign, url)
-    with store.alone(url) if part is None else store.beside(url, part):
-        job = _Job(campaign, url, resources, part, retry_failed, report, tell)
+    with store.alone(url) if part is None else store.beside(url, part) as hold:
+        _require_sound(url)
+        job = _Job(campaign, url, hold, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
-            return _run_rounds(job, execute)
+            progress = _run_rounds(job, execute)
+        _settle(job, progress)
+        return progress
+
+
+def _require_sound(url: str) -> None:
+    """Refuse to go on with a store that cheap checks find damaged."""
+    if store.exists(url):
+        store.require_sound(url, store.series_names(url))
+
+
+def _settle(job: _Job, progress: Progress) -> None:
+    """Leave few files, and say what the last digits of the results may depend on if it is not the same for all."""
+    names = store.series_names(job.url)
+    for name in names:
+        store.put_together(job.url, name)
+    if progress.blocks:
+        kinds = store.kinds(job.url, names)
+        if len(kinds) > 1:
+            told = "; ".join(f"{kind} ({count} blocks)" for kind, count in kinds.items())
+            sentence = f"blocks come from {len(kinds)} kinds of machine, last digits may differ: {told}"
+            job.tell(Event("kinds of machine", kinds, sentence))
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
@@ -150,7 +173,7 @@ def _run_rounds(job: _Job, execute: Execute) -> Progress:
         groups = _find(job, current)
         progress = _begin_round(progress, groups)
         job.report(progress)
-        execute(tasks(job.url, groups), settle)
+        execute(tasks(job.url, groups, job.hold), settle)
         if job.resources.remote:
             _verify(job, current)
         job.tell(Event("round ended", {"realisations": count, "done": progress.done, "failed": progress.failed}))
@@ -170,7 +193,8 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
         if any(mask.any() for mask in needed):
             job.tell(Event("laying out", {"realisations": count}))
             layout = _grow(layout, count)
-            store.lay_out(job.url, layout)
+            with store.holding(job.url, job.hold):
+                store.lay_out(job.url, layout)
             blocks = {template.series.name or "-": list(template.grid) for template in layout}
             job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
     return _Round(layout, asked, needed, (before, count))

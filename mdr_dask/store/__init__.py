@@ -5,26 +5,24 @@ for every parameter. The driver lays arrays out; a block is written by whoever c
 array, ``status`` last. Readers see consolidated metadata, which is replaced in one write.
 """
 
-from mdr_dask.store.blocks import (
-    Place,
-    attempts,
-    layout_mark,
-    ledger,
-    read_block,
-    record,
-    records,
-    values,
-    write_record,
-    write_status,
-    write_values,
-)
-from mdr_dask.store.files import absolute, attributes, exists, is_study
+from mdr_dask.store.blocks import Place, is_written, layout_mark, ledger, read_block, values, write_block
+from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
+from mdr_dask.store.locks import Hold, holding, lock
 from mdr_dask.store.reading import datasets, is_damage, readable, save
+from mdr_dask.store.records import TOGETHER, attempts, kinds, put_together, record, records
+from mdr_dask.store.repairing import repair
 from mdr_dask.store.runners import Part, alone, at_work, beside, entrance
+from mdr_dask.store.sound import require_sound
+from mdr_dask.store.study import attributes, exists, is_study, series_names
+from mdr_dask.store.verifying import Finding, Inspection, verify
 
 __all__ = [
+    "TOGETHER",
+    "Finding",
+    "Hold",
+    "Inspection",
     "Part",
     "Place",
     "Stored",
@@ -37,19 +35,26 @@ __all__ = [
     "datasets",
     "entrance",
     "exists",
+    "holding",
     "is_damage",
     "is_study",
+    "is_written",
+    "kinds",
     "lay_out",
     "layout_mark",
     "ledger",
+    "lock",
+    "put_together",
     "read_block",
     "readable",
     "reconcile",
     "record",
     "records",
+    "repair",
+    "require_sound",
     "save",
+    "series_names",
     "values",
-    "write_record",
-    "write_status",
-    "write_values",
+    "verify",
+    "write_block",
 ]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -13,11 +12,18 @@ from typing import Any
 import numpy as np
 import zarr
 from numpy.typing import NDArray
+from zarr.abc.store import Store
+from zarr.core.buffer import Buffer
+from zarr.storage import WrapperStore
 
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.files import bytes_of, group_name, guarded, names, read_bytes, read_json, write_bytes
+from mdr_dask.store.digests import Checked
+from mdr_dask.store.files import bytes_of, group_name, guarded, read_bytes, write_stages
+from mdr_dask.store.locks import Hold, holding
+from mdr_dask.store.records import digest, name_of, sealed
+from mdr_dask.store.study import document
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,8 @@ class Place:
     layout : str
         The `layout_mark` of the store that the driver sees, so that nobody writes into another one, or into a shape of
         yesterday.
+    hold : Hold
+        That of the runner on whose behalf it is written.
     """
 
     url: str
@@ -42,20 +50,57 @@ class Place:
     index: BlockIndex
     region: tuple[slice, ...]
     layout: str
+    hold: Hold
 
 
-def write_values(place: Place, values: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write a block of every output, each a whole chunk: its shape is that of the region, further dimensions behind."""
+def write_block(
+    place: Place,
+    attempt: int,
+    values: Mapping[str, NDArray[np.float64]],
+    status: NDArray[np.int8],
+    record: Mapping[str, Any],
+) -> None:
+    """Write a block: what is to be told of it, whole chunks of every output, and its part of the ledger last.
+
+    The ledger is the only proof that a block is done. The record, with the digest of every chunk, comes first: whatever
+    a killed task leaves behind, each chunk is one that some record knows.
+
+    Parameters
+    ----------
+    place : Place
+        Where it stands, and on whose behalf it is written.
+    attempt : int
+        How often the block has been begun, this time included.
+    values : mapping of str to float array
+        The outputs, each of the shape of the region, further dimensions behind; none if only the ledger changes.
+    status : int8 array, shape of the region
+        The block's part of the ledger.
+    record : mapping
+        What it has to tell besides its numbers.
+    """
     arrays = _arrays(place.url, place.series, place.layout)
-    for name, array in values.items():
-        with guarded(place.url, f"writing {name}"):
+    chunks: dict[str, tuple[str, bytes]] = {}
+    for name, array in {**values, "status": status}.items():
+        with guarded(place.url, f"encoding {name}"):
             arrays[name][place.region] = array
+        key = chunk_name(arrays[name], place.index)
+        chunks[name] = key, arrays[name].store.taken(key)
+    told = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
+    ledger = dict([chunks.pop("status")])
+    with holding(place.url, place.hold):
+        write_stages(place.url, [{name_of(place.series, place.index, attempt): told}, dict(chunks.values()), ledger])
 
 
-def write_status(place: Place, status: NDArray[np.int8]) -> None:
-    """Write a block of the ledger: the last act of a task, and the only proof that it is done."""
-    with guarded(place.url, "writing status"):
-        _arrays(place.url, place.series, place.layout)["status"][place.region] = status
+def chunk_name(array: Any, index: BlockIndex) -> str:
+    """Return the name under which a block of an array is stored."""
+    further = (0,) * (array.ndim - len(index))
+    return f"{array.path}/{array.metadata.encode_chunk_key((*index, *further))}"
+
+
+def is_written(place: Place, record: Mapping[str, Any]) -> bool:
+    """Say whether the ledger holds what a record says was written."""
+    content = read_bytes(place.url, chunk_name(_arrays(place.url, place.series, place.layout)["status"], place.index))
+    return content is not None and record.get("chunks", {}).get("status") == digest(content)
 
 
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
@@ -67,65 +112,49 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
         )
 
 
-def write_record(place: Place, attempt: int, record: Mapping[str, Any]) -> None:
-    """Write what a block has to tell besides its numbers: times, versions, messages."""
-    write_bytes(place.url, _record_name(place, attempt), json.dumps(record, sort_keys=True).encode())
-
-
-def record(place: Place, attempt: int) -> dict[str, Any] | None:
-    """Return what an attempt at a block had to tell, None if it never came so far."""
-    return read_json(place.url, _record_name(place, attempt))
-
-
-def _record_name(place: Place, attempt: int) -> str:
-    return f"{_records(place.series)}{'.'.join(map(str, place.index))}-{attempt}.json"
-
-
-def records(url: str, series: str) -> Iterator[dict[str, Any]]:
-    """Yield the records of all blocks of a group."""
-    for name in names(url, _records(series)):
-        record = read_json(url, name)
-        if record is not None:
-            yield record
-
-
-def attempts(url: str, series: str) -> dict[BlockIndex, int]:
-    """Return how often each block has been computed, from the names of its records."""
-    found: dict[BlockIndex, int] = {}
-    for name in names(url, _records(series)):
-        index, _, attempt = name.rpartition("/")[2].removesuffix(".json").partition("-")
-        key = tuple(map(int, index.split(".")))
-        found[key] = max(found.get(key, 0), int(attempt))
-    return found
-
-
-def _records(series: str) -> str:
-    return group_name(series, "status/records/")
-
-
 def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
     """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing.
 
     Another part may have grown it beyond the shape meanwhile.
     """
     found = np.full(shape, Status.MISSING, dtype=np.int8)
-    if read_json(url, group_name(series, "zarr.json")) is None:
+    if document(url, series) is None:
         return found
-    with guarded(url, "reading status"):
-        status = _open(url, series)["status"]
-        common = tuple(map(slice, np.minimum(shape, status.shape)))
-        found[common] = status[common]
+    try:
+        with guarded(url, "reading status"):
+            status = _open(url, series, bytes_of(url))["status"]
+            common = tuple(map(slice, np.minimum(shape, status.shape)))
+            found[common] = status[common]
+    except StoreError as error:
+        raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
     return found
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return one output of a group as it stands now, axes in the order of the store."""
     with guarded(url, f"reading {output}"):
-        return np.asarray(_open(url, series)[output][...])
+        return np.asarray(_open(url, series, Checked(bytes_of(url), url, series))[output][...])
 
 
-def _open(url: str, series: str) -> Any:
-    return zarr.open_group(bytes_of(url), path=group_name(series) or None, mode="r", use_consolidated=True)
+def _open(url: str, series: str, store: Store) -> Any:
+    document(url, series)
+    return zarr.open_group(store, path=group_name(series) or None, mode="r", use_consolidated=True, zarr_format=3)
+
+
+class Staged(WrapperStore[Store]):
+    """A store that reads what is there, and keeps what is written until it is taken: each task its own chunks."""
+
+    def __init__(self, store: Store) -> None:
+        super().__init__(store)
+        self._kept: dict[str, bytes] = {}
+
+    async def set(self, key: str, value: Buffer) -> None:
+        """Keep what would be written."""
+        self._kept[key] = value.to_bytes()
+
+    def taken(self, key: str) -> bytes:
+        """Return what was written, once."""
+        return self._kept.pop(key)
 
 
 @lru_cache(maxsize=64)
@@ -134,9 +163,12 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     seen = layout_mark(url)
     if seen != layout:
         raise StoreError(f"{url}: {_other_store(seen)}")
+    document(url, series)
     with guarded(url, "opening it"):
-        group = zarr.open_group(bytes_of(url), path=group_name(series) or None, mode="r+", use_consolidated=True)
-        return dict(group.arrays())
+        staged = Staged(bytes_of(url))
+        path = group_name(series) or None
+        group = zarr.open_group(staged, path=path, mode="r+", use_consolidated=True, zarr_format=3)
+        return {name: array.with_config({"write_empty_chunks": True}) for name, array in group.arrays()}
 
 
 def _other_store(seen: str | None) -> str:
@@ -148,5 +180,5 @@ def _other_store(seen: str | None) -> str:
 
 def layout_mark(url: str) -> str | None:
     """Return what tells a layout of a store from every other one; None where there is no store."""
-    document = read_bytes(url, "zarr.json")
-    return None if document is None else hashlib.blake2b(document, digest_size=16).hexdigest()
+    content = read_bytes(url, "zarr.json")
+    return None if content is None else hashlib.blake2b(content, digest_size=16).hexdigest()

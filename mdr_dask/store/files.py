@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+import errno
+import itertools
 import json
 import os
-import platform
-from collections.abc import Iterator, Mapping
+import uuid
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -15,13 +19,21 @@ import zarr
 from zarr.core.buffer import default_buffer_prototype
 from zarr.core.sync import sync
 
-from mdr_dask.errors import MdrDaskError, StoreBusyError, StoreError
+from mdr_dask.errors import MdrDaskError, StoreError
 
 #: How the study of a campaign without series is called where series stand beside it.
 ROOT = "-"
 
-#: Raised when the layout changes so that older code cannot read it.
-LAYOUT = 1
+#: Where the claims of runners lie in a store whose file system, or server, has no locks.
+CLAIMS = ".claims/"
+#: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
+KEPT = ("zarr.json", CLAIMS.rstrip("/"))
+
+#: Requests to a server at a time.
+AT_ONCE = 64
+
+#: Raised when the layout changes so that older code cannot go on with it. 2: chunks have digests, records lie together.
+LAYOUT = 2
 
 
 def local(url: str) -> Path | None:
@@ -76,20 +88,181 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
     """Return a JSON document, or None if there is none of that name."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
-        return None if content is None else json.loads(content)
+        try:
+            return None if content is None else json.loads(content)
+        except RecursionError:
+            raise ValueError("nested too deep") from None
+
+
+def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
+    """Yield name and content of many files in order, None for those that are gone; from a server, many at once."""
+    if local(url) is not None:
+        for name in files:
+            yield name, read_bytes(url, name)
+        return
+
+    async def gather(names: tuple[str, ...]) -> list[Any]:
+        return await asyncio.gather(*[bytes_of(url).get(name, default_buffer_prototype()) for name in names])
+
+    remaining = iter(files)
+    while window := tuple(itertools.islice(remaining, AT_ONCE)):
+        with guarded(url, f"reading {window[0]} and others"):
+            found = sync(gather(window))
+        yield from (
+            (name, None if one is None else bytes(one.to_bytes())) for name, one in zip(window, found, strict=True)
+        )
+
+
+def sizes(url: str, files: Iterable[str]) -> Iterator[tuple[str, int | None]]:
+    """Yield name and number of bytes of files in order, None for those that are gone."""
+    path = local(url)
+    if path is None:
+        store = bytes_of(url)
+        with guarded(url, "listing it"):
+            found = sync(store.fs._find(store.path, detail=True))
+        known = {name.removeprefix(f"{store.path}/"): told["size"] for name, told in found.items()}
+        yield from ((name, known.get(name)) for name in files)
+        return
+    for name in files:
+        with guarded(url, f"looking at {name}"):
+            try:
+                size = os.stat(f"{path}/{name}").st_size  # noqa: PTH116 (of a hundred thousand, a Path each is slow)
+            except FileNotFoundError:
+                yield name, None
+            else:
+                yield name, size
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:
     """Replace what stands under a name, at once."""
+    write_stages(url, [{name: content}])
+
+
+def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
+    """Write files, those of each stage after those of the one before, each at once; all last when this returns.
+
+    On a disk everything is flushed under other names first. The names are given in order, and flushed in the end: one
+    wait for all contents, and one for all names.
+    """
+    path = local(url)
+    if path is not None:
+        _write_local(url, path, [item for stage in stages for item in stage.items()])
+        return
+
+    async def write(stage: Mapping[str, bytes]) -> None:
+        buffer = default_buffer_prototype().buffer
+        await asyncio.gather(*[bytes_of(url).set(name, buffer.from_bytes(data)) for name, data in stage.items()])
+
+    for stage in stages:
+        if stage:
+            with guarded(url, f"writing {next(iter(stage))}"):
+                sync(write(stage))
+
+
+def _write_local(url: str, root: Path, files: list[tuple[str, bytes]]) -> None:
+    unnamed: dict[Path, Path] = {}
+    folders: dict[Path, None] = {}
+    try:
+        for name, content in files:
+            target = root / name
+            unnamed[target] = target.with_name(f"{target.name}.{uuid.uuid4().hex}.partial")
+            with guarded(url, f"writing {name}"):
+                folders |= dict.fromkeys([*_make(target.parent), target.parent])
+                put(unnamed[target], content)
+        with guarded(url, f"writing {', '.join(name for name, _ in files)}"):
+            _flush(unnamed.values())
+            for target, leftover in unnamed.items():
+                give_name(leftover, target)
+            _flush(folders)
+    except BaseException:
+        for leftover in unnamed.values():
+            leftover.unlink(missing_ok=True)
+        raise
+
+
+def put(path: Path, content: bytes) -> None:
+    """Write bytes to a new file."""
+    path.write_bytes(content)
+
+
+def give_name(leftover: Path, target: Path) -> None:
+    """Make a file that is complete take the place of what stands under a name."""
+    leftover.replace(target)
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder; return those in which a new one stands."""
+    if folder.is_dir():
+        return []
+    above = [*_make(folder.parent), folder.parent]
+    folder.mkdir(exist_ok=True)
+    return above
+
+
+def _flush(paths: Iterable[Path]) -> None:
+    """Wait until files, and the names in folders, are on the disk; together, since a disk writes them together."""
+    list(_flushers().map(_flush_one, paths))
+
+
+def _flush_one(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP) or not path.is_dir():  # some have no flush for folders
+            raise
+    finally:
+        os.close(descriptor)
+
+
+@lru_cache(maxsize=1)
+def _flushers() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(8, thread_name_prefix="flush")
+
+
+def create(url: str, name: str, content: bytes) -> bool:
+    """Write bytes under a name that is free, and return True; leave one that is taken, and return False."""
+    path = local(url)
     with guarded(url, f"writing {name}"):
-        sync(bytes_of(url).set(name, default_buffer_prototype().buffer.from_bytes(content)))
+        try:
+            if path is None:
+                store = bytes_of(url)
+                sync(store.fs._pipe_file(f"{store.path}/{name}", content, mode="create"))
+            else:
+                (path / name).parent.mkdir(parents=True, exist_ok=True)
+                with (path / name).open("xb") as file:
+                    file.write(content)
+        except FileExistsError:
+            return False
+    return True
+
+
+def conditional(url: str) -> bool:
+    """Say whether `create` is one act of the server, not a look before a write."""
+    if local(url) is not None:
+        return True
+    from fsspec import AbstractFileSystem
+
+    wrapped = getattr(bytes_of(url).fs, "sync_fs", None)
+    return wrapped is None or type(wrapped).pipe_file is not AbstractFileSystem.pipe_file
+
+
+def remove(url: str, files: Iterable[str]) -> None:
+    """Remove files by name; those that are gone are no matter."""
+
+    async def delete() -> None:
+        for name in files:
+            await bytes_of(url).delete(name)
+
+    with guarded(url, "removing files"):
+        sync(delete())
 
 
 def clear(url: str) -> None:
     """Remove what a run left that took the place and got no further."""
 
     async def remove() -> None:
-        for name in [name async for name in bytes_of(url).list_dir("") if name != "zarr.json"]:
+        for name in [name async for name in bytes_of(url).list_dir("") if name not in KEPT]:
             await bytes_of(url).delete_dir(name)
 
     with guarded(url, "clearing it"):
@@ -106,148 +279,27 @@ def sweep(url: str) -> None:
                     leftover.unlink(missing_ok=True)
 
 
-def names(url: str, prefix: str) -> list[str]:
-    """Return the names of all JSON documents below a prefix, in order."""
+def listed(url: str, prefix: str = "") -> list[str]:
+    """Return the names of all files below a prefix, in order."""
+    path = local(url)
+    if path is not None:
+        with guarded(url, f"listing {prefix}"):
+            found = os.walk(path / prefix, onerror=_raise_unless_gone)
+            below = len(f"{path}/") if str(path) != "." else 0
+            return sorted(f"{folder}/{name}"[below:] for folder, _, files in found for name in files)
 
     async def collect() -> list[str]:
-        return sorted([name async for name in bytes_of(url).list_prefix(prefix) if name.endswith(".json")])
+        return sorted([name async for name in bytes_of(url).list_prefix(prefix)])
 
-    with guarded(url, f"listing {prefix}"):
+    with guarded(url, f"listing {prefix or 'it'}"):
         return sync(collect())
 
 
-def exists(url: str) -> bool:
-    """Say whether there is a study at a path or URL, whoever made it.
-
-    Raises
-    ------
-    StoreError
-        If there is something else.
-    """
-    path = local(url)
-    if path is not None and path.is_file():
-        raise StoreError(f"{url}: a file, expected the folder of a store or nothing")
-    found = _root_attributes(url)
-    if found is None and path is not None and path.is_dir():
-        others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial")
-        if others:
-            raise StoreError(f"{url}: a folder that holds something else ({others[0]}), expected a store or nothing")
-    return found is not None and not only_claimed(found)
-
-
-def is_study(url: str) -> bool:
-    """Say whether there is a study of mdr_dask at a path or URL."""
-    return "mdr_dask_layout" in (_root_attributes(url) or {})
-
-
-def _root_attributes(url: str) -> dict[str, Any] | None:
-    """Return the attributes of whatever Zarr there is, or None if there is none."""
-    metadata = read_json(url, "zarr.json")
-    if metadata is None:
-        return None
-    found = metadata.get("attributes", {}) if isinstance(metadata, dict) else {}
-    return found if isinstance(found, dict) else {}
-
-
-def only_claimed(found: Mapping[str, Any]) -> bool:
-    """Say whether a run took the place and was stopped before its arrays were laid out."""
-    return list(found) == ["mdr_dask_layout"]
-
-
-def attributes(url: str) -> dict[str, Any]:
-    """Return the attributes of a study.
-
-    Raises
-    ------
-    StoreError
-        If there is no study of mdr_dask at `url`, or one with a newer layout.
-    """
-    path = local(url)
-    if path is not None and path.is_file():
-        raise StoreError(f"{url}: a file, expected the folder of a store; 'mdr-dask run {url}' runs a campaign")
-    found = _root_attributes(url)
-    if found is None:
-        raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")
-    if "mdr_dask_layout" not in found:
-        raise StoreError(f"{url}: Zarr, but not a study that mdr_dask made")
-    if found["mdr_dask_layout"] > LAYOUT:
-        raise StoreError(f"{url}: made by a newer mdr_dask (layout {found['mdr_dask_layout']}, known: {LAYOUT})")
-    if only_claimed(found):
-        raise StoreError(f"{url}: still empty, its first run has not come far enough; run the campaign")
-    return found
-
-
-def series_names(url: str) -> list[str]:
-    """Return the names of the groups of a study, ``""`` for one without series and `ROOT` if series stand beside it."""
-    root = "axes" in attributes(url)
-    metadata = read_json(url, "zarr.json") or {}
-    members = metadata["consolidated_metadata"]["metadata"]
-    names = [name for name, member in members.items() if member["node_type"] == "group"]
-    return ([ROOT] if names else [""]) * root + names
+def _raise_unless_gone(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError):
+        raise error
 
 
 def group_name(series: str, member: str = "") -> str:
     """Return the path of a member of a series' group, or of the group itself; arrays without series are at the root."""
     return "/".join(part for part in ("" if series == ROOT else series, member) if part)
-
-
-@contextmanager
-def lock(url: str, name: str = "") -> Iterator[None]:
-    """Hold a lock beside a study; the operating system lets go of it however its holder ends.
-
-    Parameters
-    ----------
-    url : str
-        Path of the store. A store at a URL has no lock: do not start two runners on it.
-    name : str
-        Which of its locks; that of a runner alone has no name.
-
-    Raises
-    ------
-    StoreBusyError
-        If another process holds it; the message names that process.
-    StoreError
-        If nothing can be written there.
-    """
-    if local(url) is None:
-        yield
-        return
-    from filelock import FileLock, Timeout
-
-    file = lock_file(url, name)
-    guard = FileLock(file, timeout=0)
-    with guarded(url, "making it"):
-        if not file.parent.exists():
-            file.parent.mkdir(parents=True, exist_ok=True)
-        file.touch()  # where this fails, the lock would say that somebody else holds it
-        try:
-            guard.acquire()
-        except Timeout:
-            raise StoreBusyError(f"{url}: {holder(file)} is running on this store; wait for it, or stop it") from None
-    try:
-        with guarded(url, "making it"):
-            _holder_file(file).write_text(f"process {os.getpid()} on {platform.node()}")
-        yield
-    finally:
-        _holder_file(file).unlink(missing_ok=True)
-        guard.release()
-
-
-def lock_file(url: str, name: str = "") -> Path:
-    """Return the file of a lock beside a store on this machine."""
-    path = Path(url.removeprefix("file://"))
-    try:
-        path = path.resolve()
-    except (OSError, RuntimeError, ValueError) as error:  # a link to itself, a null character
-        raise StoreError(f"{url}: expected a path: {error}") from None
-    return path.with_name(".".join(["", path.name, *filter(None, [name]), "lock"]))
-
-
-def holder(file: Path) -> str:
-    """Return who holds a lock that is held."""
-    told = _holder_file(file)
-    return told.read_text() if told.exists() else "another process"
-
-
-def _holder_file(file: Path) -> Path:
-    return file.with_suffix(".runner")

@@ -16,8 +16,9 @@ from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import DataFile
-from mdr_dask.store.files import ROOT, attributes, group_name, read_json, series_names
+from mdr_dask.store.files import ROOT
 from mdr_dask.store.layout import plain_values
+from mdr_dask.store.study import attributes, document, series_names
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
 
 
 def _group_attributes(url: str, name: str) -> dict[str, Any] | None:
-    metadata = read_json(url, group_name(name, "zarr.json"))
+    metadata = document(url, name)
     if metadata is None or "axes" not in metadata["attributes"]:
         return None
     shape = metadata["consolidated_metadata"]["metadata"]["status"]["shape"]
@@ -111,7 +112,7 @@ def _study_differences(url: str, campaign: Campaign) -> list[str]:
 
 
 def _arrays_at_root(url: str) -> set[str]:
-    members = (read_json(url, "zarr.json") or {})["consolidated_metadata"]["metadata"]
+    members = (document(url) or {})["consolidated_metadata"]["metadata"]
     return {name for name, member in members.items() if member["node_type"] == "array"}
 
 

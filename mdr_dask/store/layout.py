@@ -20,12 +20,15 @@ from mdr_dask import models
 from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import DataFile, Status, unit_of
 from mdr_dask.plan import Template
-from mdr_dask.store.files import LAYOUT, clear, group_name, only_claimed, read_json, write_bytes
+from mdr_dask.store.copies import Copy
+from mdr_dask.store.files import LAYOUT, clear, group_name, read_many, write_bytes, write_stages
+from mdr_dask.store.records import digest
+from mdr_dask.store.study import document, only_claimed
 from mdr_dask.version import __version__
 
 _COORDINATE_CHUNK = 4096
 #: What `_series_attributes` writes; at the root it outlasts campaigns of which that study is no part.
-_OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks")
+OF_SERIES = ("series", "parameters", "axes", "outputs", "blocks", "notes")
 _Coordinate = tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]
 
 
@@ -49,38 +52,42 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     """
     if all(_is_laid_out(url, template) for template in layout):
         return
-    held = read_json(url, "zarr.json")
+    held = document(url)
     if held is None:
-        write_bytes(url, "zarr.json", _group_document({}, {"mdr_dask_layout": LAYOUT}))
+        write_bytes(url, "zarr.json", group_document({}, {"mdr_dask_layout": LAYOUT}))
     elif only_claimed(held["attributes"]):
         clear(url)
     members: dict[str, Any] = held["consolidated_metadata"]["metadata"] if held else {}
     study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
-    root = {name: held["attributes"][name] for name in _OF_SERIES if name in held["attributes"]} if held else {}
-    groups: dict[str, bytes] = {}
-    for template in layout:
-        name = template.series.name
-        path = group_name(name, "zarr.json").removesuffix("zarr.json")
-        files = _arrays_in_memory(template)
-        for file, content in files.items():
-            write_bytes(url, f"{path}{file}", content)
+    root = {name: held["attributes"][name] for name in OF_SERIES if name in held["attributes"]} if held else {}
+    copies = [_copy(url, template, study) for template in layout]
+    for copy in copies:
+        members |= copy.members
+        root = root if copy.series else dict(copy.own)
+    own = {copy.series: group_name(copy.series, "zarr.json") for copy in copies if copy.series}
+    files = {name: content for copy in copies for name, content in copy.files.items()}
+    groups = {name: files.pop(name) for name in own.values()}
+    root_document = {"zarr.json": group_document(members, study | root)}
+    write_stages(url, [dict(copy.file() for copy in copies), files, groups, root_document])
+
+
+def _copy(url: str, template: Template, study: Mapping[str, Any]) -> Copy:
+    series, own = template.series.name, _series_attributes(template)
+    path = group_name(series, "zarr.json").removesuffix("zarr.json")
+    files = _arrays_in_memory(template)
+    if series:
         arrays = {file.removesuffix("/zarr.json"): json.loads(files[file]) for file in files if "zarr.json" in file}
-        members |= {f"{path}{array}": document for array, document in arrays.items()}
-        own = study | _series_attributes(template)
-        if name:
-            groups[f"{path}zarr.json"] = _group_document(arrays, own)
-            members[name] = {"zarr_format": 3, "node_type": "group", "attributes": own}
-        else:
-            root = _series_attributes(template)
-    for path, content in groups.items():
-        write_bytes(url, path, content)
-    write_bytes(url, "zarr.json", _group_document(members, study | root))
+        files["zarr.json"] = group_document(arrays, {**study, **own})
+    held = read_many(url, [f"{path}{name}" for name in files])
+    before = {name: digest(content) for name, content in held if content is not None}
+    return Copy(series, {f"{path}{name}": content for name, content in files.items()}, study, own, before)
 
 
 def _is_laid_out(url: str, template: Template) -> bool:
-    held = read_json(url, group_name(template.series.name, "zarr.json"))
-    root = read_json(url, "zarr.json")
+    held, root = document(url, template.series.name), document(url)
     if held is None or root is None or "axes" not in held["attributes"]:
+        return False
+    if root["attributes"]["mdr_dask_layout"] < LAYOUT:
         return False
     wanted = json.loads(json.dumps(_series_attributes(template)))
     status = group_name(template.series.name, "status")
@@ -234,12 +241,12 @@ def plain_values(values: tuple[Any, ...]) -> list[Any]:
     return [list(value) if isinstance(value, tuple) else value for value in plain]
 
 
-def _group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
+def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:
     """Return the metadata of a group, attributes and all: written at once, it is what makes a new shape visible."""
-    document = {
+    held = {
         "zarr_format": 3,
         "node_type": "group",
         "attributes": attrs,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": members},
     }
-    return json.dumps(document, indent=1).encode()
+    return json.dumps(held, indent=1).encode()

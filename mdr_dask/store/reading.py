@@ -13,7 +13,10 @@ from pathlib import Path
 import xarray as xr
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import bytes_of, group_name, series_names
+from mdr_dask.store.digests import Checked
+from mdr_dask.store.files import bytes_of, group_name
+from mdr_dask.store.sound import require_laid_out
+from mdr_dask.store.study import document, series_names
 
 #: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
 LAZY_BYTES = 2**30
@@ -58,11 +61,15 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
         If there is no study of mdr_dask at `url`.
     """
     with readable(url):
-        return {name: _open_sorted(url, name) for name in series_names(url)}
+        names = series_names(url)
+        require_laid_out(url, names)
+        return {name: _open_sorted(url, name) for name in names}
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
-    opened = partial(xr.open_zarr, bytes_of(url), group=group_name(series) or None, consolidated=True)
+    document(url, series)
+    store = Checked(bytes_of(url), url, series)
+    opened = partial(xr.open_zarr, store, group=group_name(series) or None, consolidated=True, zarr_format=3)
     dataset: xr.Dataset = opened(chunks=None)
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})

@@ -6,19 +6,24 @@ so a part and a runner alone never meet, and a study is laid out by one of them 
 
 from __future__ import annotations
 
+import logging
 import re
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 
 from mdr_dask.errors import StoreBusyError
-from mdr_dask.store.files import holder, local, lock, lock_file, sweep
+from mdr_dask.store.files import sweep
+from mdr_dask.store.locks import Hold, forget, holder, is_known, lock, lock_names
 
 _ENTRANCE = "entrance"
+_PART = "part-"
+log = logging.getLogger("mdr_dask.store")
 #: Seconds between two tries at the entrance.
 KNOCK = 0.1
+#: Seconds after which waiting there is no longer silent.
+SILENT = 4.0
 #: Seconds that somebody who only wants to know waits there.
 GLANCE = 2.0
 
@@ -42,7 +47,7 @@ class Part:
     @property
     def lock(self) -> str:
         """Name of its lock."""
-        return f"part-{self.number}-of-{self.count}"
+        return f"{_PART}{self.number}-of-{self.count}"
 
     @classmethod
     def of(cls, position: int, count: int) -> Part:
@@ -55,7 +60,7 @@ class Part:
 
 
 @contextmanager
-def alone(url: str) -> Iterator[None]:
+def alone(url: str) -> Iterator[Hold]:
     """Hold a study for one runner; the operating system lets go of it however that ends.
 
     Raises
@@ -70,15 +75,15 @@ def alone(url: str) -> Iterator[None]:
             parts = _parts(url)
             if parts:
                 raise StoreBusyError(f"{url}: {_named(parts)} running on this store; wait for them, or stop them")
-            held.enter_context(lock(url))
-            for file in _part_files(url):
-                file.unlink(missing_ok=True)
+            hold = held.enter_context(lock(url))
+            for name in _part_locks(url):
+                forget(url, name)
             sweep(url)
-        yield
+        yield hold
 
 
 @contextmanager
-def beside(url: str, part: Part) -> Iterator[None]:
+def beside(url: str, part: Part) -> Iterator[Hold]:
     """Hold one part of a study, with other parts of as many beside it.
 
     Raises
@@ -95,10 +100,10 @@ def beside(url: str, part: Part) -> Iterator[None]:
             unfit = [other for other in others if other == part or other.count != part.count]
             if unfit:
                 raise StoreBusyError(f"{url}: {_named(unfit)} running on this store; wait for them, or stop them")
-            held.enter_context(lock(url, part.lock))
+            hold = held.enter_context(lock(url, part.lock))
             if not others:
                 sweep(url)
-        yield
+        yield hold
 
 
 @contextmanager
@@ -110,15 +115,19 @@ def entrance(url: str, patience: float = float("inf")) -> Iterator[None]:
     StoreBusyError
         If somebody else holds it for longer than `patience` seconds.
     """
-    start = time.monotonic()
+    start, told = time.monotonic(), False
     with ExitStack() as held:
         while True:
             try:
                 held.enter_context(lock(url, _ENTRANCE))
                 break
-            except StoreBusyError:
-                if time.monotonic() - start > patience:
+            except StoreBusyError as error:
+                waited = time.monotonic() - start
+                if waited > patience:
                     raise
+                if waited > SILENT and not told:
+                    log.warning("%s; waiting until it has looked at what is there", error.args[0].partition(";")[0])
+                    told = True
                 time.sleep(KNOCK)
         yield
 
@@ -131,25 +140,22 @@ def at_work(url: str) -> tuple[str | None, list[Part]]:
     StoreError
         If that cannot be found out, since the study is being laid out, or belongs to somebody else.
     """
-    if local(url) is None or not lock_file(url, _ENTRANCE).exists():
+    if not is_known(url):
         return None, []
     with entrance(url, GLANCE):
-        runner = None if _is_free(url) else holder(lock_file(url))
+        runner = None if _is_free(url) else holder(url)
         return runner, _parts(url)
 
 
 def _parts(url: str) -> list[Part]:
     """Return the parts at work; only for who holds the entrance."""
-    names = (file.name.rpartition(".part-")[2].removesuffix(".lock").split("-of-") for file in _part_files(url))
-    known = sorted(Part(int(number), int(count)) for number, count in names)
+    numbers = (name.removeprefix(_PART).split("-of-") for name in _part_locks(url))
+    known = sorted(Part(int(number), int(count)) for number, count in numbers)
     return [part for part in known if not _is_free(url, part.lock)]
 
 
-def _part_files(url: str) -> list[Path]:
-    if local(url) is None:
-        return []
-    pattern = re.compile(re.escape(lock_file(url, "part-NUMBER").name).replace("NUMBER", r"\d+-of-\d+"))
-    return [file for file in lock_file(url).parent.glob(".*.lock") if pattern.fullmatch(file.name)]
+def _part_locks(url: str) -> list[str]:
+    return [name for name in lock_names(url) if re.fullmatch(rf"{_PART}\d+-of-\d+", name)]
 
 
 def _is_free(url: str, name: str = "") -> bool:

@@ -1,0 +1,57 @@
+"""The command that reads all of a store, and mends it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from mdr_dask.cli.printing import print_json, print_rows, printable
+
+if TYPE_CHECKING:
+    from mdr_dask.store import Inspection
+
+
+@click.command()
+@click.argument("store")
+@click.option("--repair", is_flag=True, help="Write metadata anew, mark damaged blocks as missing, set the rest aside.")
+@click.option("--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most lines; 0 for all.")
+@click.option("--json", "form", flag_value="json", help="Print one JSON document.")
+def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
+    """Read every file of a store and name what is damaged, missing, swapped or foreign; exit code 1 if anything is.
+
+    \b
+    mdr-dask verify results/quickstart.zarr
+    mdr-dask verify results/quickstart.zarr --repair
+    """
+    from mdr_dask import store as room
+
+    found, left = room.repair(store) if repair else (room.verify(store), None)
+    if form == "json":
+        print_json(_document(found) | ({"left": _document(left)["findings"]} if left else {}))
+    else:
+        _print(store, found, limit)
+    if left is None:
+        return 1 if found.findings else 0
+    for finding in left.findings:
+        click.echo(printable(f"left as it is: {finding.kind} {finding.name}: {finding.what}"), err=True)
+    return 1 if left.findings else 0
+
+
+def _print(store: str, found: Inspection, limit: int) -> None:
+    rows = [{"kind": f.kind, "file": printable(f.name), "what": printable(f.what)} for f in found.findings]
+    if rows:
+        print_rows(rows, {}, "table", limit)
+    for note in found.notes:
+        click.echo(printable(note))
+    bad = sum(len(group.bad_blocks) for group in found.groups)
+    click.echo(f"{store}: {found.files} files, {found.blocks} blocks: {len(rows) or 'no'} faults")
+    if bad:
+        click.echo(
+            f"{bad} blocks are damaged; with --repair they are marked as missing, and the next run computes them"
+        )
+
+
+def _document(found: Inspection) -> dict[str, object]:
+    findings = [{"kind": f.kind, "file": f.name, "what": f.what} for f in found.findings]
+    return {"files": found.files, "blocks": found.blocks, "findings": findings, "notes": found.notes}

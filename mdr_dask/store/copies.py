@@ -1,0 +1,114 @@
+"""A second copy of what lays a group out: its metadata and coordinates, as they were made from the campaign.
+
+It is written before the files themselves. A file is sound if it is as in the copy, or as in the one before: so also
+while a study is laid out anew, and after a run that was killed meanwhile.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from mdr_dask.errors import StoreError
+from mdr_dask.store.files import ROOT, group_name, read_bytes
+from mdr_dask.store.records import digest
+
+_NAME = "status/layout.json"
+
+
+@dataclass(frozen=True)
+class Copy:
+    """What lays a group out.
+
+    Parameters
+    ----------
+    series : str
+        Name of the group; empty for that of a study without series.
+    files : mapping of str to bytes
+        Metadata of its arrays and chunks of its coordinates, and of a series the metadata of its group, by their names
+        in the store.
+    study, own : mapping
+        Attributes of the study as of then, and of the group.
+    before : mapping of str to str
+        Digests of the files of the copy before.
+    """
+
+    series: str
+    files: Mapping[str, bytes]
+    study: Mapping[str, Any]
+    own: Mapping[str, Any]
+    before: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def members(self) -> dict[str, Any]:
+        """What the root's consolidated metadata have to say of the group."""
+        own = group_name(self.series, "zarr.json")
+        suffix = "/zarr.json"
+        arrays = {
+            name.removesuffix(suffix): json.loads(content)
+            for name, content in self.files.items()
+            if name.endswith(suffix) and name != own
+        }
+        if not self.series:
+            return arrays
+        attributes = {**self.study, **self.own}
+        return {**arrays, self.series: {"zarr_format": 3, "node_type": "group", "attributes": attributes}}
+
+    def is_sound(self, name: str, content: bytes | None) -> bool:
+        """Say whether a file is as it was made, now or before."""
+        return content is not None and (content == self.files[name] or digest(content) == self.before.get(name))
+
+    def file(self) -> tuple[str, bytes]:
+        """Return the name and the content of the file that holds the copy."""
+        held = {
+            "series": self.series,
+            "study": self.study,
+            "own": self.own,
+            "files": {name: base64.b64encode(content).decode() for name, content in self.files.items()},
+            "before": self.before,
+        }
+        text = json.dumps(held, sort_keys=True)
+        return copy_name(self.series), json.dumps({**held, "digest": digest(text.encode())}, sort_keys=True).encode()
+
+
+def copy_name(series: str) -> str:
+    """Return the name of the copy of a group."""
+    return group_name(series, _NAME)
+
+
+def read_copy(url: str, series: str) -> Copy | None:
+    """Return the copy of a group, None if there is none.
+
+    Raises
+    ------
+    StoreError
+        If it is damaged.
+    """
+    content = read_bytes(url, copy_name(series))
+    if content is None:
+        return None
+    damaged = StoreError(f"{url}: {copy_name(series)} is damaged")
+    try:
+        held = json.loads(content)
+        stated = held.pop("digest")
+        files = {name: base64.b64decode(text) for name, text in held["files"].items()}
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise damaged from None
+    if held["series"] != ("" if series == ROOT else series):
+        raise damaged
+    if stated != digest(json.dumps(held, sort_keys=True).encode()):
+        raise damaged
+    return Copy(held["series"], files, held["study"], held["own"], held["before"])
+
+
+def root_of(copies: list[Copy]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return members and attributes of the root's metadata, put together from the copies of all groups."""
+    latest = max(copies, key=lambda copy: len(copy.study["history"]))
+    root = next((copy.own for copy in copies if not copy.series), {})
+    members: dict[str, Any] = {}
+    for copy in copies:
+        members |= copy.members
+    return members, {**latest.study, **root}

@@ -1,0 +1,232 @@
+"""Verify and repair: whatever is harmed is named, and the next run ends with the bytes of an undisturbed one."""
+
+import json
+import random
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import damage
+import numpy as np
+import pytest
+import zarr
+from test_execute import digests, run
+from test_locks import late_task, small
+
+from mdr_dask import execute, store
+from mdr_dask.cli import main
+from mdr_dask.errors import StoreError
+from mdr_dask.execute import Resources
+from mdr_dask.store.records import digest
+from mdr_dask.task import run_block
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """Sound stores to copy, without and with series, and their campaigns."""
+    import toy
+
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        toy.register(patch)
+        paths = {series: folder / f"{series}.zarr" for series in (False, True)}
+        return {series: (path, damage.build(toy, str(path), series)) for series, path in paths.items()}
+
+
+HARMS = [(kind, list(damage.HARMS)[number % len(damage.HARMS)]) for number, kind in enumerate(damage.KINDS)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "harm"), [*HARMS, ("values", "swap with a sibling"), ("ledger", "swap with a sibling")]
+)
+def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm):
+    """Every kind of file once; ``python -m benchmarks runner damage 700`` tries every harm to each, many times."""
+    draw = random.Random(f"{kind} {harm}")
+    series = damage.KINDS[kind].startswith("far")
+    trial = damage.try_harm(toy, *whole[series], tmp_path / "harmed.zarr", kind, harm, draw)
+    assert trial.changed
+    assert trial.faults == []
+
+
+def test_the_command_lists_what_it_finds_and_mends_it(toy, url, capsys):
+    run(small(toy), url)
+    assert main(["verify", url]) == 0
+    assert f"{url}: 25 files, 2 blocks: no faults" in capsys.readouterr().out
+    Path(url, "height/c/0/1").unlink()
+    Path(url, "notes.txt").write_text("mine")
+    assert main(["verify", url, "--json"]) == 1
+    document = json.loads(capsys.readouterr().out)
+    assert [(found["kind"], found["file"]) for found in document["findings"]] == [
+        ("missing", "height/c/0/1"),
+        ("foreign", "notes.txt"),
+    ]
+    assert main(["status", url]) == 2
+    assert "damaged: height/c/0/1 is missing; 'mdr-dask verify" in capsys.readouterr().err
+    assert main(["verify", url, "--repair"]) == 1
+    assert "left as it is: foreign notes.txt" in capsys.readouterr().err
+    Path(url, "notes.txt").unlink()
+    assert main(["verify", url]) == 0
+    assert run(small(toy), url).done == 4
+
+
+def test_a_store_at_which_a_run_is_at_work_is_not_verified(url, toy, capsys):
+    run(small(toy), url)
+    with store.alone(url):
+        assert main(["verify", url]) == 2
+        assert main(["verify", url, "--repair"]) == 2
+    assert capsys.readouterr().err.count("is running on this store") == 2
+
+
+def test_a_run_that_was_killed_leaves_nothing_to_find_fault_with(toy, url, monkeypatch):
+    late = late_task(toy, url, monkeypatch)
+    assert store.verify(url).findings == []
+    values = {"height": np.zeros(late.wanted.reshape(2, -1).shape)}
+    with store.lock(url) as hold, monkeypatch.context() as patch:
+        stages = []
+        patch.setattr("mdr_dask.store.blocks.write_stages", lambda _, given: stages.extend(given))
+        record = {"attempt": 1, "block": list(late.place.index), "messages": []}
+        status = np.ones(values["height"].shape, np.int8)
+        store.write_block(replace(late.place, hold=hold), 1, values, status, record)
+    for stage in stages[:-1]:  # all but the ledger
+        store.files.write_stages(url, [stage])
+        found = store.verify(url)
+        assert found.findings == []
+    assert found.notes == ["some blocks were begun and never finished; the next run computes them"]
+    assert run(small(toy), url).done == 12
+
+
+def test_the_checksum_of_bytes_and_their_checksum_is_no_digest():
+    """Why chunks are not told apart by the checksum that they end with."""
+    import google_crc32c
+
+    ends = [content + google_crc32c.value(content).to_bytes(4, "little") for content in (b"one", b"another")]
+    assert len({google_crc32c.value(end) for end in ends}) == 1
+    assert len({digest(end) for end in ends}) == 2
+
+
+def test_records_of_many_blocks_lie_together(toy, url, monkeypatch):
+    monkeypatch.setattr("mdr_dask.store.TOGETHER", 3)
+    monkeypatch.setattr("mdr_dask.execute.executors.THREAD_WINDOW", 1)
+    seen = []
+    folder = Path(url, "status/records")
+
+    def look(_):
+        seen.append(len(list(folder.glob("*.json"))))
+
+    execute.run(damage.campaign(toy, False), url, Resources(threads=1), look)
+    assert 0 < max(seen) < 5
+    assert not list(folder.glob("*.json"))
+    assert set(store.attempts(url, "")) == {(i, j) for i in range(4) for j in range(2)}
+
+
+def test_a_store_of_an_earlier_version_is_verified_as_far_as_it_can_be(toy, url, capsys):
+    run(small(toy), url)
+    older(url)
+    assert main(["verify", url]) == 0
+    assert "made by an earlier version, without digests" in capsys.readouterr().out
+    sound = Path(url).with_name("sound.zarr")
+    shutil.copytree(url, sound)
+    for name, harm in (
+        ("height/c/0/0", damage.flip),
+        ("position/c/0", damage.flip),
+        ("height/zarr.json", damage.truncate),
+    ):
+        harm(Path(url, name), random.Random(1))
+        assert [finding.kind for finding in store.verify(url).findings] == ["damaged"]
+        shutil.copy(sound / name, Path(url, name))
+    Path(url, "height/zarr.json").unlink()
+    Path(url, "height/c/0/0").write_bytes(b"")
+    found, left = store.repair(url)
+    assert {finding.name for finding in found.findings} == {"height/zarr.json", "height/c/0/0"}
+    assert left.findings == []
+    assert run(small(toy, 9), url).done > 6
+    assert store.verify(url).findings == []
+    run(small(toy, 9), url + "2")
+    assert digests(url) == digests(url + "2")
+
+
+def older(url: str) -> None:
+    """Make a store as version 0.2.0.dev0 left it: no copy of the layout, no digests, records apart."""
+    Path(url, "status/layout.json").unlink()
+    for record in list(store.records(url, "")):
+        name = f"{'.'.join(map(str, record['block']))}-{record['attempt']}.json"
+        del record["chunks"]
+        Path(url, "status/records", name).write_text(json.dumps(record))
+    next(Path(url, "status/records").glob("*.jsonl")).unlink()
+    root = json.loads(Path(url, "zarr.json").read_text())
+    root["attributes"]["mdr_dask_layout"] = 1
+    Path(url, "zarr.json").write_text(json.dumps(root))
+
+
+HOSTILE = {
+    "another format": lambda root: root.update(zarr_format=2),
+    "a member of another format": lambda root: members(root)["height"].update(
+        zarr_format=2, filters=[{"id": "pickle"}]
+    ),
+    "a codec that runs code": lambda root: members(root)["height"].update(codecs=[{"name": "numcodecs.pickle"}]),
+    "no codecs": lambda root: members(root)["height"].pop("codecs"),
+    "a storage transformer": lambda root: members(root)["height"].update(storage_transformers=[{"name": "x"}]),
+    "no consolidated metadata": lambda root: root.pop("consolidated_metadata"),
+    "a member that is a number": lambda root: members(root).update(height=3),
+    "no model": lambda root: root["attributes"].pop("model"),
+    "no outputs": lambda root: root["attributes"].pop("outputs"),
+    "a layout in words": lambda root: root["attributes"].update(mdr_dask_layout="two"),
+    "attributes that are a list": lambda root: root.update(attributes=[1]),
+}
+
+
+def members(root):
+    return root["consolidated_metadata"]["metadata"]
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_the_metadata_of_strangers_are_refused_before_anything_is_opened(toy, url, monkeypatch, capsys, kind):
+    run(small(toy), url)
+    root = json.loads(Path(url, "zarr.json").read_text())
+    HOSTILE[kind](root)
+    Path(url, "zarr.json").write_text(json.dumps(root))
+
+    def opened(*_, **__):
+        raise AssertionError("opened")
+
+    for name in ("open_group", "open_array", "open"):
+        monkeypatch.setattr(zarr, name, opened)
+    monkeypatch.setattr("xarray.open_zarr", opened)
+    for command in ("status", "show", "plot", "fit", "aggregate"):
+        assert main([command, url]) == 2
+        said = capsys.readouterr().err
+        assert "mdr-dask verify" in said
+        assert len(said.splitlines()) == 1
+    with pytest.raises(StoreError, match="verify"):
+        run(small(toy), url)
+
+
+def test_metadata_that_never_end_are_refused(toy, url, capsys):
+    run(small(toy), url)
+    Path(url, "zarr.json").write_text("[" * 100_000)
+    assert main(["status", url]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    assert store.repair(url)[1].findings == []
+    assert main(["status", url]) == 0
+
+
+def test_blocks_tell_the_kind_of_machine_and_a_second_kind_is_named(toy, url, monkeypatch):
+    run(small(toy), url)
+    told = {record["kind"] for record in store.records(url, "")}
+    assert len(told) == 1
+    assert {"processor", "BLAS", "numpy", "scipy", "numba"} <= set(told.pop().replace(",", "").split())
+    monkeypatch.setattr("mdr_dask.task.kind", lambda: "processor of another kind")
+    sentences = []
+
+    def tell(event):
+        sentences.append(event.sentence)
+
+    execute.run(small(toy, 9), url, Resources(threads=1), lambda _: None, tell=tell)
+    assert any("blocks come from 2 kinds of machine, last digits may differ" in sentence for sentence in sentences)
+
+
+def test_a_task_is_done_once(toy, url, monkeypatch):
+    late = late_task(toy, url, monkeypatch)
+    with pytest.raises(StoreError, match="nothing was written"):
+        run_block(late)
+    assert run(small(toy), url).done == 12
