@@ -17,6 +17,7 @@ from mdr_dask.cli.results import aggregate, fit, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
+from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
 BROKE = 3
@@ -54,6 +55,7 @@ for command in (
     plot,
     figures,
     master_curve,
+    surface,
     schema,
 ):
     cli.add_command(command)
