@@ -23,6 +23,7 @@ from mdr_dask.version import __version__
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: the largest that glibc allows on the heap, and a few of them
 
+
 @dataclass(frozen=True)
 class Work:
     """One task: everything a worker needs to compute a block and write it.
