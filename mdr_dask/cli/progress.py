@@ -37,6 +37,20 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 
 @contextmanager
+def at_work(what: str) -> Iterator[None]:
+    """Tell a terminal now and then that something takes long, and why."""
+
+    def draw(_: Progress | None, elapsed: float) -> None:
+        click.echo(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]), err=True)
+
+    if not sys.stderr.isatty():
+        yield
+        return
+    with _beating(draw, PAUSE):
+        yield
+
+
+@contextmanager
 def _beating(draw: Draw, pause: float) -> Iterator[Callable[[Progress], None]]:
     """Draw the latest progress, and the time since the start, at every beat."""
     started, ended = time.monotonic(), threading.Event()
