@@ -209,6 +209,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
             click.echo(
                 f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
             )
+    if "law_holds" in curve:
+        click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
     _print_outliers(curve)
     for sentence in ("left_out", "undetermined"):
         if curve.attrs.get(sentence):
