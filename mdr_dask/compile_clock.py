@@ -22,11 +22,11 @@ class CompileClock:
             self._running += 1
 
     def end(self) -> None:
-        """Note that one has ended."""
+        """Note that one has ended; one that began before the clock was there counts nothing."""
         with self._lock:
-            self._running -= 1
-            if not self._running:
+            if self._running == 1:
                 self._before += time.perf_counter() - self._since
+            self._running = max(self._running - 1, 0)
 
     @property
     def is_running(self) -> bool:

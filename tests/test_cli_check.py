@@ -2,9 +2,12 @@
 
 import json
 import math
+import re
+from pathlib import Path
 
 import pytest
 
+from mdr_dask.campaign import load
 from mdr_dask.cli import main
 from mdr_dask.cli.understood import human_bytes, spacing
 
@@ -140,6 +143,21 @@ def test_bare_numbers_far_from_usual_are_asked_about(kind, files, capsys):
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith("bare.yaml:")
         assert question in line
+
+
+SHIPPED = sorted((Path(__file__).parents[1] / "campaigns").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_no_shipped_campaign_is_asked_about(path):
+    assert load(path).remarks == ()
+
+
+def test_moduli_of_no_solid_are_asked_about(files, capsys):
+    (files / "rubber.csv").write_text(rubber((0, 20, 50)).replace("MPa", "mPa"))
+    assert main(["check", "tyre.yaml"]) == 0
+    told = r"rubber.csv: shear moduli of 1.079 mPa to 35.62 mPa are those of no solid: is the unit right\?"
+    assert re.search(told, capsys.readouterr().out)
 
 
 @pytest.mark.parametrize(("size", "told"), [(999, "999 B"), (1500, "1.5 kB"), (39.2e9, "39 GB"), (2.5e14, "250 TB")])

@@ -1,12 +1,19 @@
 """Figures on the command line: what is run, drawn, left out and said."""
 
+import hashlib
+import re
+import sys
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
-from mdr_dask import datasets, plots
+import mdr_dask
+from mdr_dask import __version__, plots
 from mdr_dask.cli import main
 from mdr_dask.plots.base import Plot
+from mdr_dask.store import datasets
 
 CAMPAIGN = """\
 name: small
@@ -44,8 +51,9 @@ def filled(campaign) -> str:
 def test_figures_runs_what_is_missing_and_draws_what_the_store_holds(campaign, capsys):
     assert main(["figures", str(campaign), "-o", "drawn", "--quiet"]) == 0
     streams = capsys.readouterr()
-    files = {path.name for path in Path("drawn").iterdir()}
+    files = {path.name for path in Path("drawn").iterdir() if path.suffix == ".png"}
     assert files - {"small-master_curve.png"} == {f"small-{name}.png" for name in HELD}
+    assert {path.stem for path in Path("drawn").glob("*.csv")} == {Path(file).stem for file in files}
     assert {line.rpartition("/")[2] for line in streams.out.splitlines() if "drawn/" in line} == files
     assert all((Path("drawn") / file).stat().st_size > 10_000 for file in files)
     (data,) = datasets("results/small.zarr").values()
@@ -95,3 +103,66 @@ def test_failed_and_missing_results_are_counted_under_a_figure(campaign, capsys)
     assert 0 < failed < data["status"].size
     assert main(["plot", "results/small.zarr", "velocity"]) == 0
     assert f"{failed} of {data['status'].size} results of the store, which" in capsys.readouterr().err
+
+
+def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, capsys):
+    command = ["plot", filled, "friction_coefficient", "--over", "velocity", "--by", "normal_force"]
+    assert main([*command, "--units", "velocity=km/h", "--size", "85mm", "-o", "drawn/mu.pdf"]) == 0
+    assert (Path("drawn") / "mu.pdf").read_bytes().startswith(b"%PDF")
+    table = pd.read_csv("drawn/mu.csv", comment="#")
+    data = table[table["what"] == "data"].set_index(["normal_force", "velocity"])
+    (study,) = datasets(filled).values()
+    mean = study["friction_coefficient"].mean("realisation").to_series()
+    np.testing.assert_allclose(data["y"].reindex(mean.index), mean)
+    np.testing.assert_allclose(data["x"], 3.6 * data.index.get_level_values("velocity"))
+    assert np.all(data["y_low"] < data["y"])
+    assert np.all(data["y"] < data["y_high"])
+    assert set(table["what"]) == {"data", "law (eq. 3.18)"}
+    head = "".join(line for line in Path("drawn/mu.csv").read_text().splitlines(True) if line.startswith("#"))
+    digest = hashlib.sha256(CAMPAIGN.encode()).hexdigest()
+    for said in (
+        f"# mdr_dask: {__version__}, figure friction_coefficient-over-velocity",
+        f"campaign small, sha256 {digest}, model sliding_friction",
+        f"# store {filled}:",
+        f"# command: mdr-dask plot {filled} friction_coefficient --over velocity",
+        "hurst = 0.7",
+        "shear_modulus = 10000000 Pa",
+        "# units: normal_force [N], velocity [m/s]",
+        "# panel 1: x: velocity v [km/h]; y: coefficient of friction",
+    ):
+        assert said in head
+    assert main(["plot", filled, filled, "contact_fraction", "--over", "velocity", "--over", "normal_force"]) == 0
+    assert main(["plot", filled, "friction_coefficient", "rms_slope", "--effects", "-o", "drawn"]) == 0
+    assert (Path("drawn") / "small-rms_slope-effects.csv").exists()
+    assert "Traceback" not in capsys.readouterr().err
+    named = ["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]
+    assert main(named) == 0
+    assert "not drawn: cases other than friction_coefficient < 1e-4" in capsys.readouterr().err
+    slow = pd.read_csv("drawn/slow.csv", comment="#")
+    slow = slow[slow["what"] == "data"]
+    assert len(slow) == int((mean < 1e-4).sum()) > 0
+    figure = mdr_dask.plot(filled, "friction_coefficient", over="velocity", by="normal_force")
+    shown = figure.table()
+    np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
+
+
+@pytest.mark.parametrize(
+    "view", ["--over normal_force --by sliding_distance", "--over normal_force --over sliding_distance", "--effects"]
+)
+def test_outputs_of_a_model_of_ones_own_have_figures_too(view, tmp_path, monkeypatch):
+    page = (Path(__file__).parents[1] / "docs/own-model.md").read_text()
+    module, campaign = (re.search(rf"^```{kind}\n(.*?)^```", page, flags=re.M | re.S)[1] for kind in ("python", "yaml"))
+    (tmp_path / "wear_rate.py").write_text(module)
+    (tmp_path / "pin.yaml").write_text(campaign)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.delitem(sys.modules, "wear_rate", raising=False)
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    assert main(["plot", "results/pin.zarr"]) == 0
+    assert main(["plot", "results/pin.zarr", "wear_volume", *view.split(), "-o", "own.svg"]) == 0
+    table = pd.read_csv("own.csv", comment="#")
+    (study,) = datasets("results/pin.zarr").values()
+    wanted = study["wear_volume"].mean("realisation").values.ravel()
+    drawn = table["value" if "value" in table else "y"]
+    assert all(np.isclose(drawn, mean, rtol=1e-9, atol=0).any() for mean in wanted)
+    sys.modules.pop("wear_rate", None)

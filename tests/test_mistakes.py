@@ -109,6 +109,7 @@ def test_a_mistake_is_a_sentence_that_says_what_to_do(right, wrong, told):
 
 
 QUOTED = ("seed: 1", "realisations: 2", "points: 500", "hurst: 0.7")
+COUNT = "1 m/s, 4]"
 
 
 def test_numbers_in_quotes_are_numbers_everywhere():
@@ -116,6 +117,7 @@ def test_numbers_in_quotes_are_numbers_everywhere():
     for entry in QUOTED:
         name, _, number = entry.partition(": ")
         text = text.replace(entry, f"{name}: '{number}'")
+    text = text.replace(COUNT, "1 m/s, '4']")
     quoted, plain = (loads(each, "study.yaml", ".") for each in (text, CAMPAIGN))
     assert quoted.series == plain.series
     assert (quoted.seed, quoted.replication) == (plain.seed, plain.replication)

@@ -48,7 +48,7 @@ def test_compilations_beside_each_other_count_once(monkeypatch):
     now = [0.0]
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
     clock = clocks.CompileClock()
-    for moment, call in ((1, "begin"), (2, "begin"), (4, "end"), (5, "end"), (9, "begin"), (10, "end")):
+    for moment, call in ((0, "end"), (1, "begin"), (2, "begin"), (4, "end"), (5, "end"), (9, "begin"), (10, "end")):
         now[0] = float(moment)
         getattr(clock, call)()
     assert clock.seconds == 5.0

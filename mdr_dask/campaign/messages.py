@@ -27,7 +27,7 @@ _KINDS = {
     "int_from_float": "a whole number",
     "float_type": "a number",
     "bool_type": "true or false",
-    "string_type": "a text",
+    "string_type": "a string",
     "dict_type": "a mapping",
     "tuple_type": "a list",
     "list_type": "a list",

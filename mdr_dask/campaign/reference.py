@@ -146,8 +146,9 @@ def _units() -> str:
         [
             "## Units",
             "",
-            "A number without a unit is in SI. With a unit it is a text, `20 mm`, `10 mPa s`, `5 1/mm`, `870 kg/m^3`;",
-            "the unit has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`.",
+            "A number without a unit is in SI. With a unit it is a string, `20 mm`, `10 mPa s`, `870 kg/m^3`; the unit",
+            "has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`. A bare number more than",
+            "three decades from a usual value, such as `length: 20`, is read as it stands, and asked about.",
             "",
             f"Prefixes: {', '.join(f'`{prefix}`' for prefix in prefixes)}, and their names.",
             "",
@@ -228,7 +229,7 @@ _NOUNS = {
     "number": "number",
     "integer": "whole number",
     "boolean": "true, false",
-    "string": "text",
+    "string": "string",
     "object": "mapping",
 }
 

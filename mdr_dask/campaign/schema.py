@@ -112,7 +112,7 @@ def _alone(key: str, value: Schema, description: str) -> Schema:
 
 
 def _readable(node: Any, unit: bool = False) -> Any:
-    """Return a schema without titles, in which every quantity may be a text with a unit."""
+    """Return a schema without titles, in which every quantity may be a string with a unit."""
     if isinstance(node, list):
         return [_readable(item, unit) for item in node]
     if not isinstance(node, Mapping):

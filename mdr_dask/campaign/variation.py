@@ -180,6 +180,8 @@ class _Search:
 
     def _items(self, spread: Spread, content: list[Any], at: Path) -> list[Item]:
         name, count = at[:-1], content[2]
+        if isinstance(count, str) and count.isascii() and count.isdigit():
+            count = int(count)  # in quotes, as any number may be
         if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
             self._complain(
                 (*at, 2), f"expected a whole number from 2 to {MOST_VALUES} of values, got {shown(count)}", name

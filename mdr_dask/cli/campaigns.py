@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdr_dask.cli.printing import print_json, printable
+from mdr_dask.cli.progress import at_work
 from mdr_dask.cli.understood import axes_rows, costs_row, study_lines
 from mdr_dask.cli.writing import writing
 
@@ -112,8 +113,9 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     rows, problems = [], []
     for path in campaigns:
         try:
-            campaign = load(path)
-            costs = estimate(campaign)
+            with at_work(f"checking {path}"):
+                campaign = load(path)
+                costs = estimate(campaign)
         except CampaignError as error:
             problems += list(error.args)
             continue

@@ -14,6 +14,7 @@ from mdr_dask.cli.printing import print_json, print_rows, table
 from mdr_dask.cli.results import Reading
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 from mdr_dask.errors import DataError
+from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,10 +98,10 @@ def master_curve(
         with writing(keep):
             _keep(curve, part, keep)
     if figure is not None:
+        from mdr_dask.cli.figures import save
         from mdr_dask.plots.master_curve import draw_master_curve
 
-        with writing(figure):
-            draw_master_curve(curve).savefig(figure, dpi=150)
+        save(draw_master_curve(curve), figure, {"mdr_dask": f"{__version__}, master-curve", "source": source})
     _print(curve, part, form)
 
 
@@ -208,6 +209,8 @@ def _print(curve: xr.Dataset, part: str, form: str | None) -> None:
             click.echo(
                 f"the law {law} misses the factors by {float(curve[f'{law}_residual']):.2g} decades (rms)", err=True
             )
+    if "law_holds" in curve:
+        click.echo(f"law_holds = {curve['law_holds'].item()}", err=True)
     _print_outliers(curve)
     for sentence in ("left_out", "undetermined"):
         if curve.attrs.get(sentence):

@@ -25,12 +25,29 @@ def reporter(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Yield the function that takes the progress of a run; it is shown now and then, whether it is called or not."""
     if quiet:
         yield lambda _: None
+    elif "ipykernel" in sys.modules:
+        with _in_notebook() as draw, _beating(draw, LIVE_PAUSE) as show:
+            yield show
     elif sys.stderr.isatty():
         with _live() as draw, _beating(draw, LIVE_PAUSE) as show:
             yield show
     else:
         with _beating(_print_line, PAUSE) as show:
             yield show
+
+
+@contextmanager
+def at_work(what: str) -> Iterator[None]:
+    """Tell a terminal now and then that something takes long, and why."""
+
+    def draw(_: Progress | None, elapsed: float) -> None:
+        click.echo(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]), err=True)
+
+    if not sys.stderr.isatty():
+        yield
+        return
+    with _beating(draw, PAUSE):
+        yield
 
 
 @contextmanager
@@ -71,6 +88,23 @@ def _live() -> Iterator[Draw]:
             bar.update(task, total=total, completed=settled, description=describe(progress, elapsed))
 
         yield draw
+
+
+@contextmanager
+def _in_notebook() -> Iterator[Draw]:
+    """Draw a bar below the cell of a notebook while it runs."""
+    from IPython.display import HTML, display
+
+    handle = display(HTML(_html(None, 0.0)), display_id=True)
+    try:
+        yield lambda progress, elapsed: handle.update(HTML(_html(progress, elapsed)))
+    finally:
+        handle.update(HTML(""))
+
+
+def _html(progress: Progress | None, elapsed: float) -> str:
+    done = f'value="{progress.total - progress.to_do}" max="{max(progress.total, 1)}"' if progress else ""
+    return f"<progress {done}></progress> {describe(progress, elapsed)}"
 
 
 def _print_line(progress: Progress | None, elapsed: float) -> None:

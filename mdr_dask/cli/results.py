@@ -1,7 +1,8 @@
-"""Commands around a store: status, show, aggregate, fit, plot."""
+"""Commands around a store: status, show, aggregate, fit."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,12 +15,11 @@ from mdr_dask.cli.options import (
     json_option,
     limit_option,
     question_options,
-    select_option,
     series_option,
     tell,
 )
 from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_intervals
-from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
+from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -231,9 +231,9 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
-        _list(model, {name: law.summary for name, law in known.items()})
+        list_names(model, {name: law.summary for name, law in known.items()})
         return
-    _require_known(names, list(known), f"law for {model}")
+    require_known(names, list(known), f"law for {model}")
     groups = stores.datasets(store)
     if series is not None:
         groups = {series: selection.group(groups, series)}
@@ -250,7 +250,8 @@ def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form
             )
 
 
-def _list(model: str, summaries: dict[str, str]) -> None:
+def list_names(model: str, summaries: dict[str, str]) -> None:
+    """Print what there is for a model, with a line about each."""
     if not summaries:
         click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)
@@ -258,78 +259,8 @@ def _list(model: str, summaries: dict[str, str]) -> None:
         click.echo(f"{name.ljust(width)}  {summary}")
 
 
-def _require_known(names: tuple[str, ...], known: list[str], what: str) -> None:
+def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
+    """Refuse a name that is not known."""
     for name in names:
         if name not in known:
             raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")
-
-
-@click.command(cls=Reading)
-@store_argument
-@click.argument("names", nargs=-1)
-@click.option("--all", "everything", is_flag=True, help="Draw every figure that the store has the data for.")
-@click.option("--series", "series", multiple=True, help="Only this series; repeat.")
-@select_option
-@click.option("--output", "-o", type=click.Path(path_type=Path), help="A file for one figure, else a folder.")
-@format_option
-def plot(
-    store: str,
-    names: tuple[str, ...],
-    everything: bool,
-    series: tuple[str, ...],
-    selections: tuple[str, ...],
-    output: Path | None,
-    suffix: str,
-) -> None:
-    """Draw figures from a store; without a name, say which figures there are.
-
-    A figure holds axes that it cannot show at one value, and says which; --select chooses another.
-
-    \b
-    mdr-dask plot results/quickstart.zarr velocity -o quickstart.png
-    mdr-dask plot results/friction_force.zarr --all -o figures
-    mdr-dask plot results/friction_force.zarr regions --select 'normal_force=1 N'
-    """
-    from mdr_dask import plots as room
-    from mdr_dask import store as stores
-    from mdr_dask.errors import DataError, FitError
-    from mdr_dask.plots import style
-    from mdr_dask.questions import selection
-
-    model = stores.attributes(store)["model"]
-    known = room.available(model)
-    if not names and not everything:
-        _list(model, {name: figure.summary for name, figure in known.items()})
-        return
-    _require_known(names, list(known), f"figure of {model}")
-    folder, file = _places(output, alone=len(names) == 1 and not everything)
-    groups = stores.datasets(store)
-    groups = {name: selection.group(groups, name) for name in series} if series else groups
-    groups = selection.select_all(groups, selections, tell)
-    for name in names or tuple(known):
-        path = file or folder / f"{Path(store).stem}-{name}.{suffix}"
-        try:
-            figure = known[name].figure(groups)
-        except (DataError, FitError) as error:
-            if not everything:
-                raise
-            click.echo(f"{name}: left out: {error}", err=True)
-            continue
-        with writing(path):
-            figure.savefig(path, dpi=style.DPI)
-        click.echo(str(path))
-        if style.left_out(figure):
-            click.echo(f"{name}: not drawn: {style.left_out(figure)}", err=True)
-
-
-def _places(output: Path | None, alone: bool) -> tuple[Path, Path | None]:
-    """Return the folder of figures, and the file of a figure that is drawn alone where one is named."""
-    folder = output or Path("figures")
-    if not folder.suffix or folder.is_dir():
-        return folder, None
-    if alone:
-        require_suffix(folder, FIGURES)
-        return folder, folder
-    if folder.suffix in FIGURES:
-        raise click.UsageError(f"expected a folder for the figures, got {str(folder)!r}")
-    return folder, None

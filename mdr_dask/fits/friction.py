@@ -64,6 +64,17 @@ def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]
     return data["friction_coefficient"] / spectral_slope(data), *loads_and_velocities(data)
 
 
+def one_value(data: xr.Dataset, name: str) -> float:
+    """Return a parameter of which a law has one value; raise FitError where the cases of a sampled study differ."""
+    values = data[name]
+    if values.size != 1:
+        raise FitError(
+            f"expected one {name}, or an axis of its own for it, got {values.size} values of a sampled study: "
+            "each has constants of its own"
+        )
+    return float(values.item())
+
+
 def constant(name: str, stack: FloatArray, count: int, long_name: str, positive: bool = False) -> Variables:
     """Return a constant and the ends of its interval."""
     low, high = bootstrap.interval(stack, count, positive)
@@ -214,7 +225,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     worst = f"F_N / (G h L) = {np.exp(x[np.argmax(np.abs(found.departures))]):.2g}"
     return {
         **constant("alpha", alpha, count, "exponent of the force in zone 1"),
-        **measure("alpha_stated", laws.alpha(float(data["hurst"])), "H / (1 + H)"),
+        **measure("alpha_stated", laws.alpha(one_value(data, "hurst")), "H / (1 + H)"),
         **constant("beta", np.exp(offset), count, "factor of the law of zone 1", positive=True),
         **measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
         **measure("loads", len(used), "number of loads in zone 1"),
@@ -368,7 +379,7 @@ def _interpolation(data: xr.Dataset) -> Variables:
         law: FloatArray = laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:]))
         return law
 
-    hurst = float(data["hurst"])
+    hurst = one_value(data, "hurst")
     start = (laws.alpha(hurst), float(np.log(laws.BETA)))
     stack = table.stack(used)
     found = fitted(
@@ -394,7 +405,7 @@ def _body(data: xr.Dataset) -> tuple[Any, float]:
     if "indenter_radius" in data.coords:
         return 1 / data["indenter_radius"], 2.0
     if "indenter_coefficient" in data.coords and data["indenter_exponent"].ndim == 0:
-        exponent = float(data["indenter_exponent"])
+        exponent = one_value(data, "indenter_exponent")
         return indenter.mapped(exponent) * data["indenter_coefficient"], exponent
     raise FitError("expected a store with an indenter: cone, parabola or power")
 

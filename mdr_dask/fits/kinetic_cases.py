@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -41,6 +42,8 @@ class Cases:
         missing = [name for name in needed if name not in data]
         if missing:
             raise FitError(f"expected the outputs {', '.join(needed)} in the store, got none of {', '.join(missing)}")
+        if not is_jump(data):
+            raise FitError("expected a jump of the velocity, got another loading history")
         if data.sizes["realisation"] < LEAST:
             raise FitError(f"expected at least {LEAST} realisations, got {data.sizes['realisation']}")
         template = data[LEVELS[0]].isel(realisation=0, drop=True)
@@ -151,6 +154,13 @@ class Cases:
             result[f"{name}_low"] = self.found(low, unit, f"lower end of the 95 % interval of {name}")
             result[f"{name}_high"] = self.found(high, unit, f"upper end of the 95 % interval of {name}")
         return result
+
+
+def is_jump(data: xr.Dataset) -> bool:
+    """Return whether the velocity of all cases of a series jumps at once."""
+    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
+    history = json.loads(data.attrs.get("parameters", "{}")).get("protocol") or {}
+    return not varied and history.get("shape", "jump") == "jump"
 
 
 def law_rate(number: FloatArray, hurst: FloatArray) -> FloatArray:

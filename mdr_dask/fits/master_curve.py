@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, FitError
+from mdr_dask.errors import DataError
 from mdr_dask.fits.base import Fit
-from mdr_dask.physics.superposition import laws as shift_laws
+from mdr_dask.fits.collapse import laws_of, with_verdict
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
 from mdr_dask.tables import numbers, read_sheet
@@ -31,7 +31,6 @@ ALIASES: dict[str, tuple[str, ...]] = {
 }
 """Names of columns that are understood, beside the names themselves; case does not matter."""
 
-ABSOLUTE_ZERO = -273.15
 LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
 SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
 
@@ -116,7 +115,7 @@ def master_curve(
     result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
-    return dataset.assign(_laws(result, over, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
+    return _with_laws(dataset, (result, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
 
 
 def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
@@ -247,11 +246,10 @@ def _of_two_groups(
             dataset[f"second_vertical_factor{part}"] = extra[f"vertical_factor{part}"]
     if draws:
         dataset["second_draws"] = extra["draws"]
-    laws = _laws(found.first, over, by[0], units.get(by[0], "")) | _laws(
-        found.second, over, by[1], units.get(by[1], "")
-    )
     about = {"second": by[1], "second_reference": found.second.reference}
-    return dataset.assign(laws).assign_attrs(about, chi_squared=found.chi_squared, probability=found.probability)
+    parts = [(one, name, units.get(name, "")) for one, name in zip((found.first, found.second), by, strict=True)]
+    dataset = _with_laws(dataset, *parts)
+    return dataset.assign_attrs(about, chi_squared=found.chi_squared, probability=found.probability)
 
 
 def _curves(
@@ -346,33 +344,14 @@ def _dataset(
     return xr.Dataset(found, {by: (by, result.groups, {"units": units.get(by, "")})}, attrs)
 
 
-def _laws(result: superposition.Superposition, over: str, by: str, unit: str) -> dict[str, xr.Variable]:
-    """Fit the laws that suit the group: a power of velocities, Arrhenius and WLF for temperatures."""
-    size = result.groups.size
-    covariance = result.covariance[:size, :size]
-    fits = []
-    try:
-        if _is_temperature(by):
-            sign = -1 if over == "t" or over.lower() == "time" else 1
-            kelvin = 0.0 if unit.upper() in ("K", "KELVIN", "") and np.all(result.groups > 0) else -ABSOLUTE_ZERO
-            temperatures = result.groups + kelvin, sign * result.horizontal, covariance, result.reference + kelvin
-            fits = [shift_laws.fit_arrhenius(*temperatures), shift_laws.fit_wlf(*temperatures)]
-        elif np.all(result.groups > 0):
-            fits = [shift_laws.fit_power(result.groups, result.horizontal, covariance, result.reference)]
-    except FitError:
-        return {}
-    return {name: value for law in fits for name, value in _constants(law).items()}
-
-
-def _constants(law: shift_laws.ShiftLaw) -> dict[str, xr.Variable]:
-    units = {"activation_energy": "J/mol", "c2": "K"}
-    found = {}
-    for key, (value, low, high) in law.constants.items():
-        for suffix, number in (("", value), ("_low", low), ("_high", high)):
-            found[f"{law.name}_{key}{suffix}"] = xr.Variable((), number, {"units": units.get(key, "1")})
-    meaning = {"units": "1", "long_name": "rms distance of the factors from the law, decades"}
-    found[f"{law.name}_residual"] = xr.Variable((), law.residual, meaning)
-    return found
+def _with_laws(dataset: xr.Dataset, *parts: tuple[superposition.Superposition, str, str]) -> xr.Dataset:
+    """Return a master curve with the laws of its parts (what was found, its group and unit), and a verdict."""
+    over = str(dataset.attrs["abscissa"])
+    told: dict[str, str] = {}
+    for found, by, unit in parts:
+        constants, verdicts = laws_of(found, over, unit, is_temperature=_is_temperature(by))
+        dataset, told = dataset.assign(constants), told | verdicts
+    return with_verdict(dataset, told)
 
 
 def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
@@ -413,8 +392,8 @@ def rereferenced(curve: xr.Dataset, reference: float) -> xr.Dataset:
         values: curve["curve_ordinate"].attrs.get("units", ""),
     }
     new = superposition.rereference(old, _inside(groups, reference), _is_logarithmic(by, groups))
-    dataset = _dataset(new, over, values, by, units).assign(_laws(new, over, by, units[by]))
-    for name in [name for name in curve.data_vars if name not in dataset]:
+    dataset = _with_laws(_dataset(new, over, values, by, units), (new, by, units[by]))
+    for name in [name for name in curve.data_vars if name not in dataset or name == "law_holds"]:
         dataset[name] = curve[name]
     if "point_shift" in curve:
         dataset["point_shift"] = curve["point_shift"] + float(new.horizontal[0] - old.horizontal[0])

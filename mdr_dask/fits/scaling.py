@@ -23,6 +23,7 @@ from mdr_dask.fits.friction import (
     holds,
     loads_and_velocities,
     measure,
+    one_value,
     peak_velocity,
     spectral_slope,
     table_of,
@@ -53,7 +54,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
     used = _slowest(force, velocity, table.mean() > 0)
     if len(used) < 3:
         raise FitError(f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]}, got {len(used)}")
-    x, count, hurst = np.log(force[used]), table.count(used), float(data["hurst"])
+    x, count, hurst = np.log(force[used]), table.count(used), one_value(data, "hurst")
     design = np.vstack([x, np.ones(x.size)])
     found = fitted(
         lambda logs: logs @ np.linalg.pinv(design),
@@ -118,7 +119,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     """Compare the slope in contact with eq. 3.21 over the size of the contact."""
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, _one(1.0), output="contact_fraction")
-    hurst, points = float(data["hurst"]), float(data["points"])
+    hurst, points = one_value(data, "hurst"), one_value(data, "points")
     law = contact_slope_law(fractions.mean(), hurst, points)
     used = np.flatnonzero((slopes.mean() > 0) & np.isfinite(law))
     if used.size < 3:
@@ -262,7 +263,7 @@ def _collapse(data: xr.Dataset) -> Variables:
     x, which, count = np.log(velocity[used]), np.array(curve), table.count(used)
     stack = np.log(table.stack(used))
     reference = len(loads) // 2
-    start = -np.log(laws.crossover(np.array(loads), laws.alpha(float(data["hurst"])), laws.BETA))
+    start = -np.log(laws.crossover(np.array(loads), laws.alpha(one_value(data, "hurst")), laws.BETA))
     found = collapse(x, stack, which, start, reference)
     if not bootstrap.chance(found.residuals, count) >= DOUBTFUL:
         missed = np.concatenate([stack[:1], bootstrap.moved(stack[0], found.residuals[0])])

@@ -8,7 +8,9 @@ from importlib.metadata import entry_points
 from mdr_dask.plots.base import Plot
 
 #: Modules of this room that hold ``PLOTS``.
-SUBJECTS: tuple[str, ...] = ("contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "wear")
+SUBJECTS: tuple[str, ...] = (
+    *("contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "scaling", "wear"),
+)
 
 #: Entry point group in which other packages offer tuples of `Plot`.
 GROUP = "mdr_dask.plots"

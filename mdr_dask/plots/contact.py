@@ -12,7 +12,7 @@ from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -104,13 +104,13 @@ def draw_contact(groups: Mapping[str, xr.Dataset]) -> Figure:
     cases = [data.isel({over: k}) for k in range(data.sizes[over])] if over else [data]
     if not cases:
         raise DataError("expected a case with a depth, got none that succeeded")
-    figure, panels = style.panels(2 * len(cases), columns=2, size=(5.6, 2.8))
+    figure, panels = drawing.panels(2 * len(cases), columns=2, size=(5.6, 2.8))
     alike = curves.fixed_by_all([curves.scalars(case) for case in cases])
     for k, case in enumerate(cases):
         contact = contact_of(case)
         own = {key: value for key, value in curves.scalars(case).items() if key not in alike}
         for axes, part in zip(panels[2 * k : 2 * k + 2], (slice(None), _close_up(contact)), strict=True):
-            _draw_one(axes, contact, part)
+            _draw_one(axes, case, contact, part)
         share = f"{contact.touching.mean():.2%} of the line touches"
         panels[2 * k].set_title(", ".join(p for p in (curves.fixed_text(own, CASE), share) if p), fontsize="small")
         panels[2 * k + 1].set_title("a part of it", fontsize="small")
@@ -132,13 +132,13 @@ def _close_up(contact: Contact) -> slice:
     return slice(start, start + width)
 
 
-def _draw_one(axes: Axes, contact: Contact, part: slice) -> None:
+def _draw_one(axes: Axes, case: xr.Dataset, contact: Contact, part: slice) -> None:
     place, line, elastomer = contact.place[part] * MILLI, contact.line[part] * MICRO, contact.elastomer[part] * MICRO
-    axes.fill_between(place, line, line.min() - 0.05 * np.ptp(line), color="0.85", linewidth=0)
-    axes.plot(place, line, lw=0.6, color="0.4", label="rigid line", gid=style.DATA)
-    axes.plot(place, elastomer, lw=1.0, color=style.COLOURS[0], label="elastomer", gid=style.DATA)
+    axes.fill_between(place, line, line.min() - 0.05 * np.ptp(line), color="0.85", linewidth=0, gid=style.GUIDE)
+    drawing.plain(axes, place, line, label="rigid line", of=case, lw=0.6, color="0.4")
+    drawing.plain(axes, place, elastomer, label="elastomer", of=case, lw=1.0, color=style.COLOURS[0])
     touching = np.where(contact.touching[part], line, np.nan)
-    axes.plot(place, touching, lw=2.0, color=style.COLOURS[1], label="contact", gid=style.DATA)
+    drawing.plain(axes, place, touching, label="contact", of=case, lw=2.0, color=style.COLOURS[1])
     shown = [elastomer.min(), elastomer.max(), *([line.min()] if part != slice(None) else [])]
     axes.set_ylim(min(shown) - 0.1 * np.ptp(shown) - 1e-9, max(shown) + 0.1 * np.ptp(shown) + 1e-9)
     axes.set(xlabel=style.with_unit("place $x$", "mm"), ylabel=style.with_unit("height", "µm"))
@@ -155,7 +155,7 @@ def draw_lines(groups: Mapping[str, xr.Dataset]) -> Figure:
     if data.sizes["realisation"] > 1:
         told.append(f"realisations but the first of {data.sizes['realisation']}")
     data, thinned = curves.thin(data.isel(realisation=0), "hurst", MOST_LINES)
-    figure, panels = style.panels(data.sizes["hurst"], columns=1, size=(7.0, 1.3), sharex=True)
+    figure, panels = drawing.panels(data.sizes["hurst"], columns=1, size=(7.0, 1.3), sharex=True)
     for k, axes in enumerate(panels):
         case = data.isel(hurst=k)
         problems, setting = _line(case)
@@ -163,7 +163,7 @@ def draw_lines(groups: Mapping[str, xr.Dataset]) -> Figure:
         count = 2 * waves.points
         place = np.arange(count) / count * problems.length[0] * MILLI
         height = waves.heights(count) * problems.height[0] * MICRO
-        axes.plot(place, height, lw=0.6, color=style.COLOURS[0], gid=style.DATA)
+        drawing.plain(axes, place, height, of=case, lw=0.6, color=style.COLOURS[0])
         axes.set_title(style.named("hurst", case["hurst"]), fontsize="small")
         axes.set_ylabel(style.with_unit("height", "µm"))
     panels[-1].set_xlabel(style.with_unit("place $x$", "mm"))

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import style
+from mdr_dask.plots.drawing import Curve, Mean
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,28 +23,8 @@ if TYPE_CHECKING:
 
 #: Dimensions that outputs have of their own, for data without a status.
 OWN = {"relaxation_times", "radius", "position", "angle", "block", "regime"}
-#: Points of a curve from which on they have no markers.
-MANY_POINTS = 60
 #: Line styles that tell a second parameter apart.
 MOST_STYLES = len(style.LINES)
-
-
-class Mean(NamedTuple):
-    """A mean over realisations with the ends of its 95 % interval, NaN where nothing is known of its error."""
-
-    value: xr.DataArray
-    low: xr.DataArray
-    high: xr.DataArray
-
-
-class Curve(NamedTuple):
-    """What one curve of a figure is drawn from, and how."""
-
-    data: xr.Dataset
-    label: str
-    colour: Any
-    line: str
-    marker: str
 
 
 class Family(NamedTuple):
@@ -365,62 +345,27 @@ def parameters_at(case: xr.Dataset) -> dict[str, Any]:
     return parameters
 
 
-def draw(axes: Axes, curve: Curve, x: Any, y: Mean, bars: bool = False) -> None:
-    """Draw a curve with its band, or with bars; points that belong on no line have bars."""
-    across, value, low, high = (_flat(each) for each in (x, y.value, y.low, y.high))
-    order = np.argsort(across, kind="stable")
-    across, value, low, high = across[order], value[order], low[order], high[order]
-    few = value.size < MANY_POINTS
-    marker, size = curve.marker if few or not curve.line else "", 3
-    look: dict[str, Any] = {"ms": size, "lw": 1.2, "color": curve.colour, "label": curve.label or None}
-    axes.plot(across, value, linestyle=curve.line or "none", marker=marker, gid=style.DATA, **look)
-    if not np.isfinite(low).any():
-        return
-    if bars or not curve.line:
-        _draw_bars(axes, across, value, _lengths(value, low, high), curve.colour)
-        return
-    axes.fill_between(across, low, high, color=curve.colour, alpha=0.25, linewidth=0, gid=style.BAND)
-
-
-def scatter(
-    axes: Axes, x: Any, y: Mean, colour: Any, marker: str, label: str | None, along: Mean | None = None
-) -> None:
-    """Draw points with their bars, upwards and perhaps sideways."""
-    across, value = _flat(x), _flat(y.value)
-    axes.plot(across, value, marker, ms=4, color=colour, label=label, gid=style.DATA)
-    _draw_bars(axes, across, value, _lengths(value, _flat(y.low), _flat(y.high)), colour)
-    if along is not None:
-        sideways = _lengths(across, _flat(along.low), _flat(along.high))
-        axes.errorbar(across, value, xerr=sideways, fmt="none", ecolor=colour, elinewidth=0.6)
-
-
-def _lengths(value: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the lengths of bars down and up, 0 where they are not known."""
-    lengths: FloatArray = np.nan_to_num(np.clip([value - low, high - value], 0, None), nan=0.0, posinf=0.0)
-    return lengths
-
-
-def _draw_bars(axes: Axes, x: FloatArray, y: FloatArray, lengths: FloatArray, colour: Any) -> None:
-    bars = axes.errorbar(x, y, lengths, fmt="none", ecolor=colour, elinewidth=0.8, capsize=2)
-    bars.lines[2][0].set_gid(style.BAND)
-
-
-def _flat(values: Any) -> FloatArray:
-    return np.atleast_1d(np.asarray(getattr(values, "values", values), dtype=np.float64)).ravel()
-
-
 def finish(figure: Figure, axes: Axes, one: Family) -> None:
-    """Draw the legend or the colour bar of a family."""
+    """Draw the legend and the colour bar of a family."""
     if one.bar is not None:
-        from matplotlib.cm import ScalarMappable
+        colour_bar(figure, [axes], *one.bar)
+    name_varying(axes, one)
+    style.legend(axes, one.heading)
 
-        name, values = one.bar
-        how, norm = style.shades(style.shown(name, values))
-        figure.colorbar(ScalarMappable(norm, how), ax=axes, label=style.label(name, values))
+
+def colour_bar(figure: Figure, axes_of: Sequence[Axes], name: str, values: xr.DataArray) -> None:
+    """Draw the colour bar of a parameter that curves differ in."""
+    from matplotlib.cm import ScalarMappable
+
+    how, norm = style.shades(style.shown(name, values))
+    figure.colorbar(ScalarMappable(norm, how), ax=list(axes_of), label=style.label(name, values))
+
+
+def name_varying(axes: Axes, one: Family) -> None:
+    """Say in the legend what changes from point to point beside the parameter of the axis."""
     if one.varying:
         symbols = ", ".join(style.quantity(name).symbol for name in one.varying)
         axes.plot([], [], " ", label=f"varying too: {symbols}")
-    style.legend(axes, one.heading)
 
 
 def results(

@@ -11,7 +11,7 @@ import xarray as xr
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.ehl_line import groups as groups_of
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def _require(values: FloatArray) -> None:
 def draw_profile(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw film and pressure against the position, one panel for each series (thesis figure B.3)."""
     found, told = curves.few(_with(groups, ("film", "pressure")))
-    figure, panels = style.panels(len(found), columns=2)
+    figure, panels = drawing.panels(len(found), columns=2)
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         family = curves.family(data, "film", "position", styled=False)
@@ -77,7 +77,7 @@ def _errors(found: Mapping[str, xr.Dataset], *outputs: str) -> str:
     return text if "grid" in text else ""
 
 
-def _measured(data: xr.Dataset, output: str, factor: float = 1.0) -> curves.Mean:
+def _measured(data: xr.Dataset, output: str, factor: float = 1.0) -> drawing.Mean:
     """Return an output with the error of its grid."""
     known = data.isel(realisation=[0]) if "realisation" in data.dims else data.expand_dims("realisation")
     return curves.measured(known, output, factor)
@@ -89,16 +89,19 @@ def _draw_one_profile(figure: Figure, axes: Axes, family: curves.Family) -> None
     for curve in family.curves:
         case = curve.data
         pressed = curve._replace(line="--", marker="", label="")
-        curves.draw(axes, pressed, case["position"], _measured(case, "pressure", 1e-9))
+        drawing.curve(axes, pressed, case["position"], _measured(case, "pressure", 1e-9))
         label = curve.label or ("film" if len(family.curves) == 1 else "")
-        curves.draw(right, curve._replace(line="-", marker="", label=label), case["position"], _measured(case, "film"))
+        drawing.curve(
+            right, curve._replace(line="-", marker="", label=label), case["position"], _measured(case, "film")
+        )
         deepest.append(np.nanmax(_one(case)["film"].where(abs(case["position"]) <= 1), initial=0.0))
     if len(family.curves) == 1:
         case = family.curves[0].data
         W = float(groups_of(case.coords.get)[0])
         p0 = 2e-9 * float(case["contact_modulus"]) * np.sqrt(W / (2 * np.pi))
         X = np.linspace(-1, 1, 201)
-        axes.plot(X, p0 * np.sqrt(1 - X**2), ":", color="0.5", label="dry contact (Hertz)")
+        dry = p0 * np.sqrt(1 - X**2)
+        drawing.law(axes, X, dry, ":", of=case, color="0.5", label="dry contact (Hertz)")
         style.legend(axes)
     right.set_ylim(0, 3 * max(deepest) if max(deepest) > 0 else 1)
     axes.set_ylim(bottom=0)
@@ -112,7 +115,7 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the films found against those of Pan and Hamrock, for every series that varies W, U or G."""
     from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
-    figure, panels = style.panels(2, sharey=True)
+    figure, panels = drawing.panels(2, sharey=True)
     told: list[str] = []
     for axes, output, formula in zip(
         panels, ("central_film", "minimum_film"), (PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM), strict=True
@@ -128,15 +131,14 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
                 "marker": marker,
                 "linestyle": "",
                 "color": style.COLOURS[index % 7],
-                "gid": style.DATA,
                 "ms": 4,
             }
             label = name or "film"
-            axes.plot(expected[inside], films[inside] / expected[inside], label=label, **look)
+            drawing.plain(axes, expected[inside], films[inside] / expected[inside], label=label, of=dataset, **look)
             if not inside.all():
                 label += ", outside the range of the formula"
                 x, y = expected[~inside], films[~inside] / expected[~inside]
-                axes.plot(x, y, markerfacecolor="none", label=label, **look)
+                drawing.plain(axes, x, y, label=label, of=dataset, markerfacecolor="none", **look)
         axes.axhline(1, color="0.5", linewidth=1)
         axes.set_xlabel(f"{formula.name}: $h/R$")
         axes.set_title(output.replace("_", " "), fontsize="small")
@@ -176,13 +178,13 @@ def draw_regimes(groups: Mapping[str, xr.Dataset]) -> Figure:
     (W, U, G, minimum), told = _moes(groups)
     M, L = moes_parameters(W, U, G)
     film = minimum / np.sqrt(2 * U)
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     how, norm = style.shades(L)
-    dots = axes.scatter(M, film, c=L, norm=norm, cmap=how, s=16, zorder=3, gid=style.DATA)
+    dots = drawing.dots(axes, M, film, L, norm=norm, cmap=how, s=16, zorder=3)
     span = np.geomspace(M.min() / 2, M.max() * 2, 100)
     limits = limiting_films(span, np.full(100, 0.5), np.ones(100))
-    axes.plot(span, limits[0], "--", color="0.4", label="rigid isoviscous: $4.895/(2M)$")
-    axes.plot(span, limits[2], ":", color="0.4", label="elastic isoviscous: $2.05\\,M^{-1/5}$")
+    drawing.law(axes, span, limits[0], "--", color="0.4", label="rigid isoviscous: $4.895/(2M)$")
+    drawing.law(axes, span, limits[2], ":", color="0.4", label="elastic isoviscous: $2.05\\,M^{-1/5}$")
     axes.set(xlabel="Moes' load $M = W (2U)^{-1/2}$", ylabel="minimum film $(h_{min}/R)(2U)^{-1/2}$")
     axes.set_ylim(0.5 * min(film.min(), limits[2].min()), 2 * film.max())
     style.logarithmic(axes, "xy")
@@ -205,16 +207,16 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
     across = np.geomspace(min(0.1, M.min() / 2), max(1e3, M.max() * 2), 300)
     up = np.geomspace(min(0.1, L[L > 0].min(initial=0.1) / 2), max(1e2, L.max() * 2), 300)
     field = regime(across, 0.5, up[:, None])  # with 2 U = 1, M is W and L is G
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     axes.set(xscale="log", yscale="log")
     shades = ListedColormap(["#dbe9f6", "#fde5c8", "#e2f0d9", "#eadcf0"])
-    axes.pcolormesh(across, up, field, cmap=shades, vmin=0, vmax=3, shading="nearest", rasterized=True)
+    axes.pcolormesh(across, up, field, cmap=shades, vmin=0, vmax=3, shading="nearest", rasterized=True, gid=style.GUIDE)
     for index, name in enumerate(REGIMES):
         rows, places = np.nonzero(field == index)
         if rows.size:
             middle = (across[int(np.median(places))], up[int(np.median(rows))])
             axes.annotate(name.replace(" ", "\n"), middle, ha="center", va="center", weight="bold", zorder=3)
-    dots = axes.scatter(M, L, c=ratio, cmap="viridis", edgecolor="0.2", linewidth=0.5, gid=style.DATA)
+    dots = drawing.dots(axes, M, L, ratio, cmap="viridis", edgecolor="0.2", linewidth=0.5)
     figure.colorbar(dots, label="minimum film found / limit of its regime")
     axes.set(xlabel="Moes' load $M = W (2U)^{-1/2}$", ylabel="Moes' lubricant parameter $L = G (2U)^{1/4}$")
     isoviscous = int((L <= 0).sum())
@@ -228,7 +230,7 @@ def _draw_along(
 ) -> Figure:
     """Draw outputs along one parameter, a panel for each series."""
     found, told = curves.few(_with(groups, outputs, along))
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         family = curves.family(data, outputs[0], along, styled=False)
@@ -238,7 +240,7 @@ def _draw_along(
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 label = curve.label if output == outputs[0] else ""
                 drawn = curve._replace(line=line if family.joined else "", marker=marker, label=label)
-                curves.draw(axes, drawn, curve.data[along], _measured(curve.data, output))
+                drawing.curve(axes, drawn, curve.data[along], _measured(curve.data, output))
         if len(outputs) > 1:
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 axes.plot([], [], line, marker=marker, ms=3, color="k", label=output.replace("_", " "))

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
 from mdr_dask.physics.sliding import laws
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -30,6 +29,7 @@ CASE = (
 )
 #: Axes that get the colours, the first that varies.
 BY = ("normal_force", "hurst", "shear_modulus", "rms_roughness", "points")
+LAW = "law (eq. 3.18)"
 FIT: dict[str, Fit] = {fit.name: fit for fit in FITS}
 
 
@@ -71,13 +71,13 @@ def _in_numbers(data: xr.Dataset) -> _Shown:
     return _Shown(factor, number / data["velocity"], x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
 
 
-def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, curves.Mean]:
+def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, drawing.Mean]:
     """Return where the points of a curve lie and their means."""
     shown = how(data)
     return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
 
 
-def _small(data: xr.Dataset) -> xr.Dataset:
+def slim(data: xr.Dataset) -> xr.Dataset:
     """Return what figures of friction need, so that nothing else is read."""
     wanted = [name for name in (MU, f"{MU}_error", "rms_slope", "status") if name in data]
     return data[wanted]
@@ -93,16 +93,16 @@ def _against_velocity(
     law: bool = False,
 ) -> Figure:
     """Draw friction against velocity, one panel for each series."""
-    found = {name: _small(data) for name, data in curves.with_outputs(groups, [MU], "velocity", *varied).items()}
+    found = {name: slim(data) for name, data in curves.with_outputs(groups, [MU], "velocity", *varied).items()}
     found, told = curves.few(found)
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         one = curves.family(data, MU, "velocity", by)
         families.append(one)
         told += [f"{name}: {each}" if name else each for each in one.left_out]
         for curve in one.curves:
-            curves.draw(axes, curve, *_mean_of(curve.data, how))
+            drawing.curve(axes, curve, *_mean_of(curve.data, how))
             if law and one.joined and is_plane(curve.data):
                 _draw_law(axes, curve)
         shown = how(one.curves[0].data)
@@ -111,14 +111,14 @@ def _against_velocity(
         if "y" not in scales:
             axes.set_ylim(bottom=0)
         if law and one.joined and is_plane(data):
-            axes.plot([], [], "k-", lw=0.8, label="law (eq. 3.18)")
+            axes.plot([], [], "k-", lw=0.8, label=LAW)
         curves.finish(figure, axes, one)
-    _titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
+    titles(figure, panels, list(found), families, subject, curves.meaning_of_bars(*found.values(), outputs=[MU]))
     style.leave_out(figure, told)
     return figure
 
 
-def _titles(
+def titles(
     figure: Figure, panels: list[Axes], names: list[str], families: list[curves.Family], subject: str, bars: str
 ) -> None:
     """Write what all panels hold fixed over the figure, and over each panel its series and what it alone holds."""
@@ -131,12 +131,12 @@ def _titles(
             axes.set_title(text, fontsize="small", wrap=True)
 
 
-def _draw_law(axes: Axes, curve: curves.Curve) -> None:
+def _draw_law(axes: Axes, curve: drawing.Curve) -> None:
     """Draw the interpolation law of one case through the range of its velocities."""
     _, force, velocity = numbers(curve.data)
     fine = np.geomspace(float(velocity.min()), float(velocity.max()), 200)
     law = laws.interpolation(_number(force), fine, _number(laws.alpha(curve.data["hurst"])), laws.BETA)
-    axes.plot(fine, law, "-", lw=0.8, alpha=0.6, color=curve.colour)
+    drawing.law(axes, fine, law, "-", name=LAW, of=curve.data, lw=0.8, alpha=0.6, color=curve.colour)
 
 
 def _number(value: Any) -> float:
@@ -158,11 +158,11 @@ def draw_forces(groups: Mapping[str, xr.Dataset]) -> Figure:
 def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against velocity for one case of each series, with the regions of the law (figure 3.7)."""
     found = curves.with_outputs(groups, [MU], "velocity", where=is_plane)
-    found = {name: _small(data) for name, data in found.items() if "velocity" in data[MU].dims}
+    found = {name: slim(data) for name, data in found.items() if "velocity" in data[MU].dims}
     if not found:
         raise DataError("expected velocity as an axis of its own: regions follow one case through the velocities")
     found, told = curves.few(found)
-    figure, panels = style.panels(len(found))
+    figure, panels = drawing.panels(len(found))
     families = []
     for axes, (name, data) in zip(panels, found.items(), strict=True):
         one, more = curves.hold(data, [dim for dim in curves.axes_of(data, MU) if dim != "velocity"])
@@ -170,22 +170,22 @@ def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
         families.append(curves.family(one, MU, "velocity"))
         _draw_regions(axes, families[-1].curves[0])
     bars = curves.meaning_of_bars(*found.values(), outputs=[MU])
-    _titles(figure, panels, list(found), families, "regions of friction against velocity", bars)
+    titles(figure, panels, list(found), families, "regions of friction against velocity", bars)
     style.leave_out(figure, told)
     return figure
 
 
-def _draw_regions(axes: Axes, curve: curves.Curve) -> None:
+def _draw_regions(axes: Axes, curve: drawing.Curve) -> None:
     data = curve.data
     velocity, value = _mean_of(data, _in_units)
-    curves.draw(axes, curve._replace(label="simulated"), velocity, value)
+    drawing.curve(axes, curve._replace(label="simulated"), velocity, value)
     _, force, number = numbers(data)
     scale = _number(number / data["velocity"])
     exponent = _number(laws.alpha(data["hurst"]))
     speeds = np.asarray(velocity.values)
     fine = np.geomspace(speeds.min(), speeds.max(), 300)
     law = np.sqrt(2) * laws.interpolation(_number(force), fine * scale, exponent, laws.BETA)
-    axes.plot(fine, law, "k--", lw=1, label="law (eq. 3.18)")
+    drawing.law(axes, fine, law, "k--", of=data, lw=1, label=LAW)
     edges = [edge / scale for edge in laws.regions(_number(force), exponent, laws.BETA)]
     edges.append(_fall(speeds, value.value.values))
     bounds = [speeds.min(), *edges, speeds.max()]
@@ -213,20 +213,20 @@ def _fall(velocity: Any, mean: Any) -> float:
 
 def _fitted(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Return the constants of a law for every series that has the data for it."""
-    known = {key: _small(data) for key, data in groups.items() if MU in data and _has_hurst(data)}
+    known = {key: slim(data) for key, data in groups.items() if MU in data and has_hurst(data)}
     if not known:
         raise DataError("expected one Hurst exponent or an axis of them: each has constants of its own")
     return curves.results(FIT[name].compute, known)
 
 
-def _has_hurst(data: xr.Dataset) -> bool:
+def has_hurst(data: xr.Dataset) -> bool:
     """Return whether the Hurst exponent is fixed or an axis of its own, not drawn along with other parameters."""
     return "hurst" in data.coords and data["hurst"].dims in ((), ("hurst",))
 
 
-def constants(found: xr.Dataset, name: str) -> curves.Mean:
+def constants(found: xr.Dataset, name: str) -> drawing.Mean:
     """Return fitted constants with their intervals."""
-    return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
+    return drawing.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
 
 
 class _Panel(NamedTuple):
@@ -241,7 +241,7 @@ class _Panel(NamedTuple):
 def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, rows: tuple[_Panel, ...]) -> Figure:
     """Draw constants of a law against the Hurst exponent, one panel for each, all series in it."""
     found = _fitted(name, groups)
-    figure, panels = style.panels(len(rows), sharex=True)
+    figure, panels = drawing.panels(len(rows), sharex=True)
     fine, told, held = np.linspace(0, 1, 101), [], []
     for axes, row in zip(panels, rows, strict=True):
         families = {key: curves.family(each, row.constant, "hurst", BY) for key, each in found.items()}
@@ -253,8 +253,8 @@ def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, ro
                 text = ", ".join(part for part in ("" if alone else key, curve.label) if part)
                 colour = curve.colour if alone else style.COLOURS[number % len(style.COLOURS)]
                 drawn = curve._replace(label=text, colour=colour, line="", marker=style.MARKERS[number % 4])
-                curves.draw(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
-        axes.plot(fine, row.law(fine), "k-", lw=1, label=row.law_label)
+                drawing.curve(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
+        drawing.law(axes, fine, row.law(fine), "k-", lw=1, label=row.law_label)
         axes.set(xlabel=style.label("hurst"), ylabel=row.label, ylim=(0, None))
         curves.finish(figure, axes, next(iter(families.values())) if len(families) == 1 else curves.NO_FAMILY)
     fixed = curves.fixed_by_all(held)
@@ -299,30 +299,29 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     points, reasons = {}, []
     for name, data in curves.with_outputs(groups, [MU]).items():
         try:
-            points[name] = _indenter_points(_small(data))
+            points[name] = _indenter_points(slim(data))
         except FitError as error:
             reasons.append(f"{name}: {error}" if name else str(error))
     if not points:
         raise FitError("; ".join(dict.fromkeys(reasons)))
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     inside = 0
     for (name, one), colour in zip(points.items(), style.scale(len(points)), strict=True):
         known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
         within = known & (one["within"] > 0)
         inside += int(within.sum())
-        axes.plot(
-            one["xi"][known & ~within], one["value"][known & ~within], ".", ms=2, color="0.8", zorder=1, gid=style.DATA
-        )
-        value = curves.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
-        curves.scatter(axes, one["xi"][within], value, colour, "o", name or "simulated")
+        away = known & ~within
+        drawing.plain(axes, one["xi"][away], one["value"][away], ".", ms=2, color="0.6", zorder=1)
+        value = drawing.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
+        drawing.points(axes, one["xi"][within], value, colour, "o", name or "simulated")
     spans = [one["xi"][np.isfinite(one["xi"]) & (one["xi"] > 0)] for one in points.values()]
     span = np.concatenate(spans)
     if not span.size:
         raise DataError("expected friction of a rough indenter, got no case that succeeded")
-    axes.plot([], [], ".", color="0.8", label="outside the law: steep or barely touching body, region IV")
+    axes.plot([], [], ".", color="0.6", label="outside the law: steep or barely touching body, region IV")
     fine = np.geomspace(span.min(), span.max(), 300)
-    axes.plot(fine, laws.indenter(fine), "k-", lw=1, label=r"law (eq. 3.40), $\alpha$ = 1.5")
-    axes.plot(fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
+    drawing.law(axes, fine, laws.indenter(fine), "k-", lw=1, label=r"law (eq. 3.40), $\alpha$ = 1.5")
+    drawing.law(axes, fine, np.minimum(fine, 1), "k:", lw=0.8, label="limits (eq. 3.34, 3.36)")
     axes.set(xlabel=r"$\xi = 8 G a \tau v \nabla z / (\sqrt{2} F_N)$", ylabel=r"$\mu$ / ($\sqrt{2}$ rms slope)")
     style.logarithmic(axes, "xy")
     style.legend(axes)
@@ -335,123 +334,11 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def draw_contact_growth(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw length and slope of the contact against the load, with F^(1 / (1 + H)) (eq. 3.12, 3.21)."""
-    found = curves.with_outputs(groups, GROWTH, "normal_force", where=is_plane)
-    found, told = curves.few(found, 3)
-    figure, panels = style.panels(2 * len(found), columns=2)
-    families = []
-    for k, (name, data) in enumerate(found.items()):
-        for axes, output in zip(panels[2 * k : 2 * k + 2], GROWTH, strict=True):
-            one = curves.family(data, output, "normal_force", ("hurst", "velocity"))
-            families.append(one)
-            for curve in one.curves:
-                _draw_contact(axes, curve, output, one.joined)
-            style.logarithmic(axes, "xy" if output == GROWTH[0] else "x")
-            curves.finish(figure, axes, one)
-        told += [f"{name}: {each}" if name else each for each in families[-1].left_out]
-    bars = curves.meaning_of_bars(*found.values(), outputs=GROWTH)
-    names = [name for name in found for _ in GROWTH]
-    subject = r"growth of the contact; dashed: $F^{1/(1+H)}$ through the lightest load"
-    grown = _said("contact_growth", "exponent", "exponent of the contact length", found)
-    _titles(figure, panels, names, families, subject, "; ".join(part for part in (bars, grown) if part))
-    style.leave_out(figure, told)
-    return figure
-
-
-GROWTH = ("contact_fraction", "contact_slope")
-
-
-def _draw_contact(axes: Axes, curve: curves.Curve, output: str, joined: bool) -> None:
-    """Draw length or slope of the contact of one family's curve against the force number."""
-    data = curve.data
-    keys = ("normal_force", "shear_modulus", "rms_roughness", "length")
-    force = laws.force_number(*(data[key] for key in keys))
-    is_length = output == GROWTH[0]
-    value = curves.measured(data, output, 1.0 if is_length else 1 / spectral_slope(data))
-    curves.draw(axes, curve, force, value)
-    axes.set_xlabel("force number $F_N / (G h L)$")
-    axes.set_ylabel("contact length / L" if is_length else "rms slope in contact / rms slope")
-    if is_length and joined:
-        _draw_growth(axes, curve, np.asarray(force.values), np.asarray(value.value.values))
-
-
-def _draw_growth(axes: Axes, curve: curves.Curve, force: Any, fraction: Any) -> None:
-    """Draw the power law of eq. 3.12 through the lightest load that is known."""
-    known = np.flatnonzero(np.isfinite(fraction) & (fraction > 0))
-    if known.size:
-        first = known[np.argmin(force[known])]
-        law = fraction[first] * (force / force[first]) ** (1 / (1 + _number(curve.data["hurst"])))
-        axes.plot(force, np.minimum(law, 1), "--", lw=0.8, color=curve.colour)
-
-
-def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
-    """Draw all friction of planes on the scales of eq. 3.23: velocity over crossover, friction over plateau."""
-    found = curves.with_outputs(groups, [MU], where=is_plane)
-    figure, (axes,) = style.panels(1)
-    points = []
-    for data in found.values():
-        one = _small(data)
-        ratio, number, velocity = numbers(one)
-        crossover = laws.crossover(number, laws.alpha(one["hurst"]), laws.BETA)
-        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], number)
-        points.append([np.asarray(column.values, dtype=np.float64).ravel() for column in columns])
-    x, y, hurst, force = (np.concatenate(column) for column in zip(*points, strict=True))
-    known = np.isfinite(y) & (y > 0)
-    if not known.any():
-        raise DataError("expected friction of a rough plane, got no case that succeeded")
-    by, values = (style.label("hurst"), hurst) if np.ptp(hurst) > 0 else (r"force number $F_N / (G h L)$", force)
-    how, norm = style.shades(values[known])
-    drawn = axes.scatter(x[known], y[known], c=values[known], s=8, cmap=how, norm=norm)
-    drawn.set_gid(style.DATA)
-    fine = np.geomspace(x[known].min(), x[known].max(), 300)
-    axes.plot(fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label="interpolation law (eq. 3.18)")
-    off = y[known] / (1 + x[known] ** -2.0) ** -0.5
-    axes.set_xlabel(r"velocity number / crossover: $v \tau \nabla z / (\sqrt{2} h) / f(F_N / G h L)$")
-    axes.set_ylabel(r"$\mu$ / ($\sqrt{2}$ rms slope)")
-    style.logarithmic(axes, "xy")
-    figure.colorbar(drawn, ax=axes, label=by)
-    style.legend(axes)
-    spread = f"{int(known.sum())} cases; half of them deviate from the law by less than {_half(off):.0%}"
-    shifted = _said("collapse", "collapsed", "share of the spread that free shifts take away", found)
-    style.title(figure, "collapse of friction on the scales of eq. 3.23", spread, shifted)
-    return figure
-
-
-def _said(name: str, constant: str, what: str, found: Mapping[str, xr.Dataset]) -> str:
-    """Return the range of a constant of the fit of the same name, and where its law holds; nothing without a fit."""
-    from mdr_dask.fits import available
-
-    try:
-        known = {key: data for key, data in found.items() if _has_hurst(data)}
-        fits = curves.results(available(MODELS[0])[name].compute, known)
-    except (FitError, DataError):
-        return ""
-    values = np.concatenate([np.ravel(each[constant].values) for each in fits.values()])
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return ""
-    ends = f"{values.min():.3g}" if values.size == 1 else f"{values.min():.3g} to {values.max():.3g}"
-    return f"fit {name}: {what} {ends}; {curves.verdict(fits.values())}"
-
-
-def _half(ratio: Any) -> float:
-    """Return the relative deviation that half of the cases stay within."""
-    return float(np.median(np.abs(ratio - 1)))
-
-
 PLOTS: tuple[Plot, ...] = (
     Plot("regions", MODELS, "friction against velocity with regions I to IV (Fig. 3.7)", draw_regions),
     Plot("velocity", MODELS, "friction against velocity and the law, e.g. for several H (Fig. 3.8)", draw_velocity),
     Plot("force", MODELS, "friction against velocity for many loads, logarithmic (Fig. 3.9)", draw_forces),
     Plot("zone_one", MODELS, "alpha and beta against the Hurst exponent (Fig. 3.10)", draw_zone_one),
     Plot("plateau", MODELS, "plateau of friction against the Hurst exponent (Fig. 3.11)", draw_plateau),
-    Plot("collapse", MODELS, "all friction of planes on the scales of the general law (eq. 3.22, 3.23)", draw_collapse),
-    Plot(
-        "contact_growth",
-        MODELS,
-        "length and slope of the contact against the load (eq. 3.12, 3.21)",
-        draw_contact_growth,
-    ),
     Plot("indenter", MODELS, "friction of rough indenters against their law (Fig. 3.14, 3.15)", draw_indenter),
 )

@@ -10,7 +10,8 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.plots import curves, style
+from mdr_dask.fits.kinetic_cases import is_jump
+from mdr_dask.plots import curves, drawing, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +30,8 @@ def _fitted(groups: Mapping[str, xr.Dataset], name: str) -> dict[str, xr.Dataset
     return curves.results(fit.compute, groups)
 
 
-def _constants(found: xr.Dataset, name: str) -> curves.Mean:
-    return curves.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
+def _constants(found: xr.Dataset, name: str) -> drawing.Mean:
+    return drawing.Mean(found[name], found[f"{name}_low"], found[f"{name}_high"])
 
 
 def jumps(groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
@@ -41,16 +42,10 @@ def jumps(groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     DataError
         If there is none.
     """
-    found = {name: data for name, data in groups.items() if _is_jump(data)}
+    found = {name: data for name, data in groups.items() if is_jump(data)}
     if not found:
         raise DataError("expected a series with a jump of the velocity, got other histories: see the figure protocols")
     return found
-
-
-def _is_jump(data: xr.Dataset) -> bool:
-    varied = any(axis["path"].split(".")[0] == "protocol" for axis in data.attrs.get("axes", []))
-    history = curves.parameters_of(data).get("protocol") or {}
-    return not varied and history.get("shape", "jump") == "jump"
 
 
 def _choose(groups: Mapping[str, xr.Dataset], *varied: str) -> tuple[dict[str, xr.Dataset], list[str]]:
@@ -78,16 +73,16 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
 
     series, told = _choose(groups, "velocity", "normal_force")
     ((name, found),) = _fitted(series, "kinetics").items()
-    figure, panels = style.panels(2, sharey=True)
+    figure, panels = drawing.panels(2, sharey=True)
     names = "before_over_slope", "jump_over_slope"
     family = curves.family(found, names[0], "velocity", ("normal_force", "hurst"))
     for axes, output, label in zip(panels, names, (BEFORE, JUMP), strict=True):
         for curve in family.curves:
             speed = curve.data["velocity"]
-            curves.draw(axes, curve, speed, _constants(curve.data, output), bars=True)
+            drawing.curve(axes, curve, speed, _constants(curve.data, output), bars=True)
             if output == names[1] and family.joined:
                 law = jump_law(np.asarray(curve.data[names[0]].values), LAW)
-                axes.plot(speed, law, ":", color=curve.colour, lw=1)
+                drawing.law(axes, speed, law, ":", name="eq. 4.11", of=curve.data, color=curve.colour, lw=1)
         axes.set(xlabel=style.label("velocity", found["velocity"]), ylabel=label)
         style.logarithmic(axes, "xy")
     panels[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
@@ -108,10 +103,10 @@ class _Cases(NamedTuple):
         """Return one number for every case."""
         return np.ravel(np.asarray(self.data[name].values, dtype=np.float64))
 
-    def constant(self, name: str, where: Any = slice(None)) -> curves.Mean:
+    def constant(self, name: str, where: Any = slice(None)) -> drawing.Mean:
         """Return one constant of some of the cases, with its interval."""
         columns = (self.column(f"{name}{end}")[where] for end in ("", "_low", "_high"))
-        return curves.Mean(*(xr.DataArray(column, dims="case") for column in columns))
+        return drawing.Mean(*(xr.DataArray(column, dims="case") for column in columns))
 
 
 def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
@@ -147,18 +142,19 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     ((name, found),) = _fitted(series, "kinetics").items()
     ((_, law),) = _fitted(series, "jump_law").items()
     fitted, low, high = (float(law[f"constant{end}"][-1]) for end in ("", "_low", "_high"))
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     x, y = "before_over_slope", "jump_over_slope"
     for cases in by_hurst(found):
         across = cases.constant(x)
         label = _hurst_label(found, cases)
-        curves.scatter(axes, across.value, cases.constant(y), cases.colour, ".", label, across)
+        drawing.points(axes, across.value, cases.constant(y), cases.colour, ".", label, across)
     known = np.ravel(found[x].values)
     fine = np.geomspace(known[known > 0].min(), np.nanmax(known), 200)
-    axes.plot(fine, jump_law(fine, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
-    axes.plot(fine, jump_law(fine, fitted), "C3--", lw=1.2, label=f"fitted {fitted:.3f} ({low:.3f}, {high:.3f})")
-    axes.fill_between(fine, jump_law(fine, low), jump_law(fine, high), color="C3", alpha=0.25, lw=0)
-    axes.plot(fine, fine, "k:", lw=0.8, label="eq. 4.9")
+    drawing.law(axes, fine, jump_law(fine, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
+    label = f"fitted {fitted:.3f} ({low:.3f}, {high:.3f})"
+    drawing.law(axes, fine, jump_law(fine, fitted), "--", color=style.FITTED, lw=1.2, label=label)
+    drawing.band(axes, fine, jump_law(fine, low), jump_law(fine, high), "fitted, 95 %", color=style.FITTED)
+    drawing.law(axes, fine, fine, "k:", lw=0.8, label="eq. 4.9")
     axes.set(xlabel=BEFORE, ylabel=JUMP)
     jumps = np.ravel(found[y].values)
     axes.set_ylim(jumps[jumps > 0].min() / 2, 3 * np.nanmax(jumps))
@@ -180,17 +176,18 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError(
             "expected a rate of relaxation known to a factor of 1.6, got none: more realisations are needed"
         )
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     left = 0
     for cases in by_hurst(found):
         good = well_known(cases.column("rate_low"), cases.column("rate_high"))
         left += int(np.count_nonzero(~good))
         x = cases.column("passing_number")
         label = _hurst_label(found, cases)
-        curves.scatter(axes, x[good], cases.constant("rate", good), cases.colour, ".", label)
+        drawing.points(axes, x[good], cases.constant("rate", good), cases.colour, ".", label)
         _draw_powers(axes, powers, cases, x[good])
         whole = np.sort(x)
-        axes.plot(whole, np.where(whole < 1, whole, whole ** (1 - cases.hurst)), ":", color=cases.colour, lw=0.8)
+        law = np.where(whole < 1, whole, whole ** (1 - cases.hurst))
+        drawing.law(axes, whole, law, ":", name="eq. 4.12", of=cases.data, color=cases.colour, lw=0.8)
     if powers is not None:
         axes.plot([], [], "k-", lw=1, label="power fitted")
     axes.plot([], [], "k:", lw=0.8, label="eq. 4.12")
@@ -226,7 +223,7 @@ def _draw_powers(axes: Axes, powers: xr.Dataset | None, cases: _Cases, x: FloatA
             for power, factor in zip(np.ravel(part["power"].values), np.ravel(part["factor"].values), strict=True):
                 if np.isfinite(power) and inside.size:
                     line = np.array([inside.min(), inside.max()])
-                    axes.plot(line, factor * line**power, color=cases.colour, lw=1)
+                    drawing.law(axes, line, factor * line**power, name="power fitted", color=cases.colour, lw=1)
 
 
 def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -235,7 +232,7 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     ((name, found),) = _fitted(series, "rate_power").items()
     if "hurst" not in found.coords:
         raise DataError("expected one Hurst exponent or an axis of them: each has a power of its own")
-    figure, (axes,) = style.panels(1)
+    figure, (axes,) = drawing.panels(1)
     rows = (
         ("above", "power", r"$v_1\tau q_{max} > 1$"),
         ("above", "power_unweighted", r"$v_1\tau q_{max} > 1$, all times alike"),
@@ -246,11 +243,11 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
             known = np.isfinite(cases.column(power))
             value = cases.constant(power, known)
             across = np.full(value.value.size, cases.hurst)
-            curves.scatter(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
+            drawing.points(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
         axes.plot([], [], style.MARKERS[number], color=style.COLOURS[number], ms=4, label=label)
     line = np.array([0.0, 1.0])
-    axes.plot(line, 1 - line, "k-", lw=1, label="1 - H")
-    axes.plot(line, [1, 1], "k:", lw=1, label="1")
+    drawing.law(axes, line, 1 - line, "k-", lw=1, label="1 - H")
+    drawing.law(axes, line, [1, 1], "k:", lw=1, label="1")
     axes.set(xlabel=style.label("hurst"), ylabel="power of $b$")
     style.legend(axes)
     _title(figure, r"power of the rate of relaxation over $v_1 \tau q_{max}$", curves.scalars(found), name, found)

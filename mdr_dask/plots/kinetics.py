@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.kinetic_laws import draw_jump, draw_jump_law, draw_power, draw_rate, jumps
 
@@ -42,7 +42,7 @@ def relaxing(data: xr.Dataset) -> xr.DataArray:
     return aggregation.mean(abs(data[BEFORE_JUMP] + data[JUMP] - data[AFTER]) / slope)
 
 
-def trace(data: xr.Dataset, lead: float = 0.3) -> tuple[Any, curves.Mean]:
+def trace(data: xr.Dataset, lead: float = 0.3) -> tuple[Any, drawing.Mean]:
     """Return times from before the jump on, by a share of the last one, and friction with its interval."""
     slope, _ = over_slope(data)
     time = np.asarray(data["relaxation_times"].values)
@@ -54,7 +54,7 @@ def trace(data: xr.Dataset, lead: float = 0.3) -> tuple[Any, curves.Mean]:
         xr.DataArray(np.concatenate([[float(b), float(b), float(a)], np.ravel(c.values)]), dims="time")
         for b, a, c in zip(before, at, later, strict=True)
     ]
-    return np.concatenate([[-lead * time[-1], 0.0, 0.0], time]), curves.Mean(*joined)
+    return np.concatenate([[-lead * time[-1], 0.0, 0.0], time]), drawing.Mean(*joined)
 
 
 def _joined(data: xr.Dataset, slope: Any) -> xr.DataArray | None:
@@ -89,13 +89,14 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time through jumps, up and down where the store has both (Fig. 4.1)."""
     name, data, told = pick(groups, OUTPUTS, "velocity_change")
     cases, more = _extreme_jumps(data)
-    figure, panels = style.panels(len(cases), size=(5.2, 4.2))
+    figure, panels = drawing.panels(len(cases), size=(5.2, 4.2))
     for axes, case in zip(panels, cases, strict=True):
-        curve = curves.Curve(case, "mean", style.COLOURS[0], "-", "")
-        curves.draw(axes, curve, *trace(_early(case)))
+        curve = drawing.Curve(case, "mean", style.COLOURS[0], "-", "")
+        time, course = trace(_early(case))
+        drawing.curve(axes, curve, time, course)
         slope, label = over_slope(case)
         after = float(aggregation.mean(case[AFTER] / slope))
-        axes.axhline(after, color="0.5", ls=":", label="steady at $v_2$")
+        drawing.law(axes, [0, time[-1]], [after, after], of=case, color="0.5", ls=":", label="steady at $v_2$")
         axes.set_title(f"$v_2 = {1 + float(case['velocity_change']):.3g}\\,v_1$", fontsize="small")
         axes.set(xlabel=TIME, ylabel=label)
         style.legend(axes)
@@ -132,12 +133,12 @@ def draw_velocities(groups: Mapping[str, xr.Dataset]) -> Figure:
     others = [dim for dim in curves.axes_of(data, BEFORE_JUMP) if dim != over]
     near = -abs(data["hurst"] - EXPONENT) if "hurst" in others else None
     data, more = curves.hold(data, others, near)
-    figure, (left, right) = style.panels(2, size=(5.4, 4.2))
+    figure, (left, right) = drawing.panels(2, size=(5.4, 4.2))
     steady = curves.family(data, BEFORE_JUMP, "velocity")
     slope, label = over_slope(data)
     for curve in steady.curves:
         value = curves.measured(curve.data, BEFORE_JUMP, 1 / slope)
-        curves.draw(left, curve, curve.data["velocity"], value, bars=True)
+        drawing.curve(left, curve, curve.data["velocity"], value, bars=True)
     left.set(xlabel=style.label("velocity", data["velocity"]), ylabel=label)
     style.logarithmic(left, "x")
     shown = data if over else data.expand_dims("velocity")
@@ -145,7 +146,7 @@ def draw_velocities(groups: Mapping[str, xr.Dataset]) -> Figure:
     for curve in traces.curves:
         time, value = trace(_early(curve.data))
         blank = xr.full_like(value.value, np.nan)
-        curves.draw(right, curve._replace(line="-", marker=""), time, curves.Mean(value.value, blank, blank))
+        drawing.curve(right, curve._replace(line="-", marker=""), time, drawing.Mean(value.value, blank, blank))
     right.set(xlabel=TIME, ylabel=label)
     curves.finish(figure, right, traces)
     bars = f"{curves.meaning_of_bars(data, outputs=[BEFORE_JUMP])} (left)"
@@ -169,10 +170,10 @@ def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
     found = relaxation_curves(data)
     value = curves.mean((data[TRACE] - data[AFTER]) / data["rms_slope"])
     time = np.asarray(data["relaxation_times"].values)
-    figure, panels = style.panels(2, size=(5.4, 4.2))
+    figure, panels = drawing.panels(2, size=(5.4, 4.2))
     for axes, logarithmic in zip(panels, (False, True), strict=True):
-        points = curves.Curve(data, "mean of the realisations", "k", "", "o")
-        curves.draw(axes, points, time, value, bars=True)
+        points = drawing.Curve(data, "mean of the realisations", "k", "", "o")
+        drawing.curve(axes, points, time, value, bars=True)
         _draw_exponentials(axes, found, float(time[time > 0][0]))
         axes.axvline(float(found["window"]), color="0.7", lw=0.8, label="end of the window")
         axes.axhline(0, color="0.8", lw=0.6)
@@ -182,7 +183,7 @@ def draw_fit(groups: Mapping[str, xr.Dataset]) -> Figure:
             style.logarithmic(axes, "x")
     style.legend(panels[0])
     held = curves.fixed_text(curves.scalars(data), CASE)
-    bars = f"{curves.meaning_of_bars(data, outputs=[])}; red band and brackets: 95 % of the fit"
+    bars = f"{curves.meaning_of_bars(data, outputs=[])}; band and brackets: 95 % of the fit"
     style.title(figure, f"relaxation after the jump{_of(name)}", held, bars)
     style.leave_out(figure, [*more, *told])
     return figure
@@ -200,17 +201,17 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
     def curve(name: str) -> Any:
         return found[name].values[order]
 
-    axes.fill_between(inside, curve("one_low"), curve("one_high"), color="C3", alpha=0.25, lw=0)
-    axes.plot(
-        inside, curve("one"), "C3", label=f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance"
-    )
+    drawing.band(axes, inside, curve("one_low"), curve("one_high"), "one exponential, 95 %", color=style.FITTED)
+    label = f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance"
+    drawing.law(axes, inside, curve("one"), color=style.FITTED, label=label)
     alike = f"$b$ = {float(found['rate_unweighted']):.2f} ({ends('rate_unweighted')}), all times alike"
-    axes.plot(inside, curve("alike"), "C1-.", lw=1, label=alike)
+    drawing.law(axes, inside, curve("alike"), "-.", color=style.COLOURS[4], lw=1, label=alike)
     law = float(found["law_rate"])
     start = float(found["one"][0])
-    axes.plot(inside, start * np.exp(-law * inside), "C0--", lw=1, label=f"$b$ = {law:.2f} of eq. 4.12")
+    label = f"$b$ = {law:.2f} of eq. 4.12"
+    drawing.law(axes, inside, start * np.exp(-law * inside), "--", color=style.COLOURS[0], lw=1, label=label)
     if "two" in found:
-        axes.plot(inside, curve("two"), "C2:", lw=1.5, label="two exponentials")
+        drawing.law(axes, inside, curve("two"), ":", color=style.COLOURS[2], lw=1.5, label="two exponentials")
 
 
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -226,11 +227,11 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         data, thinned = curves.thin(data, over, style.MOST_PANELS)
         more += thinned
     cases = [data.isel({over: k}) for k in range(data.sizes[over])] if over else [data]
-    figure, panels = style.panels(len(cases), size=(4.6, 3.4))
+    figure, panels = drawing.panels(len(cases), size=(4.6, 3.4))
     for axes, case in zip(panels, cases, strict=True):
         slope, label = over_slope(case)
         time, value = trace(_early(case))
-        curves.draw(axes, curves.Curve(case, "simulated", style.COLOURS[0], "-", ""), time, value)
+        drawing.curve(axes, drawing.Curve(case, "simulated", style.COLOURS[0], "-", ""), time, value)
         before, after = (float(aggregation.mean(case[part] / slope)) for part in (BEFORE_JUMP, AFTER))
         passing = float(case["velocity"] * case["relaxation_time"] * np.pi * case["points"] / case["length"])
         rate = float(law_rate(np.array(passing), np.array(float(case["hurst"]))))
@@ -239,7 +240,7 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
         course = relaxation_law(np.array([before]), np.array([after]), 1.0, change, rate, t)[0]
         error = np.sqrt(np.nanmean((np.interp(time[2:], t, course) - value.value.values[2:]) ** 2))
         size = abs(after - before) + abs(course[0] - before)
-        axes.plot(t, course, "k--", lw=1, label="closed course")
+        drawing.law(axes, t, course, "k--", of=case, lw=1, label="closed course")
         axes.set_title(
             f"{style.named('velocity', case['velocity'])}: rms {error / size:.1%} of the change", fontsize="small"
         )

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def draw_master_curve(curve: xr.Dataset) -> Figure:
         shown.append(second)
     rising = bool(curve["vertical_factor"].any())
     count = 2 + len(shown) * (1 + rising)
-    figure, panels = style.panels(count, columns=count, size=(4.6, 4.0))
+    figure, panels = drawing.panels(count, columns=count, size=(4.6, 4.0))
     axes = iter(panels)
     _measured(figure, next(axes), curve)
     _merged(next(axes), curve)
@@ -106,12 +106,12 @@ def _measured(figure: Figure, axes: Axes, curve: xr.Dataset) -> None:
         shifts = points.get("point_shift", shift)
         x, y = points["point_abscissa"] / 10**shifts, points["point_ordinate"] / 10 ** points.get("point_rise", rise)
         if "point_second" not in points:
-            axes.loglog(x, y, ".-", color=colour, label=f"{value:.3g}", gid=style.DATA)
+            drawing.plain(axes, x, y, ".-", color=colour, label=f"{value:.3g}")
             continue
         for number, other in enumerate(np.unique(points["point_second"])):
             one = np.flatnonzero(points["point_second"] == other)
             label = None if number else f"{value:.3g}"
-            axes.loglog(x[one], y[one], ".-", color=colour, label=label, gid=style.DATA)
+            drawing.plain(axes, x[one], y[one], ".-", color=colour, label=label)
     axes.set_xlabel(_label(curve.attrs["abscissa"], curve["curve_abscissa"]))
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
     heading = _label(curve.attrs["group"], curve[curve.attrs["group"]])
@@ -128,16 +128,14 @@ def _measured(figure: Figure, axes: Axes, curve: xr.Dataset) -> None:
 
 def _merged(axes: Axes, curve: xr.Dataset) -> None:
     for (_, points, _, _), colour in zip(_by_group(curve), _colours(curve), strict=True):
-        axes.loglog(points["point_abscissa"], points["point_ordinate"], ".", color=colour, gid=style.DATA)
+        drawing.plain(axes, points["point_abscissa"], points["point_ordinate"], ".", color=colour)
     x, y = curve["curve_abscissa"].to_numpy(), curve["curve_ordinate"].to_numpy()
     error = 10 ** (BAR * curve["curve_error"].to_numpy())
     low, high = (curve["curve_abscissa"].attrs[f"measured_{end}"] for end in ("low", "high"))
     inside = (x >= low) & (x <= high)
-    axes.loglog(x, y, "k--", linewidth=1, label="reached by shifting")
-    axes.loglog(
-        np.where(inside, x, np.nan), np.where(inside, y, np.nan), "k-", label="measured at the reference", gid="merged"
-    )
-    axes.fill_between(x, y / error, y * error, color="k", alpha=0.2, label="standard error")
+    drawing.law(axes, x, y, "k--", linewidth=1, label="reached by shifting")
+    drawing.law(axes, x, np.where(inside, y, np.nan), "k-", label="measured at the reference")
+    drawing.band(axes, x, y / error, y * error, "merged curve", color="k", label="standard error")
     axes.set_xlabel("shifted " + _label(curve.attrs["abscissa"], curve["curve_abscissa"]))
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
     style.logarithmic(axes, "xy")
@@ -148,12 +146,15 @@ def _merged(axes: Axes, curve: xr.Dataset) -> None:
 def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: float) -> None:
     groups = curve[by].to_numpy()
     error = BAR * curve[f"{factor}_error"]
-    axes.errorbar(groups, curve[factor], error, fmt="o", ms=4, color="k", label="factors, 68 %")
+    value = curve[factor]
+    factors = drawing.Mean(value, value - error, value + error)
+    drawing.points(axes, groups, factors, "k", "o", "factors, 68 %")
     across = "vertical" not in factor
     if "power_exponent" in curve and "temperature" not in by.lower() and by not in ("T", "temp"):
         exponent = float(curve["power_exponent"])
         if across:
-            axes.plot(groups, exponent * np.log10(groups / reference), label=f"slope {exponent:.3g}")
+            slope = exponent * np.log10(groups / reference)
+            drawing.law(axes, groups, slope, color=style.FITTED, label=f"slope {exponent:.3g}")
         style.logarithmic(axes, "x")
     axes.set_xlabel(_label(by, curve[by]))
     moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -23,6 +23,8 @@ OPERATION = ("normal_force", "rotation_speed", "temperature")
 CASE = (*OPERATION, "rms_roughness", "slide_roll_ratio", "layer_thickness", "boundary_friction")
 PROBABILITY = "breakthrough_probability"
 MOST_SERIES = 4
+#: What a logarithmic axis shows beside the largest value: shares of asperities go to zero without an end.
+LEAST_PART = 1e-7
 
 
 def _cases(found: Mapping[str, xr.Dataset], output: str) -> tuple[list[tuple[str, xr.Dataset]], list[str]]:
@@ -53,15 +55,16 @@ def _case_titles(figure: Figure, subject: str, panels: Sequence[Axes], cases: Se
 def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the two surfaces in the contact at the moment of greatest contact, realisation 0 (thesis figure 5.5)."""
     cases, told = _cases(curves.with_outputs(groups, ["upper_profile", "lower_profile", "film"]), "film")
-    figure, panels = style.panels(len(cases), columns=1, size=(8.0, 2.4), sharex=True)
+    figure, panels = drawing.panels(len(cases), columns=1, size=(8.0, 2.4), sharex=True)
     for panel, (_, case) in zip(panels, cases, strict=True):
         one = case.isel(realisation=0)
         upper, lower = one["upper_profile"].values * 1e6, one["lower_profile"].values * 1e6
         place = one["position"].values
         colours = style.scale(2)
-        panel.plot(place, upper, lw=0.8, color=colours[0], label="elastic roller, held off by the film", gid=style.DATA)
-        panel.plot(place, lower, lw=0.8, color=colours[1], label="rough counter body", gid=style.DATA)
-        panel.fill_between(place, lower, upper, where=lower > upper, color="k", label="overlap")
+        label = "elastic roller, held off by the film"
+        drawing.plain(panel, place, upper, label=label, of=case, lw=0.8, color=colours[0])
+        drawing.plain(panel, place, lower, label="rough counter body", of=case, lw=0.8, color=colours[1])
+        panel.fill_between(place, lower, upper, where=lower > upper, color="k", label="overlap", gid=style.GUIDE)
         for edge in (-1, 1):
             panel.axvline(edge, color="0.7", lw=0.8, ls=":")
         panel.set_title(f"$h_0$ = {float(one['film']) * 1e6:.2f} µm")
@@ -76,11 +79,11 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
 def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the contact length over one turn, realisation 0 (thesis figure 5.7a)."""
     cases, told = _cases(curves.with_outputs(groups, ["contact_length_trace"]), "contact_length_trace")
-    figure, panels = style.panels(len(cases), columns=1, size=(8.0, 1.9))
+    figure, panels = drawing.panels(len(cases), columns=1, size=(8.0, 1.9))
     for panel, (_, case) in zip(panels, cases, strict=True):
         trace = case["contact_length_trace"].isel(realisation=0)
         time = case["angle"].values / float(case["rotation_speed"]) * 1e3
-        panel.plot(time, trace.values * 1e6, lw=0.5, color=style.COLOURS[0], gid=style.DATA)
+        drawing.plain(panel, time, trace.values * 1e6, of=case, lw=0.5, color=style.COLOURS[0])
         share = float((trace > 0).where(trace.notnull()).mean())
         panel.set_title(f"layer broken during {share:.1%} of this turn")
         panel.set_ylabel("contact\nlength [µm]")
@@ -96,11 +99,11 @@ class _Row(NamedTuple):
 
     outputs: tuple[str, ...]
     label: str
-    value: Callable[[xr.Dataset], curves.Mean]
+    value: Callable[[xr.Dataset], drawing.Mean]
     logarithmic: bool = False
 
 
-def _scaled(output: str, factor: float = 1.0) -> Callable[[xr.Dataset], curves.Mean]:
+def _scaled(output: str, factor: float = 1.0) -> Callable[[xr.Dataset], drawing.Mean]:
     return lambda data: curves.measured(data, output, factor)
 
 
@@ -112,14 +115,22 @@ def _draw_row(axes: Axes, family: curves.Family, row: _Row, along: str, bars: bo
     across, drawn = [], []
     for curve in family.curves:
         x, value = np.atleast_1d(style.shown(along, curve.data[along])), row.value(curve.data)
-        curves.draw(axes, curve, x, value, bars=bars)
+        drawing.curve(axes, curve, x, value, bars=bars)
         across += x.tolist()
         drawn += np.ravel(value.value).tolist()
     axes.set_ylabel(row.label)
     if along != "temperature" and style.is_geometric(across):
         style.logarithmic(axes, "x")
     if row.logarithmic and style.is_geometric(drawn):
+        axes.set_ylim(bottom=max(axes.get_ylim()[0], LEAST_PART * np.nanmax(drawn)))
         style.logarithmic(axes, "y")
+
+
+def _is_cut(axes: Axes) -> bool:
+    """Return whether a panel ends above some of its data."""
+    lines = [np.asarray(line.get_ydata(), dtype=np.float64) for line in axes.lines if line.get_gid() == style.DATA]
+    low = min((np.nanmin(each[each > 0], initial=np.inf) for each in lines), default=np.inf)
+    return axes.get_yscale() == "log" and low < axes.get_ylim()[0]
 
 
 def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -133,7 +144,7 @@ def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:
         data, more = curves.thin(data, "rotation_speed", style.MOST_PANELS)
         told += more
     parts = [data.isel(rotation_speed=k) for k in range(data.sizes["rotation_speed"])] if by_speed else [data]
-    figure, panels = style.panels(len(parts), size=(4.4, 3.8), sharey=True)
+    figure, panels = drawing.panels(len(parts), size=(4.4, 3.8), sharey=True)
     families = []
     for panel, part in zip(panels, parts, strict=True):
         family = curves.family(part, PROBABILITY, "temperature", ("normal_force",))
@@ -164,7 +175,7 @@ def draw_sensitivity(groups: Mapping[str, xr.Dataset]) -> Figure:
     most = 2 * style.MOST_PANELS
     told = [f"{name}: {along}" for name, _, along in found[most:]]
     found = found[:most]
-    figure, panels = style.panels(len(found), columns=4, size=(4.0, 3.4), sharey=True)
+    figure, panels = drawing.panels(len(found), columns=4, size=(4.0, 3.4), sharey=True)
     held = []
     for panel, (name, data, along) in zip(panels, found, strict=True):
         family = curves.family(data, PROBABILITY, along, ("temperature", *OPERATION))
@@ -180,7 +191,7 @@ def draw_sensitivity(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _width(data: xr.Dataset) -> curves.Mean:
+def _width(data: xr.Dataset) -> drawing.Mean:
     """Return the width in intimate contact in per cent of the contact."""
     factor = 100 / (2 * data["contact_half_width"])
     return curves.measured(data, "contact_length", factor)
@@ -200,7 +211,7 @@ def draw_stribeck(groups: Mapping[str, xr.Dataset]) -> Figure:
     found = curves.with_outputs(groups, ["friction_coefficient"], "rotation_speed")
     found, told = curves.few(found, MOST_SERIES)
     rows = [row for row in STRIBECK if all(name in data for name in row.outputs for data in found.values())]
-    figure, panels = style.panels(len(rows) * len(found), columns=len(found), size=(6.4, 2.2), sharex="col")
+    figure, panels = drawing.panels(len(rows) * len(found), columns=len(found), size=(6.4, 2.2), sharex="col")
     families = []
     for column, (name, data) in enumerate(found.items()):
         family = curves.family(data, "friction_coefficient", "rotation_speed", OPERATION)
@@ -218,6 +229,8 @@ def draw_stribeck(groups: Mapping[str, xr.Dataset]) -> Figure:
         own = curves.fixed_text({key: value for key, value in family.held.items() if key not in alike}, CASE)
         panels[column].set_title(", ".join(part for part in (name, own) if part), fontsize="small")
     bars = curves.meaning_of_bars(*found.values(), outputs=["friction_coefficient"])
+    if any(_is_cut(axes) for axes in panels):
+        told.append(f"values below {LEAST_PART:g} of the largest of their row")
     style.title(figure, "Stribeck curve", curves.fixed_text(alike, CASE), bars)
     style.leave_out(figure, told)
     return figure

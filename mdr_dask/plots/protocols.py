@@ -12,7 +12,7 @@ from mdr_dask import aggregation
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.velocity_jump import VelocityJump
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.kinetics import AFTER, CASE, OUTPUTS, TIME, over_slope, trace
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BEFORE = 0.08  # of the time shown
+#: Width of a column alone, and beside others, in inches.
+ALONE, BESIDE = 6.4, 3.4
 
 
 def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
@@ -48,7 +50,8 @@ def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, Flo
 def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw friction against time over velocity and load, one column for each series."""
     found, told = curves.few(curves.with_outputs(groups, OUTPUTS))
-    figure, panels = style.panels(3 * len(found), columns=len(found), size=(3.4, 2.0), sharex="col")
+    width = ALONE if len(found) == 1 else BESIDE
+    figure, panels = drawing.panels(3 * len(found), columns=len(found), size=(width, 2.0), sharex="col")
     families = []
     for k, (name, data) in enumerate(found.items()):
         top, *below = panels[k :: len(found)]
@@ -58,16 +61,17 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
         last = float(values["relaxation_times"].values[-1])
         slope, label = over_slope(values)
         time, friction = trace(values, BEFORE)
-        curves.draw(top, curves.Curve(values, "mean", style.COLOURS[0], "-", ""), time, friction)
+        drawing.curve(top, drawing.Curve(values, "mean", style.COLOURS[0], "-", ""), time, friction)
         after = float(aggregation.mean(values[AFTER] / slope))
         if np.isfinite(after):
-            top.axhline(after, color="0.5", ls=":", lw=1, label="steady state at the end")
+            steady = "steady state at the end"
+            drawing.law(top, [0, last], [after, after], of=values, color="0.5", ls=":", lw=1, label=steady)
         top.set_title(name or case.protocol.shape, fontsize="small")
         top.set_ylabel(label)
         time, speed, force = course(case, last)
         labels = style.label("velocity"), style.label("normal_force")
         for axes, row, text, colour in zip(below, (speed, force), labels, style.COLOURS[1:], strict=False):
-            axes.plot(time, row, color=colour, lw=1.2)
+            drawing.plain(axes, time, row, of=values, color=colour, lw=1.2)
             axes.set_ylim(min(0.0, 1.15 * float(row.min())), 1.15 * max(float(row.max()), 1e-300))
             axes.set_ylabel(text)
         below[1].set_xlabel(TIME)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from mdr_dask.plots import style
+from mdr_dask.plots import drawing, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ def sensitivity(indices: xr.Dataset) -> Figure:
 
     inputs = [style.quantity(str(name)).symbol for name in indices["parameter"].to_numpy()]
     kinds = [kind for kind in ("first", "total") if indices[kind].notnull().any()]
-    figure = Figure(figsize=(style.PANEL[0], 1.6 + 0.5 * len(inputs)), layout="constrained")
+    figure = Figure(figsize=(drawing.PANEL[0], 1.6 + 0.5 * len(inputs)), layout="constrained")
     axes = figure.subplots()
     for k, kind in enumerate(kinds):
         value = indices[kind].to_numpy()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import textwrap
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+
+from mdr_dask.errors import DataError
+from mdr_dask.plots import page
+from mdr_dask.units import conversion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,16 +21,16 @@ if TYPE_CHECKING:
 
 #: Okabe and Ito's colours, told apart by colour-blind readers; more curves than these have a colour bar.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Of fitted laws and the bands that they are known within.
+FITTED = COLOURS[1]
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 #: Panels of one figure that can still be read.
 MOST_PANELS = 6
-#: Width and height of a panel in inches; characters of small print to an inch.
-PANEL = (6.4, 4.4)
-SMALL_PRINT = 12
-DPI = 150
-#: What data carry as their gid, so that they can be told from laws and guides.
-DATA, BAND = "data", "band"
+#: Characters to an inch in letters of one point.
+SMALL_PRINT = 120
+#: What everything drawn carries as its gid: data and their bars, laws, and guides, which stand in no table.
+DATA, BAND, LAW, GUIDE = "data", "band", "law", "guide"
 
 
 class Quantity(NamedTuple):
@@ -74,18 +78,50 @@ QUANTITIES: Mapping[str, Quantity] = {
     "path": Quantity("sliding path", "m"),
     "friction": Quantity("coefficient of friction", ""),
     "xi": Quantity(r"$\xi$", ""),
+    "eyring_stress": Quantity("Eyring stress", "MPa", 1e-6),
+    "hardness": Quantity("hardness", "GPa", 1e-9),
+    "roller_width": Quantity("roller width", "mm", 1e3),
+    "relaxation_times": Quantity(r"$(t - t_0)/\tau$", ""),
     "indenter_angle": Quantity("angle", "°", 180 / np.pi),
     "indenter_radius": Quantity("radius $R$", "mm", 1e3),
 }
 
 
+#: Symbols in the long names of outputs, and how they are written.
+SYMBOLS = {
+    r"\bd_mu_(\w+)": r"$\\Delta\\mu_{\1}$",
+    r"\bmu_(\w+)": r"$\\mu_{\1}$",
+    r"\b([A-Za-z])_(\w+)": r"$\1_{\2}$",
+}
+
+
 def quantity(name: str, values: xr.DataArray | None = None) -> Quantity:
-    """Return how a parameter is written; one without a unit in its store is a pure number."""
+    """Return how a parameter or an output is written; one without a unit in its store is a pure number.
+
+    Raises
+    ------
+    DataError
+        If it cannot have the unit that was asked for.
+    """
     unit = None if values is None else values.attrs.get("units")
-    known = QUANTITIES.get(name)
-    if known is None:
-        return Quantity(name.replace("_", " "), "" if unit in (None, "1") else str(unit))
-    return Quantity(known.symbol, "") if unit == "1" else known
+    words = name.replace("_", " ") if values is None or name in values.coords else meaning(values, name)
+    known = QUANTITIES.get(name, Quantity(words, "" if unit in (None, "1") else str(unit)))
+    wanted = page.asked().units.get(name)
+    if wanted is None:
+        return Quantity(known.symbol, "") if unit == "1" else known
+    try:
+        factor, zero = conversion(wanted, str(unit))
+    except ValueError as error:
+        raise DataError(f"{name}: {error}, got {wanted!r}") from None
+    return Quantity(known.symbol, wanted, 1 / factor, -zero / factor)
+
+
+def meaning(values: xr.DataArray, name: str) -> str:
+    """Return the long name of an output without what stands behind it in brackets, symbols as mathtext."""
+    words = re.split(r"[;,] | \(", str(values.attrs.get("long_name", name.replace("_", " "))))[0]
+    for ascii_form, symbol in SYMBOLS.items():
+        words = re.sub(ascii_form, symbol, words)
+    return words
 
 
 def shown(name: str, values: xr.DataArray) -> Any:
@@ -104,7 +140,11 @@ def label(name: str, values: xr.DataArray | None = None) -> str:
 
 def with_unit(symbol: str, unit: str) -> str:
     """Return a label with its unit as all figures write it."""
-    return f"{symbol} [{unit}]" if unit and unit != "1" else symbol
+    return f"{symbol} [{_raised(unit)}]" if unit and unit != "1" else symbol
+
+
+def _raised(unit: str) -> str:
+    return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
 
 
 def named(name: str, value: xr.DataArray) -> str:
@@ -112,20 +152,12 @@ def named(name: str, value: xr.DataArray) -> str:
     how, number = quantity(name, value), shown(name, value)
     text = f"{float(number):.4g}" if value.dtype.kind in "fiu" else str(number[()])
     symbol = how.symbol[how.symbol.index("$") :] if "$" in how.symbol else how.symbol
-    return f"{symbol} = {text} {how.unit}".strip()
+    return f"{symbol} = {text} {_raised(how.unit)}".strip()
 
 
-def panels(count: int, columns: int = 3, size: tuple[float, float] = PANEL, **shared: Any) -> tuple[Figure, list[Axes]]:
-    """Return a figure and as many panels as asked for, in rows."""
-    from matplotlib.figure import Figure
-
-    columns = max(1, min(columns, count))
-    rows = -(-count // columns)
-    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
-    grid = list(figure.subplots(rows, columns, squeeze=False, **shared).ravel())
-    for unused in grid[count:]:
-        unused.remove()
-    return figure, grid[:count]
+def plain(text: str) -> str:
+    """Return a label without mathtext, in one line: ``F_N = 1 N``."""
+    return re.sub(r"[$\\]", "", text.replace("\\,", " ")).replace("#", "no. ").replace("\n", " ").strip()
 
 
 def title(figure: Figure, subject: str, *fixed: str) -> None:
@@ -148,8 +180,34 @@ def left_out(figure: Figure) -> str:
     return figure.get_supxlabel().replace("\n", " ").removeprefix("not drawn: ")
 
 
+def _letters() -> float:
+    """Return how many letters go to an inch."""
+    from matplotlib import rcParams
+
+    return SMALL_PRINT / float(rcParams["font.size"])
+
+
 def _wrapped(figure: Figure, text: str) -> list[str]:
-    return textwrap.wrap(text, max(30, int(SMALL_PRINT * figure.get_figwidth())), break_long_words=False)
+    """Return lines as wide as a figure, counted as they are seen; a value stays with its symbol and its unit."""
+    most = max(30, int(_letters() * figure.get_figwidth()))
+    joined = re.sub(r" = (\S+) (?=[^\s,;]+(?:[,;)]|$))", "\u00a0=\u00a0\\1\u00a0", text).replace(" = ", "\u00a0=\u00a0")
+    return [line.replace("\u00a0", " ") for line in broken(joined, most).split("\n")]
+
+
+def broken(label: str, most: int = 40) -> str:
+    """Return a label in lines that fit beside a panel."""
+    lines = [""]
+    for word in label.split(" "):
+        line = f"{lines[-1]} {word}".strip(" ")
+        lines[-1:] = [line] if len(plain(line)) <= most or not lines[-1] else [lines[-1], word]
+    return "\n".join(lines)
+
+
+def beside(figure: Figure, axes: Axes, label: str) -> str:
+    """Return a label in lines as long as a panel is high."""
+    place = axes.get_subplotspec()
+    rows = place.get_gridspec().nrows if place else 1
+    return broken(label, max(16, int(0.9 * _letters() * figure.get_figheight() / rows)))
 
 
 def scale(count: int) -> list[str]:
@@ -157,14 +215,14 @@ def scale(count: int) -> list[str]:
     return [COLOURS[k % len(COLOURS)] for k in range(count)]
 
 
-def shades(values: Any) -> tuple[Colormap, Normalize]:
-    """Return colour map and norm of curves that a colour bar names: logarithmic where the values are geometric."""
+def shades(values: Any, logarithmic: bool = True) -> tuple[Colormap, Normalize]:
+    """Return colour map and norm of a colour bar: logarithmic, unless forbidden, where the values are geometric."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm, Normalize
 
     values = np.asarray(values, dtype=np.float64)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    norm = (LogNorm if is_geometric(values) else Normalize)(low, high if high > low else low + 1)
+    norm = (LogNorm if logarithmic and is_geometric(values) else Normalize)(low, high if high > low else low + 1)
     return colormaps["viridis"].resampled(256), norm
 
 

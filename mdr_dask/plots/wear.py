@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError
-from mdr_dask.plots import curves, style
+from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
 
 if TYPE_CHECKING:
@@ -59,11 +59,11 @@ def draw_development(groups: Mapping[str, xr.Dataset]) -> Figure:
         raise DataError("expected cycles as an axis of its own: a shape develops in one case")
     others = [dim for dim in curves.axes_of(data, "worn_profile") if dim != "cycles"]
     data, told = curves.hold(data, others, _prefer(data, "exact"))
-    figure, panels = style.panels(2)
+    figure, panels = drawing.panels(2)
     for axes, (output, place) in zip(panels, PROFILES, strict=True):
         one = curves.family(data, output, place, ("cycles",))
         for curve in one.curves:
-            curves.draw(axes, curve._replace(marker=""), data[place], curves.measured(curve.data, output))
+            drawing.curve(axes, curve._replace(marker=""), data[place], curves.measured(curve.data, output))
         _draw_limit(axes, groups, data, output, place)
         _label(axes, output, data)
         if axes is panels[0] or one.bar:
@@ -87,7 +87,7 @@ def _draw_limit(axes: Axes, groups: Mapping[str, xr.Dataset], data: xr.Dataset, 
         if any(not np.allclose(limit[key], data[key]) for key in keys if key in data.coords) or rest:
             continue
         limit = limit.isel(dict.fromkeys(curves.axes_of(limit, output), -1))
-        axes.plot(limit[place], aggregation.mean(limit[output]), "k:", label="limit")
+        drawing.law(axes, limit[place], aggregation.mean(limit[output]), "k:", of=limit, label="limit")
         return
 
 
@@ -110,7 +110,7 @@ def draw_profiles(groups: Mapping[str, xr.Dataset]) -> Figure:
     chosen = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), style.MOST_PANELS)).round().astype(int))
     if chosen.size < len(rows):
         told.append(f"{len(rows) - chosen.size} of {len(rows)} cases ({chosen.size} drawn, spread evenly)")
-    figure, panels = style.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
+    figure, panels = drawing.panels(2 * chosen.size, columns=2, size=(5.4, 3.0))
     alike = curves.fixed_by_all([_without(curves.scalars(rows[number][1]), ("cycles", RULE)) for number in chosen])
     for k, number in enumerate(chosen):
         name, part = rows[number]
@@ -148,7 +148,7 @@ def _draw_rules(figure: Figure, axes: Axes, data: xr.Dataset, output: str, place
         line = LINES.get(rule, "-")
         for curve in family.curves:
             drawn = curve._replace(line=line, marker="", label="", colour="k" if rule == "limit" else curve.colour)
-            curves.draw(axes, drawn, one[place], curves.measured(curve.data, output))
+            drawing.curve(axes, drawn, one[place], curves.measured(curve.data, output))
             if rule in ("exact", "") and named and curve.label:
                 axes.plot([], [], color=curve.colour, label=curve.label)
         if named:
@@ -170,7 +170,7 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
     if not found:
         raise DataError("no series holds wear_volume over cycles or path")
     shown, told = curves.few({name: data for name, (data, _) in found.items()})
-    figure, panels = style.panels(len(shown))
+    figure, panels = drawing.panels(len(shown))
     families, most = [], 1
     for axes, (name, data) in zip(panels, shown.items(), strict=True):
         along = found[name][1]
@@ -179,7 +179,7 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
         most = max(most, data.sizes["realisation"])
         told += [f"{name}: {each}" if name else each for each in one.left_out]
         for curve in one.curves:
-            curves.draw(axes, curve, curve.data[along], _spread(curve.data))
+            drawing.curve(axes, curve, curve.data[along], _spread(curve.data))
         axes.set_xlabel(_over(along, data))
         axes.set_ylabel(
             style.with_unit("worn volume $V$", "m³") if not dimensionless(data) else "worn volume $V/(a_0^2 d_0)$"
@@ -198,7 +198,7 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
     return figure
 
 
-def _spread(data: xr.Dataset) -> curves.Mean:
+def _spread(data: xr.Dataset) -> drawing.Mean:
     """Return the median of the realisations and what 95 % of them lie within."""
     volume = data["wear_volume"]
     if volume.sizes["realisation"] < 2:
@@ -206,7 +206,7 @@ def _spread(data: xr.Dataset) -> curves.Mean:
     known = volume.notnull().any("realisation")
     ends = volume.where(known, 0.0).quantile([0.025, 0.5, 0.975], "realisation", skipna=True).where(known)
     low, middle, high = (ends.isel(quantile=k) for k in range(3))
-    return curves.Mean(middle, low, high)
+    return drawing.Mean(middle, low, high)
 
 
 def _over(along: str, data: xr.Dataset) -> str:
@@ -221,7 +221,7 @@ def draw_fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
     error, volume_error, told = compare(groups)
     usual = float(error.xi.sel(xi=0.8, method="nearest"))
     overall = (error["rms"] ** 2).mean(["stick_radius", "cycles"]) ** 0.5
-    figure, panels = style.panels(4, columns=2)
+    figure, panels = drawing.panels(4, columns=2)
     best = error.xi.isel(xi=error["rms"].fillna(np.inf).argmin("xi"))
     maps = (
         (error["largest"].sel(xi=usual), rf"largest $|\Delta f|/d_0$ at $\xi$ = {usual:g}", "viridis"),
@@ -230,15 +230,15 @@ def draw_fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
     )
     for panel, (values, text, colours) in zip(panels, maps, strict=False):
         bound = {"vmin": -abs(values).max(), "vmax": abs(values).max()} if colours == "RdBu" else {}
-        shown = values.transpose("stick_radius", "cycles")
-        mesh = panel.pcolormesh(error.cycles, error.stick_radius, shown, cmap=colours, shading="nearest", **bound)
-        mesh.set_gid(style.DATA)
+        unknown = xr.full_like(values, np.nan)
+        shown = drawing.Mean(values, unknown, unknown)
+        mesh = drawing.field(panel, error.cycles, error.stick_radius, shown, cmap=colours, **bound)
         figure.colorbar(mesh, ax=panel)
         panel.set_title(text, fontsize="small")
         panel.set(xlabel="cycles $N/N_0$", ylabel=style.label("stick_radius"))
         if style.is_geometric(error.cycles):
             style.logarithmic(panel, "x")
-    panels[3].plot(error.xi, overall, "o-", color=style.COLOURS[0], gid=style.DATA)
+    drawing.plain(panels[3], error.xi, overall, "o-", color=style.COLOURS[0])
     least = float(error.xi[int(np.nanargmin(overall.values))])
     panels[3].axvline(least, color="0.6", linewidth=1)
     panels[3].set(xlabel=style.label("xi"), ylabel="rms error of $f/d_0$ over the map")

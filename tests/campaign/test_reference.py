@@ -77,7 +77,7 @@ def test_rows_say_what_a_command_prints(rubbing):
     assert rows["oversampling"]["allowed"] == "whole number ≥ 1 or auto"
     assert rows["indenter"]["default"] == "{shape: plane}"
     assert rows["profile"] | {"meaning": ""} == {
-        "parameter": "profile", "unit": "", "default": "", "allowed": "text", "meaning": ""
+        "parameter": "profile", "unit": "", "default": "", "allowed": "string", "meaning": ""
     }  # fmt: skip
     assert [row["output"] for row in reference.output_rows(rubbing)] == [output.name for output in rubbing.outputs]
 

@@ -95,7 +95,7 @@ def test_wear_coefficient_from_a_table_of_volumes(tmp_path):
     settings = {
         "indenter": Parabola(radius=0.01),
         "contact_modulus": 115e9,
-        "shear_modulus": 90e9,
+        "effective_shear_modulus": 90e9,
         "friction": 0.6,
         "amplitude": 1e-6,
         "normal_force": 50.0,

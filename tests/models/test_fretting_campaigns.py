@@ -11,7 +11,7 @@ from mdr_dask.cli import main
 STEEL = """\
   indenter: {shape: parabola, radius: 10 mm}
   contact_modulus: 115 GPa
-  shear_modulus: 90 GPa
+  effective_shear_modulus: 90 GPa
   friction: 0.6
   amplitude: 1 um
   normal_force: 50 N
@@ -21,7 +21,7 @@ STEEL = """\
 TABLE = """\
   indenter: {shape: table, file: profile.csv}
   contact_modulus: 115 GPa
-  shear_modulus: 90 GPa
+  effective_shear_modulus: 90 GPa
   friction: 0.6
   amplitude: 1 um
   depth: 4.7 um
@@ -126,7 +126,9 @@ def test_sliding_from_a_campaign(write):
 
 
 def test_sliding_in_physical_units_obeys_the_wear_law(write):
-    kept = [line for line in STEEL.splitlines() if line.split(":")[0].strip() not in {"shear_modulus", "friction"}]
+    kept = [
+        line for line in STEEL.splitlines() if line.split(":")[0].strip() not in {"effective_shear_modulus", "friction"}
+    ]
     kept = [line for line in kept if "amplitude" not in line]
     data = filled(write("\n".join(kept) + "\n  wear_rule: exact\n  hold: force\n  path: [1 m, 10 m]\n"))
     np.testing.assert_allclose(data.wear_volume.values.ravel(), 1e-4 * 50 * np.array([1, 10]) / 2e9, rtol=1e-3)

@@ -12,7 +12,7 @@ from mdr_dask.physics.wear.exact import exact
 STEEL = {
     "indenter": Parabola(radius=0.01),
     "contact_modulus": 115e9,
-    "shear_modulus": 90e9,
+    "effective_shear_modulus": 90e9,
     "friction": 0.6,
     "amplitude": 1e-6,
     "normal_force": 50.0,
@@ -280,6 +280,7 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
         ("load", 50.0, "normal_force"),
         ("modulus", 1e11, "contact_modulus"),
         ("curvature_radius", 0.01, "radius"),
+        ("shear_modulus", 90e9, "effective_shear_modulus"),
         ("angle", 0.1, "angle"),
     ],
 )

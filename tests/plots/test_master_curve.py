@@ -14,12 +14,12 @@ def test_three_panels_with_units_bars_and_extrapolated_range(tmp_path):
     assert measured.get_xlabel() == "force [N]"
     assert len(measured.lines) == 3
     np.testing.assert_allclose(np.sort(measured.lines[0].get_xdata()), np.geomspace(1, 100, 12))
-    (solid,) = (line for line in merged.lines if line.get_gid() == "merged")
+    (solid,) = (line for line in merged.lines if line.get_label() == "measured at the reference")
     (whole,) = (line for line in merged.lines if line.get_label() == "reached by shifting")
     inside = np.isfinite(solid.get_ydata())
     np.testing.assert_array_equal(solid.get_ydata()[inside], whole.get_ydata()[inside])
     np.testing.assert_allclose(whole.get_ydata(), 1 / (1 + whole.get_xdata() * 1e-2**-0.15), rtol=0.02)
-    solid = solid.get_xdata()
+    solid = np.where(inside, solid.get_xdata(), np.nan)
     assert np.isnan(solid).any()
     assert np.nanmin(solid) >= 0.99
     assert factors.get_xscale() == "log"

@@ -46,6 +46,8 @@ def test_one_column_a_series_with_friction_velocity_and_load() -> None:
     swing = {"shape": "oscillation", "amplitude": 0.02, "frequency": 250.0}
     data = {"one": dataset(steps), "two": dataset(swing)}
     figure = draw_protocols(data)
+    labels = [panel.get_ylabel() for panel in figure.axes[::2]]
+    assert [label.split(" [")[0] for label in labels] == [r"$\mu$ / rms slope", "velocity $v$", "normal force $F_N$"]
     friction, velocity, load = curves(figure, 0, 2)
     wanted = (data["one"]["friction_coefficient"] / 0.5).mean("realisation").values
     assert np.allclose(friction[3:, 1], wanted)

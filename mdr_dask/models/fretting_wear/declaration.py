@@ -101,7 +101,7 @@ class LoadStep(Parameters):
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
 
 
-_OSCILLATION = ("shear_modulus", "friction", "amplitude")
+_OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
 class FrettingWear(Parameters):
@@ -112,6 +112,7 @@ class FrettingWear(Parameters):
         "method": "write wear_rule: exact, fast or limit; exact is the default",
         "tolerance": "write accuracy",
         "load": "write normal_force",
+        "shear_modulus": "write effective_shear_modulus: it is G* of the pair, G of one body elsewhere",
         "modulus": "write contact_modulus",
         "curvature_radius": "write indenter: {shape: parabola, radius: ...}",
         "angle": "write indenter: {shape: cone, angle: ...}",
@@ -149,7 +150,7 @@ class FrettingWear(Parameters):
         "m", "amplitude U0 of the tangential oscillation", usual="1 um", gt=0, default=None
     )
     contact_modulus: float | None = quantity("Pa", "contact modulus E*", usual="115 GPa", gt=0, default=None)
-    shear_modulus: float | None = quantity(
+    effective_shear_modulus: float | None = quantity(
         "Pa", "effective shear modulus G* of the pair", usual="90 GPa", gt=0, default=None
     )
     friction: float | None = quantity("1", "coefficient of friction", usual="0.6", gt=0, default=None)
@@ -302,7 +303,7 @@ MODEL = Model(
     seconds=deferred(_SOLVE, "seconds"),
     whole=(
         *("cycles", "path", "wear_coefficient", "hardness"),
-        *("friction", "amplitude", "shear_modulus", "contact_modulus", "depth", "normal_force"),
+        *("friction", "amplitude", "effective_shear_modulus", "contact_modulus", "depth", "normal_force"),
         *("indenter.radius", "indenter.angle", "indenter.coefficient"),
     ),
     coordinates=coordinates,

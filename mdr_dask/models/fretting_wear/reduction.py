@@ -99,7 +99,7 @@ def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, i
         length, height = _first_contact(block, coefficient, n, modulus, messages)
         force = modulus * height * length
         if not sliding:
-            share = _column(block, "shear_modulus") * _column(block, "amplitude")
+            share = _column(block, "effective_shear_modulus") * _column(block, "amplitude")
             level = 1.0 - widening * (share / (_column(block, "friction") * modulus * height))[:, None]
         swept = 1.0 if sliding else 4.0 * _column(block, "amplitude")
         rate = swept * _column(block, "wear_coefficient") * modulus

@@ -64,6 +64,7 @@ class PowerLaw(Parameters):
 
 
 KINDS = ("kelvin", "standard_solid", "prony", "power_law", "dma_table")
+SOFTEST, STIFFEST = 100.0, 1e12  # shear moduli, Pa: of a gel, and above that of diamond
 LAWS = ("wlf", "arrhenius", "shift_factors")
 
 
@@ -108,7 +109,7 @@ class Material(Parameters):
 
     def notes(self) -> tuple[str, ...]:
         """Say how well the Prony series of a law or a table holds, and whether the temperature lies in the data."""
-        return (*fit_notes(self), *_outside(self))
+        return (*fit_notes(self), *_outside(self), *_unusual(self))
 
 
 @lru_cache(maxsize=256)
@@ -226,6 +227,19 @@ def _outside(material: Material) -> tuple[str, ...]:
     return (
         f"table {table.file.name}: measured at {ends}; {shown(temperature, 'K')} is reached by shift factors alone",
     )
+
+
+def _unusual(material: Material) -> tuple[str, ...]:
+    """Say that the moduli of a table are those of no solid: its unit may be wrong."""
+    table = material.dma_table
+    if table is None:
+        return ()
+    storage = _curve(table, material.law).storage
+    low, high = float(storage.min()), float(storage.max())
+    if high >= SOFTEST and low <= STIFFEST:
+        return ()
+    ends = f"{shown(low, 'Pa')} to {shown(high, 'Pa')}"
+    return (f"table {table.file.name}: shear moduli of {ends} are those of no solid: is the unit right?",)
 
 
 def _errors(fit: SeriesFit) -> dict[str, float]:

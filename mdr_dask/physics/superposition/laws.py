@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import stdtrit
+from scipy.special import chdtrc, stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
@@ -44,12 +44,18 @@ class ShiftLaw:
     scatter : float
         Standard deviation about the law beyond the errors of the factors, decades; 0 where the errors explain the
         distance.
+    departures : array, shape (groups,)
+        Factors less those of the law, decades.
+    chance : float
+        Probability of such departures by the errors of the factors alone.
     """
 
     name: str
     constants: dict[str, tuple[float, float, float]]
     residual: float
     scatter: float
+    departures: FloatArray
+    chance: float
 
 
 def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, reference: float) -> ShiftLaw:
@@ -73,7 +79,7 @@ def fit_power(groups: FloatArray, factors: FloatArray, covariance: FloatArray, r
         raise FitError("a power law needs positive groups, such as velocities")
     distance = np.log10(groups / reference)
     fitted = _fit("power", _proportional(distance), np.array([_slope(distance, factors)]), factors, covariance)
-    return ShiftLaw("power", {"exponent": fitted.interval(0)}, fitted.residual, fitted.scatter)
+    return fitted.law("power", {"exponent": fitted.interval(0)})
 
 
 def fit_arrhenius(
@@ -85,7 +91,7 @@ def fit_arrhenius(
     distance = (1 / temperature - 1 / reference) / (GAS_CONSTANT * np.log(10))
     guess = np.array([_slope(distance, log_factors)])
     fitted = _fit("arrhenius", _proportional(distance), guess, log_factors, covariance)
-    return ShiftLaw("arrhenius", {"activation_energy": fitted.interval(0)}, fitted.residual, fitted.scatter)
+    return fitted.law("arrhenius", {"activation_energy": fitted.interval(0)})
 
 
 def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatArray, reference: float) -> ShiftLaw:
@@ -110,12 +116,12 @@ def fit_wlf(temperature: FloatArray, log_factors: FloatArray, covariance: FloatA
         least = 1 / min(bend + fitted.quantile * float(np.sqrt(fitted.covariance[1, 1])), bounds[1])
         first, last = sorted([slope * least, float(np.copysign(np.inf, slope))])
         constants = {"c1": (c1, first, last), "c2": (c2, least, np.inf)}
-        return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
+        return fitted.law("wlf", constants)
     change = np.array([[1 / bend, -slope / bend**2], [0.0, -1 / (bend**2 * (c2 - lowest))]])
     half = fitted.quantile * np.sqrt(np.diag(change @ fitted.covariance @ change.T))
     ends = lowest + (c2 - lowest) * np.exp(np.clip([-half[1], half[1]], -700, 700))
     constants = {"c1": (c1, c1 - float(half[0]), c1 + float(half[0])), "c2": (c2, float(ends[0]), float(ends[1]))}
-    return ShiftLaw("wlf", constants, fitted.residual, fitted.scatter)
+    return fitted.law("wlf", constants)
 
 
 def _slope(distance: FloatArray, factors: FloatArray) -> float:
@@ -130,8 +136,14 @@ class _Fitted(NamedTuple):
     constants: FloatArray
     covariance: FloatArray
     quantile: float
-    residual: float
     scatter: float
+    departures: FloatArray
+    chance: float
+
+    def law(self, name: str, constants: dict[str, tuple[float, float, float]]) -> ShiftLaw:
+        """Return the law with its constants."""
+        residual = float(np.sqrt(np.mean(self.departures**2)))
+        return ShiftLaw(name, constants, residual, self.scatter, self.departures, self.chance)
 
     def interval(self, place: int) -> tuple[float, float, float]:
         """Return a constant and the ends of its interval."""
@@ -157,14 +169,15 @@ def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance
         best, squares, _ = _solved(law, best, known, vectors, values + scatter**2, target)
         return squares / freedom - 1
 
+    chance = float(chdtrc(freedom, freedom * (excess(0.0) + 1)))
     scatter, largest = 0.0, float(np.std(factors))
     ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
     if excess(0.0) > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
         scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-3)))
     best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
-    residual = float(np.sqrt(np.mean((law(best)[0] - factors) ** 2)))
     quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
-    return _Fitted(best, np.asarray(np.linalg.pinv(precision), dtype=np.float64), quantile, residual, scatter)
+    inverse = np.asarray(np.linalg.pinv(precision), dtype=np.float64)
+    return _Fitted(best, inverse, quantile, scatter, factors - law(best)[0], chance)
 
 
 def _solved(

@@ -1,0 +1,410 @@
+"""Studies from Python: what the commands do, with dictionaries for campaign files and labelled arrays for tables.
+
+Importing this module gives every Dataset the accessor ``mdr``.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import json
+import shutil
+import tempfile
+import warnings
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from mdr_dask import aggregation, campaign, fits, plots, store
+from mdr_dask.campaign import Campaign
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.execute import Resources
+from mdr_dask.execute import run as execute
+from mdr_dask.plan import Estimate, estimate
+from mdr_dask.questions import selection
+from mdr_dask.questions.columns import Columns, numbers, states
+from mdr_dask.questions.labelled import labelled
+from mdr_dask.questions.table import MEANS, Question
+from mdr_dask.questions.table import table as rows_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from mdr_dask.plots.base import Plot
+
+#: What can be run: the keys of a campaign file, or the path of one.
+Source = Mapping[str, Any] | str | Path | Campaign
+#: What can be looked at: the result of `run` or `open_study`, or the path or URL of a store.
+Study = xr.Dataset | xr.DataTree | str | Path
+
+
+def read(source: Source) -> Campaign:
+    """Read a campaign from a dictionary or a file.
+
+    Parameters
+    ----------
+    source : mapping, str, Path or Campaign
+        The keys of a campaign file, with numbers in SI or strings with units, lists and numpy arrays; the name may be
+        left out. Or the path of a campaign file.
+
+    Raises
+    ------
+    CampaignError
+        With every problem, as ``mdr-dask check`` tells them.
+    """
+    if isinstance(source, Campaign):
+        return source
+    if isinstance(source, Mapping):
+        text = json.dumps({"name": "study", **source}, indent=1, default=_plain)
+        return campaign.loads(text, "campaign", ".")
+    return campaign.load(source)
+
+
+def check(source: Source) -> Estimate:
+    """Check a campaign, and say what it will cost: cases, results, bytes, seconds, notes.
+
+    Raises
+    ------
+    CampaignError
+        With every problem at once.
+
+    Examples
+    --------
+    >>> costs = check({"model": "ehl_line", "parameters": {"load_parameter": [1e-5, 1e-4], "speed_parameter": 1e-11,
+    ...     "material_parameter": 4500}})
+    >>> costs.cases
+    2
+    """
+    return estimate(read(source))
+
+
+def run(
+    source: Source,
+    store: str | Path | None = None,
+    progress: bool = True,
+    resources: Resources | None = None,
+    retry_failed: bool = False,
+) -> xr.Dataset | xr.DataTree:
+    """Run a campaign, or what is missing of it, and return the study.
+
+    Interrupt it, and run it again: what is in the store is kept, and only the rest is computed.
+
+    Parameters
+    ----------
+    source : mapping, str, Path or Campaign
+        As `read` takes it.
+    store : str or Path, optional
+        Path or URL of the store. Without it, a file's campaign goes where the command line puts it, a dictionary's
+        where its key ``store`` says, or else to a temporary place that lasts as long as this process: the same
+        dictionary finds its results there.
+    progress : bool
+        Show a bar in a notebook or on a terminal, or a line now and then.
+    resources : Resources, optional
+        Threads, workers, a scheduler or a cluster; all cores of this machine if there is none.
+    retry_failed : bool
+        Compute the cases again that failed or did not converge.
+
+    Returns
+    -------
+    Dataset or DataTree
+        As `open_study` returns it. A warning says how many results failed.
+
+    Raises
+    ------
+    MdrDaskError
+        With the sentences of the command line.
+
+    Examples
+    --------
+    >>> study = run({"model": "ehl_line", "parameters": {"load_parameter": [1e-5, 1e-4], "speed_parameter": 1e-11,
+    ...     "material_parameter": 4500}, "outputs": ["central_film"]}, progress=False)
+    >>> study.central_film.sizes["load_parameter"]
+    2
+    """
+    from mdr_dask.cli.progress import reporter
+
+    found = read(source)
+    url = str(store or _place(found, isinstance(source, Mapping) and "store" not in source))
+    with reporter(not progress) as report:
+        outcome = execute(found, url, resources or Resources(), report, retry_failed)
+    if outcome.failed:
+        what = f"{outcome.failed} of {outcome.total} results failed; mdr-dask status {url} --failures says why"
+        warnings.warn(what, stacklevel=2)
+    return open_study(url)
+
+
+def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
+    """Open a study, finished or not.
+
+    Returns
+    -------
+    Dataset or DataTree
+        Outputs over the axes and ``realisation``, with units, companions with errors, and ``status``; a DataTree with a
+        node for each series where there are series. Arrays are read when they are used.
+
+    Raises
+    ------
+    StoreError
+        If there is no study at `url`.
+    """
+    groups = store.datasets(str(url))
+    return (
+        groups[""] if [*groups] == [""] else xr.DataTree.from_dict({f"/{name}": data for name, data in groups.items()})
+    )
+
+
+def aggregate(
+    study: Study,
+    statistics: Sequence[str] = aggregation.NAMES,
+    *,
+    series: str | None = None,
+    select: Sequence[str] = (),
+    where: str = "",
+    group_by: Sequence[str] = (),
+    columns: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
+) -> xr.Dataset:
+    """Reduce outputs over their realisations, as ``mdr-dask aggregate`` does.
+
+    Parameters
+    ----------
+    study : Dataset, DataTree, str or Path
+        As `run` or `open_study` returns it, or where its store is.
+    statistics : sequence of str
+        Some of `mdr_dask.aggregation.NAMES`.
+    series, select, where, group_by, columns, units
+        As on the command line (docs/questions.md).
+
+    Returns
+    -------
+    Dataset
+        A variable ``<output>_<statistic>`` for every output and statistic, and ``state_counts``.
+    """
+    asked = Question((), tuple(select), where, tuple(group_by), (), tuple(columns), units or {}, tuple(statistics))
+    return labelled(_group(study, series), asked)
+
+
+def table(
+    study: Study,
+    outputs: Sequence[str] = (),
+    statistics: Sequence[str] | None = MEANS,
+    *,
+    series: str | None = None,
+    select: Sequence[str] = (),
+    where: str = "",
+    group_by: Sequence[str] = (),
+    sort: Sequence[str] = (),
+    columns: Sequence[str] = (),
+    units: Mapping[str, str] | None = None,
+    limit: int = 0,
+) -> pd.DataFrame:
+    """Return a study as a table, as ``mdr-dask show`` does; every result has a row if `statistics` is None.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The units of its columns are in ``attrs["units"]``.
+    """
+    import pandas as pd
+
+    reduced = None if statistics is None else tuple(statistics)
+    asked = Question(
+        tuple(outputs), tuple(select), where, tuple(group_by), tuple(sort), tuple(columns), units or {}, reduced
+    )
+    answer = rows_of(_group(study, series), asked, limit)
+    frames = list(answer.frames)
+    found = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(answer.units))
+    found = found[:limit] if limit else found
+    found.attrs["units"] = answer.units
+    return found
+
+
+def fit(study: Study, law: str) -> xr.Dataset | xr.DataTree:
+    """Fit a law, each constant with its interval, as ``mdr-dask fit`` does.
+
+    Returns
+    -------
+    Dataset or DataTree
+        Constants with ``_low`` and ``_high``, and ``law_holds``; a node for each series where they are fitted apart.
+
+    Raises
+    ------
+    FitError
+        If the study has not what the law needs.
+    """
+    groups = _groups(study)
+    model = _model(groups)
+    found: dict[str, xr.Dataset] = _named(fits.available(model), law, f"law for {model}").results(groups)
+    return next(iter(found.values())) if len(found) == 1 else _tree(found)
+
+
+def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
+    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+
+    Parameters
+    ----------
+    study : Dataset, DataTree, str or Path
+        A study, or the path of its store.
+    figure : str
+        Name of a figure, or of an output where `view` says how it is drawn.
+    select : sequence of str
+        Parts of the study, as in ``--select``.
+    **view
+        ``over``, an axis or two for a map, ``by``, ``panels`` and ``log``; ``over=()`` draws main effects. See
+        :class:`mdr_dask.plots.outputs.View`.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; ``.table()`` gives the data drawn.
+
+    Raises
+    ------
+    DataError, FitError
+        If the study has not what the figure needs.
+    """
+    groups = _groups(study)
+    model = _model(groups)
+    found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
+    drawn: Figure = found.figure(selection.select_all(groups, select))
+    return drawn
+
+
+def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
+    from mdr_dask.plots.outputs import View, of_output
+
+    return of_output(View(output, (over,) if isinstance(over, str) else tuple(over), **view))
+
+
+def master_curve(
+    study: Study | pd.DataFrame,
+    over: str | None = None,
+    of: str | None = None,
+    by: str | None = None,
+    vertical: bool = False,
+    reference: float | None = None,
+    bootstrap: int = 0,
+) -> xr.Dataset:
+    """Shift curves into one master curve, as ``mdr-dask master-curve`` does.
+
+    Parameters
+    ----------
+    study : Dataset, DataTree, DataFrame, str or Path
+        A study, a table of curves, or the path of either.
+    over, of, by, vertical, reference, bootstrap
+        As the options of the command.
+
+    Returns
+    -------
+    Dataset
+        Shift factors, the merged curve with its error, and the constants of the laws that the factors follow.
+    """
+    from pandas import DataFrame
+
+    from mdr_dask.fits import master_curve as room
+
+    if isinstance(study, str | Path) and Path(study).is_file():
+        study = room.read_table(study)
+    if not isinstance(study, DataFrame):
+        groups = _groups(study)
+        study = room.friction_of_roughness(groups) if len(groups) > 1 else _group(study, None)
+    return room.master_curve(study, over, of, by, vertical, reference, bootstrap)
+
+
+@xr.register_dataset_accessor("mdr")  # type: ignore[no-untyped-call]
+class StudyAccessor:
+    """``study.mdr``: what labelled arrays alone do not know of a study."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    @property
+    def numbers(self) -> xr.Dataset:
+        """The dimensionless numbers of the cases that the study has the ingredients for, of means over realisations."""
+        columns = Columns(self._dataset)
+        known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
+        return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
+
+    @property
+    def states(self) -> xr.DataArray:
+        """What became of every case: ``done``, or how many of its realisations are missing, failed, not converged."""
+        return states(self._dataset)
+
+    def select(self, *selections: str) -> xr.Dataset:
+        """Keep a part of the study: ``study.mdr.select("velocity=1 mm/s..1 m/s", "hurst=0.3,0.7")``."""
+        return selection.select(self._dataset, selections)
+
+    def where(self, condition: str) -> xr.Dataset:
+        """Keep the cases that meet a condition, such as ``"load_number > 0.1 and velocity < 3 km/h"``."""
+        return selection.where(self._dataset, condition)
+
+    def table(self, *outputs: str, **asked: Any) -> pd.DataFrame:
+        """Return means with their errors as a table: `mdr_dask.table` of this study."""
+        return table(self._dataset, outputs, **asked)
+
+    def aggregate(self, **asked: Any) -> xr.Dataset:
+        """Reduce over realisations: `mdr_dask.aggregate` of this study."""
+        return aggregate(self._dataset, **asked)
+
+    def fit(self, law: str) -> xr.Dataset | xr.DataTree:
+        """Fit a law: `mdr_dask.fit` of this study."""
+        return fit(self._dataset, law)
+
+    def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
+        """Draw a figure: `mdr_dask.plot` of this study."""
+        return plot(self._dataset, figure, select, **view)
+
+
+def _plain(value: Any) -> Any:
+    """Return numbers of numpy and paths as JSON holds them."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _place(found: Campaign, is_temporary: bool) -> str:
+    """Return the store of a campaign; a temporary one is known by all that the campaign says."""
+    if not is_temporary:
+        return found.store
+    digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]
+    return str(_temporary_folder() / f"{found.name}-{digest}.zarr")
+
+
+@lru_cache(maxsize=1)
+def _temporary_folder() -> Path:
+    folder = tempfile.mkdtemp(prefix="mdr-dask-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
+
+
+def _tree(groups: Mapping[str, xr.Dataset]) -> xr.DataTree:
+    return xr.DataTree.from_dict({f"/{name}": data for name, data in groups.items()})
+
+
+def _groups(study: Study) -> dict[str, xr.Dataset]:
+    """Return the groups of a study by the names of their series."""
+    if isinstance(study, xr.Dataset):
+        return {"": study}
+    if isinstance(study, xr.DataTree):
+        return {name: node.to_dataset() for name, node in study.children.items()} or {"": study.to_dataset()}
+    return store.datasets(str(study))
+
+
+def _group(study: Study, series: str | None) -> xr.Dataset:
+    return selection.group(_groups(study), series)
+
+
+def _model(groups: Mapping[str, xr.Dataset]) -> str:
+    model = next(iter(groups.values())).attrs.get("model")
+    if model is None:
+        raise DataError("expected a study, got a Dataset without the attribute 'model'")
+    return str(model)
+
+
+def _named(known: Mapping[str, Any], name: str, what: str) -> Any:
+    if name not in known:
+        hint = did_you_mean(name, list(known)) or f"; known: {', '.join(known) or 'none'}"
+        raise DataError(f"no {what} is called {name!r}{hint}")
+    return known[name]

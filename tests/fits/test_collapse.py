@@ -1,0 +1,59 @@
+"""What a master curve says of its curves and of the law of their shifts."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from mdr_dask.fits.master_curve import master_curve
+
+TEMPERATURES = np.arange(0.0, 61.0, 10.0)  # degrees Celsius
+REFERENCE = 30.0
+
+
+def wlf(temperature):
+    return -8.0 * (temperature - REFERENCE) / (100.0 + temperature - REFERENCE)
+
+
+def modulus(seed, scatter, *, shift=wlf, tilt=0.0):
+    """Return a table of moduli on one sigmoid, shifted; `tilt` bends each curve in its own way."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for number, temperature in enumerate(TEMPERATURES):
+        x = np.linspace(-1.0, 1.0, 25)
+        y = 6.0 + 1.5 * np.tanh((x + shift(temperature)) / 2.0) + tilt * (-1) ** number * (x**2 - 0.4)
+        y += scatter * rng.standard_normal(x.size)
+        rows += [(10**a, 10**b, temperature) for a, b in zip(x, y, strict=True)]
+    return pd.DataFrame(rows, columns=["frequency", "modulus", "temperature"])
+
+
+def step(temperature):
+    return wlf(temperature) + (0.6 if temperature > 25.0 else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "verdicts"),
+    [
+        ({}, ("yes: ", "the curves collapse: yes", "wlf: yes")),
+        ({"shift": step}, ("no: ", "the curves collapse: yes", "wlf: no", "arrhenius: no")),
+        ({"tilt": 0.3}, ("no: ", "the curves collapse: no")),
+    ],
+    ids=["as planted", "a step in the shifts", "curves of their own shape"],
+)
+def test_what_is_planted_is_told(case, verdicts):
+    sentence = master_curve(modulus(1, 0.03, **case))["law_holds"].item()
+    assert sentence.startswith(verdicts[0]), sentence
+    assert all(verdict in sentence for verdict in verdicts[1:]), sentence
+
+
+def test_false_alarms_are_rare():
+    """Two tests with a chance of 5 % each; Arrhenius does not hold, and WLF is enough."""
+    told = [master_curve(modulus(seed, 0.04))["law_holds"].item() for seed in range(20)]
+    print(*(sentence for sentence in told if not sentence.startswith("yes")), sep="\n")
+    assert np.mean([sentence.startswith("yes: ") for sentence in told]) >= 0.8
+
+
+def test_too_few_curves_leave_a_law_untested():
+    table = modulus(1, 0.03)
+    sentence = master_curve(table[table["temperature"].isin([20.0, 30.0])])["law_holds"].item()
+    assert sentence.startswith("not tested: the curves collapse: yes")
+    assert "law of the shifts: not tested: the law arrhenius needs more than 1 shift factors" in sentence

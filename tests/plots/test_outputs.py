@@ -1,0 +1,220 @@
+"""A figure of any output on stores of every model: what is drawn against the store, and what is refused."""
+
+import numpy as np
+import planted
+import pytest
+import xarray as xr
+from drawn import check_picture, mismatches, rows, stored
+from matplotlib.colors import LogNorm
+
+from mdr_dask.errors import DataError
+from mdr_dask.plots import page, style
+from mdr_dask.plots.outputs import View, of_output
+
+V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 6]}\n"
+F = "  normal_force: {geometric: [1 mN, 100 N, 9]}\n"
+MU = "friction_coefficient"
+STUDIES = {
+    "grid": (planted.SLIDING + F + V + "  hurst: [0.3, 0.7]\n", {"failed": True}),
+    "sampled": (
+        planted.SLIDING + "  normal_force: {geometric: [1 mN, 100 N]}\n  velocity: {geometric: [0.1 mm/s, 1 m/s]}\n"
+        "  hurst: {linear: [0.2, 0.8]}\nsampling: {latin_hypercube: 32}\n",
+        {"failed": True},
+    ),
+    "jump": (planted.JUMP + V + "  hurst: 0.6\n  velocity_change: [-0.2, 0.2]\n  normal_force: 1 N\n", {}),
+    "rollers": (
+        planted.ROLLERS + "  normal_force: [200 N, 800 N]\n  rotation_speed: {geometric: [10 rpm, 1000 rpm, 4]}\n"
+        "  temperature: [40 degC, 60 degC]\n",
+        {"realisations": 1},
+    ),
+    "film": (
+        planted.NUMBERS + "  material_parameter: 5000\n  load_parameter: [1e-6, 1e-5]\n"
+        "  speed_parameter: {geometric: [1e-12, 1e-10, 5]}\n",
+        {},
+    ),
+    "wear": (
+        planted.FRETTING
+        + f"  {planted.RULE}: [exact, fast, limit]\n  stick_radius: [0.4, 0.6]\n  cycles: [0.5, 1, 2]\n",
+        {"failed": True},
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory):
+    return {
+        name: next(iter(planted.make(tmp_path_factory.mktemp(name), text, **special).values())).load()
+        for name, (text, special) in STUDIES.items()
+    }
+
+
+def drawn(groups, output, over, **view):
+    over = (over,) if isinstance(over, str) else over
+    figure = of_output(View(output, over, **view)).figure(groups)
+    check_picture(figure)
+    return figure
+
+
+def shown(data, name):
+    return xr.DataArray(style.shown(name, data[name]), dims=data[name].dims)
+
+
+LINES = [
+    ("grid", MU, "velocity", {}),
+    ("grid", MU, "velocity", {"by": "normal_force", "panels": "hurst"}),
+    ("grid", "contact_fraction", "normal_force", {"by": "velocity"}),
+    ("grid", f"{MU}_error", "velocity", {"log": "xy"}),
+    ("sampled", MU, "velocity", {}),
+    ("sampled", MU, "velocity", {"by": "hurst"}),
+    ("jump", MU, "relaxation_times", {"by": "velocity"}),
+    ("jump", "friction_coefficient_jump", "velocity", {}),
+    ("rollers", "film_ratio", "rotation_speed", {"panels": "temperature"}),
+    ("film", "central_film", "speed_parameter", {}),
+    ("film", "pressure", "position", {"by": "speed_parameter"}),
+    ("wear", "wear_volume", "cycles", {"by": planted.RULE}),
+    ("wear", "wear_volume", planted.RULE, {}),
+    ("wear", "worn_profile", "radius", {"panels": "stick_radius"}),
+]
+
+
+@pytest.mark.parametrize(("study", "output", "over", "view"), LINES)
+def test_an_output_against_a_parameter_is_what_the_store_holds(study, output, over, view, stores):
+    data = stores[study]
+    figure = drawn({"": data}, output, over, **view)
+    table = figure.table()
+    x = shown(data, over) if data[over].dtype.kind in "fiu" else xr.DataArray(np.arange(data[over].size), dims=over)
+    factor = table.loc[table["what"] == "data", "y"].abs().max() / np.nanmax(abs(stored(data, output)[0]))
+    factor = 10.0 ** np.round(np.log10(factor)) if output == "pressure" else 1.0
+    value = stored(data, output, factor)
+    known = rows(x, value, shown(data, "hurst")) if view.get("by") == "hurst" else rows(x, value)
+    found = table[table["what"] == "data"]
+    assert mismatches(found, known).empty
+    assert "values of" in style.left_out(figure) or mismatches(known, found).empty
+    assert not mismatches(found.tail(1).assign(y=lambda row: 1.001 * row["y"]), known).empty
+    empty = bool(data[output].isnull().all("realisation").any())
+    marked = set(table["what"]) & {"failed"}
+    assert bool(marked) == empty or "values of" in style.left_out(figure)
+
+
+def test_what_is_held_fixed_stands_in_the_title_and_in_the_table(stores):
+    figure = drawn({"": stores["grid"].isel(hurst=[1])}, MU, "velocity", by="normal_force")
+    table = figure.table()
+    for name, text in (
+        ("rms_roughness", "$h$ = 0.5 µm"),
+        ("relaxation_time", r"$\tau$ = 1 ms"),
+        ("hurst", "$H$ = 0.7"),
+    ):
+        assert text in figure.get_suptitle().replace("\n", " ")
+        assert table.attrs["held"][name] == float(stores["grid"].isel(hurst=1)[name])
+    assert any(axes.get_label() == "<colorbar>" for axes in figure.axes), "nine curves have a colour bar"
+
+
+def test_a_map_has_the_values_of_the_store_and_crosses_out_what_failed(stores):
+    data = stores["grid"].isel(hurst=0)
+    figure = drawn({"": data}, MU, ("velocity", "normal_force"))
+    value = stored(data, MU)
+    known = rows(shown(data, "velocity"), shown(data, "normal_force"), value)
+    found = figure.table()
+    assert mismatches(found, known).empty
+    assert mismatches(known, found).empty
+    (crosses,) = (line for line in figure.axes[0].lines if line.get_label() == "no value")
+    assert len(crosses.get_xdata()) == int(value[0].isnull().sum()) > 0
+    (mesh,) = figure.axes[0].collections
+    assert isinstance(mesh.norm, LogNorm)
+    edges = mesh.get_coordinates()[0, :, 0]
+    np.testing.assert_allclose(edges[1:-1] ** 2, data["velocity"][1:] * data["velocity"][:-1].values)
+    half = float(((value[2] - value[1]) / 2).max())
+    assert f"at most ±{half:.2g}" in figure.get_suptitle()
+    drawn({"": stores["sampled"]}, MU, ("velocity", "hurst"))
+    drawn({"": stores["grid"]}, MU, ("velocity", "normal_force"), panels="hurst")
+
+
+def test_effects_are_means_over_all_that_varies_besides(stores):
+    data = stores["rollers"]
+    table = drawn({"": data}, "film_ratio", ()).table()
+    means = table[table["curve"] == "mean, 95 % interval"]
+    for panel, name in enumerate(("normal_force", "rotation_speed", "temperature"), start=1):
+        rest = {"normal_force", "rotation_speed", "temperature", "realisation"} - {name}
+        here = means[means["panel"] == panel]
+        np.testing.assert_allclose(here["x"], style.shown(name, data[name]))
+        np.testing.assert_allclose(here["y"], data["film_ratio"].mean(rest))
+    table = drawn({"": stores["sampled"]}, MU, ()).table()
+    cases = stores["sampled"][MU].mean("realisation").dropna("case")
+    for panel in (1, 2, 3):
+        here = table[(table["panel"] == panel) & (table["curve"] == "mean, 95 % interval")]
+        assert len(here) == cases.size // 8
+        assert here["y"].mean() == pytest.approx(float(cases.mean()), rel=0.35)
+        assert np.all((here["y_low"] <= here["y"]) & (here["y"] <= here["y_high"]))
+
+
+def test_several_studies_have_one_entry_each_and_panels_where_there_are_too_many(stores):
+    one = stores["grid"].isel(hurst=[0], normal_force=[0])
+    other = stores["grid"].isel(hurst=[1], normal_force=[0])
+    figure = drawn({"first": one, "second": other}, MU, "velocity")
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels[:2] == ["first", "second"]
+    assert "law (eq. 3.18)" in labels
+    assert "$H$" not in figure.get_suptitle(), "what differs is not held fixed"
+    figure = drawn({"first": stores["grid"], "second": stores["grid"]}, MU, "velocity")
+    assert [axes.get_title() for axes in figure.axes[:2]] == ["first", "second"]
+
+
+def test_units_size_and_style_of_the_page(stores, tmp_path):
+    data = stores["rollers"]
+    sheet = tmp_path / "paper.mplstyle"
+    sheet.write_text("axes.linewidth: 3\n")
+    asked = page.Page(*page.size("85x60mm"), {"rotation_speed": "rad/s", "temperature": "K", "film_ratio": "percent"})
+    with page.drawing_for(asked, str(sheet)):
+        figure = drawn({"": data}, "film_ratio", "rotation_speed", by="temperature")
+    assert figure.get_size_inches() * 25.4 == pytest.approx([85, 60])
+    axes = figure.axes[0]
+    assert axes.spines["left"].get_linewidth() == 3
+    assert axes.get_xlabel() == "rotation speed [rad/s]"
+    assert "[percent]" in axes.get_ylabel()
+    np.testing.assert_allclose(axes.lines[0].get_xdata(), data["rotation_speed"])
+    np.testing.assert_allclose(np.nanmax(axes.lines[0].get_ydata()) / 100, data["film_ratio"].max(), rtol=0.3)
+    assert axes.get_legend_handles_labels()[1][0] == "$F_N$ = 200 N, temperature = 313.1 K"
+
+
+@pytest.mark.parametrize(
+    ("study", "output", "over", "view", "sentence"),
+    [
+        (
+            "grid",
+            "friction",
+            ("velocity",),
+            {},
+            "no output 'friction' in this study .did you mean 'friction_coefficient'",
+        ),
+        ("grid", MU, ("speed",), {}, "no axis 'speed'.*varies along normal_force, velocity, hurst"),
+        ("grid", MU, ("shear_modulus",), {}, r"shear_modulus is fixed, \$G\$ = 10 MPa; .*varies along"),
+        ("grid", MU, ("velocity",), {"by": "velocity"}, "velocity is asked for twice"),
+        ("grid", MU, ("velocity", "hurst"), {"by": "normal_force"}, "a map of one series, without --by"),
+        ("film", "pressure", ("speed_parameter",), {}, "pressure goes along position: --over position, or --select"),
+        ("sampled", MU, ("velocity",), {"panels": "hurst"}, "every case of a sampled study has another hurst: --by"),
+    ],
+)
+def test_what_cannot_be_drawn_is_one_sentence(study, output, over, view, sentence, stores):
+    with pytest.raises(DataError, match=sentence) as refused:
+        of_output(View(output, over, **view)).figure({"": stores[study]})
+    assert refused.value.__cause__ is None
+
+
+@pytest.mark.parametrize("text", ["85", "85x60", "mm", "85mmx", "1mm", "3m", "85 kg", "85mm x 60N"])
+def test_a_size_is_lengths_that_a_page_has(text):
+    with pytest.raises(DataError, match=r"expected|size"):
+        page.size(text)
+
+
+def test_sizes_are_read():
+    assert page.size("85mm") == (pytest.approx(85 / 25.4), None)
+    assert page.size("8.5 cm x 60 mm") == (pytest.approx(85 / 25.4), pytest.approx(60 / 25.4))
+    assert page.size("3x2in") == (pytest.approx(3), pytest.approx(2))
+
+
+def test_a_style_that_is_not_there_is_one_sentence():
+    with (
+        pytest.raises(DataError, match=r"no style file of matplotlib.*'nowhere\.mplstyle'"),
+        page.drawing_for(page.Page(), "nowhere.mplstyle"),
+    ):
+        pass

@@ -1,0 +1,196 @@
+"""Studies from Python: dictionaries in, labelled arrays out, and the same numbers and sentences as the command line."""
+
+import io
+import subprocess
+import sys
+from contextlib import contextmanager
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from planted import SLIDING, make
+
+import mdr_dask
+from mdr_dask import studies
+from mdr_dask.cli import main, progress
+from mdr_dask.errors import CampaignError, DataError, StoreError
+
+SMALL = {
+    "model": "sliding_friction",
+    "realisations": 6,
+    "parameters": {
+        "length": "20 mm",
+        "points": 200,
+        "rms_roughness": 5e-7,
+        "shear_modulus": "10 MPa",
+        "relaxation_time": "1 ms",
+        "normal_force": ["0.1 N", 1],
+        "velocity": np.geomspace(1e-3, 1, 4),
+    },
+    "outputs": ["friction_coefficient", "rms_slope"],
+}
+
+
+@pytest.fixture(scope="module")
+def study():
+    return mdr_dask.run(SMALL, progress=False)
+
+
+@pytest.fixture(scope="module")
+def url(study, tmp_path_factory):
+    """The same in a store with a name."""
+    folder = tmp_path_factory.mktemp("studies") / "small.zarr"
+    mdr_dask.run(SMALL, store=folder, progress=False)
+    return str(folder)
+
+
+def test_a_dictionary_becomes_a_dataset_and_is_found_again(study, monkeypatch):
+    assert dict(study.sizes) == {"normal_force": 2, "velocity": 4, "realisation": 6}
+    assert (study.status == 1).all()
+    assert study.friction_coefficient.attrs["units"] == "1"
+    monkeypatch.setattr("mdr_dask.models.sliding_friction.solve.compute", None)  # nothing is computed again
+    xr.testing.assert_identical(mdr_dask.run(SMALL, progress=False), study)
+
+
+def test_a_store_holds_the_same_values_and_is_opened_by_its_path(study, url):
+    opened = mdr_dask.open(url)
+    np.testing.assert_array_equal(opened.friction_coefficient, study.friction_coefficient)
+    assert "indentation_depth" not in opened
+
+
+def test_python_and_the_command_line_give_the_same_table(url, capsys):
+    asked = {"where": "velocity > 5 mm/s", "sort": ["-friction_coefficient"], "units": {"velocity": "km/h"}}
+    found = mdr_dask.table(url, ["friction_coefficient"], **asked)
+    command = ["show", url, "friction_coefficient", "--where", asked["where"], "--sort", asked["sort"][0]]
+    assert main([*command, "--units", "velocity=km/h", "--csv"]) == 0
+    printed = pd.read_csv(io.StringIO(capsys.readouterr().out))
+    assert found.attrs["units"]["velocity"] == "km/h"
+    pd.testing.assert_frame_equal(found.set_axis(list(printed), axis=1), printed)
+
+
+def test_statistics_figures_and_master_curves_of_a_dataset_and_of_its_path(study, url):
+    for source in (study, url):
+        reduced = mdr_dask.aggregate(source, ["mean"], select=["velocity=1 m/s"])
+        np.testing.assert_allclose(
+            reduced.friction_coefficient_mean[:, 0], study.friction_coefficient[:, -1].mean("realisation")
+        )
+        assert mdr_dask.plot(source, "velocity").axes
+        factors = mdr_dask.master_curve(source, over="velocity", of="friction_coefficient", by="normal_force")
+        assert factors.sizes["normal_force"] == 2
+
+
+def test_laws_are_fitted_to_a_dataset_and_to_its_path(tmp_path):
+    loads = "  normal_force: {geometric: [2 mN, 25 mN, 8]}\n  velocity: {geometric: [0.1 mm/s, 10 m/s, 11]}\n"
+    planted = make(tmp_path, SLIDING + loads)[""]
+    found = mdr_dask.fit(planted, "zone_one")
+    assert found.law_holds.item().startswith("yes")
+    xr.testing.assert_identical(planted.mdr.fit("zone_one"), found)
+    xr.testing.assert_identical(mdr_dask.fit(tmp_path / "study.zarr", "zone_one"), found)
+
+
+def test_the_accessor_knows_numbers_states_and_parts(study):
+    found = study.mdr.numbers
+    np.testing.assert_allclose(found.load_number, study.normal_force / (1e7 * 5e-7 * 0.02))
+    np.testing.assert_allclose(found.deborah, study.velocity * 1e-3 / 0.02)
+    assert set(found.velocity_number.dims) == {"normal_force", "velocity"}
+    assert (study.mdr.states == "done").all()
+    assert study.mdr.select("velocity=0.1..1", "normal_force=1").sizes["velocity"] == 2
+    assert study.mdr.where("load_number > 5").friction_coefficient.notnull().sum() == 4 * 6
+    assert len(study.mdr.table("rms_slope", group_by=("normal_force",))) == 2
+    assert study.mdr.aggregate(statistics=["count"]).friction_coefficient_count.min() == 6
+    assert study.mdr.plot("velocity").axes
+
+
+def test_series_become_a_tree_and_are_named(tmp_path):
+    parameters = {**SMALL["parameters"], "normal_force": 1, "velocity": 1}
+    asked = {**SMALL, "parameters": parameters, "series": {"rough": {"hurst": [0.3, 0.7]}, "flat": {"hurst": 1.0}}}
+    tree = mdr_dask.run(asked, tmp_path / "series.zarr", progress=False)
+    assert sorted(tree.children) == ["flat", "rough"]
+    assert tree["rough"].friction_coefficient.sizes["hurst"] == 2
+    assert len(mdr_dask.table(tree, series="rough")) == 2
+    with pytest.raises(DataError, match="choose one: --series with one of rough, flat"):
+        mdr_dask.aggregate(tree)
+
+
+def test_an_interrupted_cell_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    """The interrupt comes after a block; the next call keeps it, and ends with the numbers of an undisturbed run."""
+    asked = {**SMALL, "store": {"path": str(tmp_path / "study.zarr"), "blocks": {"normal_force": 1, "realisation": 2}}}
+
+    @contextmanager
+    def interrupting(quiet):
+        def report(state):
+            if state.done:
+                raise KeyboardInterrupt
+
+        yield report
+
+    kept = []
+
+    @contextmanager
+    def watching(quiet):
+        yield lambda state: kept.append(state.kept)
+
+    monkeypatch.setattr(progress, "reporter", interrupting)
+    with pytest.raises(KeyboardInterrupt):
+        mdr_dask.run(asked)
+    monkeypatch.setattr(progress, "reporter", watching)
+    resumed = mdr_dask.run(asked)
+    assert 0 < kept[0] < resumed.status.size
+    assert (resumed.status == 1).all()
+
+
+REFUSED = [
+    (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key"),
+    (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
+    (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
+    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study, got a Dataset without"),
+]
+
+
+@pytest.mark.parametrize(("call", "error", "told"), REFUSED)
+def test_exceptions_say_what_the_command_line_says(call, error, told):
+    with pytest.raises(error) as refused:
+        call()
+    assert told in str(refused.value)
+
+
+def test_unknown_laws_and_figures_are_one_sentence(study):
+    with pytest.raises(DataError, match=r"no law for sliding_friction is called 'zone_on'.*did you mean 'zone_one'"):
+        mdr_dask.fit(study, "zone_on")
+    with pytest.raises(DataError, match="no figure of sliding_friction is called 'stribeck'"):
+        mdr_dask.plot(study, "stribeck")
+
+
+def test_failed_results_are_a_warning(toy, tmp_path):
+    asked = {"model": "toy", "realisations": 2, "parameters": {"position": [1, 2, 3], "fail_above": 2}}
+    with pytest.warns(UserWarning, match=r"2 of 6 results failed; mdr-dask status .* --failures says why"):
+        found = mdr_dask.run(asked, tmp_path / "toy.zarr", progress=False)
+    assert found.mdr.states.to_numpy().tolist() == ["done", "done", "2 failed"]
+
+
+def test_a_notebook_has_a_bar_below_its_cell(monkeypatch):
+    shown = []
+    room = ModuleType("IPython.display")
+    room.HTML = str
+    room.display = lambda html, display_id: shown.append(html) or SimpleNamespace(update=shown.append)
+    monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
+    monkeypatch.setitem(sys.modules, "IPython.display", room)
+    with progress._in_notebook() as draw:
+        draw(studies.execute.__globals__["Progress"](total=10, done=4), 2.0)
+    assert "preparing" in shown[0]
+    assert 'value="4" max="10"' in shown[1]
+    assert shown[-1] == ""
+
+
+def test_importing_the_package_is_light_and_its_names_stay_functions():
+    code = """
+import sys, mdr_dask
+heavy = {"numpy", "pandas", "xarray", "dask", "zarr", "numba", "scipy", "matplotlib", "click", "pydantic"}
+assert not heavy & set(sys.modules), heavy & set(sys.modules)
+import mdr_dask.fits, mdr_dask.plots, mdr_dask.cli, mdr_dask.aggregation, mdr_dask.tables
+for name in mdr_dask.__all__:
+    assert name == "__version__" or callable(getattr(mdr_dask, name)), name
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
