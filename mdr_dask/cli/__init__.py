@@ -11,12 +11,14 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures, plot
+from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
+from mdr_dask.cli.surface import surface
 from mdr_dask.version import __version__
 
 BROKE = 3
@@ -51,9 +53,11 @@ for command in (
     aggregate,
     fit,
     sensitivity,
+    law,
     plot,
     figures,
     master_curve,
+    surface,
     schema,
 ):
     cli.add_command(command)

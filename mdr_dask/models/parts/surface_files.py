@@ -111,8 +111,9 @@ def _tabulated(file: DataFile) -> Spectrum:
         Column("C2D", "m^4", ("C 2D", "C_iso", "areal spectrum"), needed=False, above=0),
         Column("C1D", "m^3", ("C 1D", "line spectrum"), needed=False, above=0),
         Column("C cut", "m^3", ("cut", "C_cut", "scan spectrum"), needed=False, above=0),
+        Column("relative error", "1", needed=False, least=0),
     )
-    table = read_table(file.read_text(), file.name, columns)
+    table = read_table(file.read_text(), file.name, columns, allow_missing=True)
     places = [name for name in ("wavenumber", "wavelength") if name in table]
     kinds = [name for name in ("C2D", "C1D", "C cut") if name in table]
     problems = [

@@ -1,0 +1,133 @@
+"""What files of a measured surface say: heights, slopes, spectra, the power law with its cut-offs, the resolution."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.models.base import DataFile
+from mdr_dask.models.parts.surface import Surface
+from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, line_of_scan, rings_of
+from mdr_dask.physics.surfaces.measured import rms_slope
+from mdr_dask.physics.surfaces.scans import averaged, cut_of_lines, hann_window
+from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
+
+if TYPE_CHECKING:
+    from mdr_dask.physics.surfaces.scans import Cut
+    from mdr_dask.physics.surfaces.spectrum import Spectrum
+
+UNITS = {
+    "file": "",
+    "rms_height": "m",
+    "rms_gradient": "1",
+    "slope_x": "1",
+    "slope_y": "1",
+    "anisotropy": "1",
+    "hurst": "1",
+    "hurst_low": "1",
+    "hurst_high": "1",
+    "rolloff": "m",
+    "rolloff_low": "m",
+    "rolloff_high": "m",
+    "cutoff": "m",
+    "cutoff_low": "m",
+    "cutoff_high": "m",
+    "resolution": "m",
+    "length": "m",
+}
+"""Columns of a report and their units; NaN where a file does not tell."""
+
+
+class FileReport(NamedTuple):
+    """What one file says.
+
+    Parameters
+    ----------
+    file : DataFile
+    row : dict of str to number or str
+        The columns of `UNITS`.
+    found : Found
+        Its spectrum C2D, where noise begins, remarks.
+    bins : Cut
+        C2D in logarithmic bins with relative errors.
+    cuts : dict of str to (array, array)
+        Wave numbers and C_cut, m^3, by the direction of the cut; empty of a table.
+    law : SelfAffine or None
+    """
+
+    file: DataFile
+    row: dict[str, float | str]
+    found: Found
+    bins: Cut
+    cuts: dict[str, tuple[FloatArray, FloatArray]]
+    law: SelfAffine | None
+
+
+def reports(surface: Surface) -> tuple[FileReport, ...]:
+    """Return what every file of a surface says.
+
+    Raises
+    ------
+    DataError
+        If a file cannot be read, or is anisotropic and no direction is named.
+    """
+    measured = surface.measured
+    return tuple(_report(surface, file, found) for file, found in zip(measured.files, measured.found(), strict=True))
+
+
+def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
+    row: dict[str, float | str] = {name: float("nan") for name in UNITS} | {"file": file.name}
+    row |= {"rms_height": found.spectrum.rms_height(), "rms_gradient": found.spectrum.rms_gradient()}
+    cuts: dict[str, tuple[FloatArray, FloatArray]] = {}
+    bins = averaged(found.spectrum.wavenumber, found.spectrum.density, 100.0)
+    if surface.map is not None:
+        bins, cuts = _of_map(surface.map, file, row, bins)
+    elif surface.scan is not None:
+        bins, cuts = _of_scan(surface.scan, file, row, found)
+    end = 2 * np.pi / found.resolution if found.resolution else np.inf
+    law = fit_self_affine(bins.until(min(end, steep_limit(bins))))
+    row["resolution"] = found.resolution or found.spectrum.wavelengths[1]
+    if law is not None:
+        for name, interval in (("hurst", law.hurst), ("rolloff", law.longest), ("cutoff", law.shortest)):
+            if interval is not None:
+                row |= dict(zip((name, f"{name}_low", f"{name}_high"), interval, strict=True))
+    return FileReport(file, row, found, bins, cuts, law)
+
+
+def _of_map(
+    maps: MapFiles, file: DataFile, row: dict[str, float | str], bins: Cut
+) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
+    rings, _ = rings_of(maps, file)
+    slopes = np.sqrt(rings.slopes[:2])
+    row |= {"rms_height": rings.rms_height, "rms_gradient": rings.rms_gradient}
+    row |= {"slope_x": float(slopes[0]), "slope_y": float(slopes[1]), "anisotropy": rings.anisotropy()}
+    row |= {"length": 2 * np.pi / float(rings.wavenumber[0])}
+    return rings.binned() if maps.direction is None else bins, dict(zip("xy", rings.cuts, strict=True))
+
+
+def _of_scan(
+    scans: ScanFiles, file: DataFile, row: dict[str, float | str], found: Found
+) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
+    line = line_of_scan(scans, file)
+    cut = cut_of_lines([line], scans.window == "hann")
+    row |= {"slope_x": rms_slope(line.height * hann_window(line.height.size), line.length), "length": line.length}
+    known = cut.wavenumber <= found.spectrum.wavenumber[-1]
+    kept = cut.until(float(cut.wavenumber[known][-1]))
+    return kept._replace(density=found.spectrum.at(kept.wavenumber)), {"x": (cut.wavenumber, cut.density)}
+
+
+def mean_spectrum(spectra: tuple[Spectrum, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return wave numbers of the first spectrum, the mean C2D of all there, and its relative standard error.
+
+    The error is NaN of one spectrum; where a spectrum has ended it counts no more.
+    """
+    q = spectra[0].wavenumber
+    each = np.array([spectrum.at(q) for spectrum in spectra])
+    there = each > 0
+    count = there.sum(axis=0)
+    mean = each.sum(axis=0) / count
+    with np.errstate(all="ignore"):
+        scatter = np.sqrt(np.sum(np.where(there, each - mean, 0.0) ** 2, axis=0) / (count - 1) / count) / mean
+    return q, mean, np.where(count > 1, scatter, np.nan)
