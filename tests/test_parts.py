@@ -1,8 +1,11 @@
 """Parts of a campaign: each block once, beside each other or one after the other, and never beside a runner alone."""
 
+import json
+import re
 import threading
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +15,23 @@ from test_faults import two_series
 
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication, Tolerance
+from mdr_dask.cli import main
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
+
+CAMPAIGN = """
+name: toy
+model: toy
+realisations: 4
+parameters: {position: [1 m, 3 m], fail_above: 2 m}
+store: {path: toy.zarr, blocks: {position: 1, realisation: 2}}
+"""
+
+
+@pytest.fixture
+def campaign_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("toy.yaml").write_text(CAMPAIGN)
 
 
 def run_part(campaign, url, number, count, **options):
@@ -128,3 +146,32 @@ def test_parts_killed_at_random_end_with_the_bytes_of_an_undisturbed_run(toy, tm
     run(study(60), whole)
     assert digests(parts) == digests(whole)
     assert sum(attempt - 1 for attempt in store.attempts(parts, "").values()) <= kills
+
+
+def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, campaign_file, capsys):
+    for part in ("1/2", "2/2"):
+        assert main(["run", "toy.yaml", "--part", part, "--quiet", "--log", "log.jsonl"]) == 1
+        assert capsys.readouterr().out == f"toy.zarr, part {part}: 2 done, 2 failed\n"
+    events = [json.loads(line) for line in Path("log.jsonl").read_text().splitlines()]
+    names = ["run begun", "laying out", "laid out", *2 * ["block begun"], "block done", "block failed"]
+    assert sorted(event["event"] for event in events) == sorted(2 * [*names, "round ended", "run ended"])
+    assert [event["part"] for event in events if event["event"] == "run begun"] == ["1/2", "2/2"]
+    assert [event["results"] for event in events if event["event"] == "block failed"] == 2 * [{"failed": 2}]
+    (laid_out,) = {json.dumps(event["blocks"]) for event in events if event["event"] == "laid out"}
+    assert laid_out == '{"-": [2, 2]}'
+
+    with store.beside("toy.zarr", Part(2, 8)), store.beside("toy.zarr", Part(3, 8)):
+        assert main(["status", "toy.zarr"]) == 0
+        assert capsys.readouterr().out.endswith("\nat work: 2 of 8 parts (2-3)\n")
+        assert main(["status", "toy.zarr", "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["at_work"] == ["2 of 8 parts (2-3)"]
+    leaving = ExitStack()
+    leaving.enter_context(store.alone("toy.zarr"))
+    timer = threading.Timer(0.3, leaving.close)
+    timer.start()
+    assert main(["status", "toy.zarr", "--watch"]) == 0
+    timer.join()
+    told = [line.partition(" ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert told[0] == "8 of 8 results (100%): 4 done, 4 failed"
+    assert re.fullmatch(r"at work: process \d+ on .*", told[1])
+    assert told[2:] == ["at work: nobody"]

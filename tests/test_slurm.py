@@ -2,6 +2,9 @@
 
 import json
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -40,7 +43,17 @@ def missing(store):
     return json.loads(told.stdout)["rows"][0]["missing"] if told.returncode == 0 else 1
 
 
-def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_again(folder, slurm):
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The digests of an undisturbed run."""
+    folder = tmp_path_factory.mktemp("whole")
+    environment = make(folder, blocks=24, pause=0)
+    store = str(folder / "long.zarr")
+    assert mdr_dask("run", str(folder / "long.yaml"), "--store", store, **environment).returncode == 0
+    return digests(store)
+
+
+def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_again(folder, slurm, whole):
     ends = []
     while missing("long.zarr") and len(ends) < 8:
         options = [
@@ -57,8 +70,56 @@ def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_
     assert len(ends) > 1, told
     assert "interrupted; nothing is lost" in told
     assert ends[-1] == {"COMPLETED"}
-    assert mdr_dask("run", "long.yaml", "--store", "whole.zarr", PAUSE="0").returncode == 0
-    assert digests("long.zarr") == digests("whole.zarr")
+    assert digests("long.zarr") == whole
     events = [json.loads(line) for path in folder.glob("*.jsonl") for line in path.read_text().splitlines()]
     begun = [(*event["block"],) for event in events if event["event"] == "block begun"]
     assert len(begun) == len(set(begun)) == 48
+
+
+CLUSTER = f"""
+class: dask_jobqueue.SLURMCluster
+arguments:
+  cores: 1
+  memory: 1 GiB
+  walltime: "00:05:00"
+  interface: lo
+  python: {sys.executable}
+  log_directory: log
+adapt: {{minimum: 0, maximum: 3}}
+"""
+
+
+def events(log):
+    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+
+
+def test_dask_workers_come_and_go_as_jobs_of_the_queue(folder, slurm, whole):
+    (folder / "queue.yaml").write_text(CLUSTER)
+    log = folder / "log.jsonl"
+    command = ["mdr-dask", "run", "long.yaml", "--cluster", "queue.yaml", "--log", "log.jsonl"]
+    driver = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    while driver.poll() is None and sum(event["event"] == "block done" for event in events(log)) < 8:
+        time.sleep(0.2)
+    jobs = slurm.call("squeue", "-h", "-t", "RUNNING", "-o", "%i").split()
+    (keys,) = folder.glob(".mdr-dask-keys-*")
+    assert keys.stat().st_mode & 0o077 == 0
+    slurm.call("scancel", "--signal=KILL", jobs[0])
+    told = driver.communicate()[1]
+    assert driver.returncode == 0, told
+    assert "starting dask_jobqueue.SLURMCluster" in told
+    assert "Traceback" not in told
+    names = [event["event"] for event in events(log)]
+    assert len(jobs) > 1
+    assert {"worker joined", "worker lost", "verified", "run ended"} <= set(names)
+    assert names.count("block done") == 48
+    assert digests("long.zarr") == whole
+    assert not keys.exists()
+
+
+def test_what_the_queue_refuses_is_said_in_its_words(folder, slurm):
+    (folder / "queue.yaml").write_text(CLUSTER.replace("1 GiB", "900 GiB"))
+    done = mdr_dask("run", "long.yaml", "--cluster", "queue.yaml")
+    assert done.returncode == 2
+    assert "the cluster starts no worker: " in done.stderr.splitlines()[-1]
+    assert "sbatch: error: Memory specification can not be satisfied" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

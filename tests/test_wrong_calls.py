@@ -31,6 +31,15 @@ WRONG = [
         "run small.yaml --cluster small.yaml",
         "small.yaml:1:1: name: unknown key (known: class, arguments, scale, adapt)",
     ),
+    ("run small.yaml --part 0/3", "--part: expected K/N with K from 1 to N, such as 3/8, got '0/3'"),
+    ("run small.yaml --part 4/3", "--part: expected K/N with K from 1 to N, such as 3/8, got '4/3'"),
+    ("run small.yaml --part 3", "--part: expected K/N with K from 1 to N, such as 3/8, got '3'"),
+    ("run small.yaml --log small.yaml/x.jsonl", "small.yaml/x.jsonl: Not a directory"),
+    (
+        "run small.yaml --cluster system.yaml",
+        "cannot start 'os.system': expected a class of Dask clusters, got builtin",
+    ),
+    ("status STORE --watch --json", "expected --watch alone, without --failures, --messages and --json"),
     ("run small.yaml --cluster class.yaml", "class.yaml:1:8: class: expected a class such as dask_jobqueue.SLURM"),
     ("run small.yaml --cluster number.yaml", "number.yaml:2:12: arguments: expected a mapping, got 3"),
     ("run small.yaml --cluster list.yaml", "list.yaml:1:1: expected a mapping with the key class, got ['class']"),
@@ -103,6 +112,7 @@ def folder(tmp_path_factory):
         "other.yaml": CAMPAIGN.replace("hurst: 0.7", "hurst: 0.6"),
         "large.yaml": CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"),
         "class.yaml": "class: LocalCluster\n",
+        "system.yaml": "class: os.system\narguments: {command: touch ran}\n",
         "number.yaml": "class: distributed.LocalCluster\narguments: 3\n",
         "list.yaml": "[class]\n",
     }.items():

@@ -17,7 +17,8 @@ import toy
 from killed_parts import run_with_kills, study
 from test_execute import digests
 
-from mdr_dask import Resources, run, store
+from mdr_dask import store
+from mdr_dask.execute import Resources, run
 
 #: Seconds that a block sleeps, and blocks for each kill.
 PAUSE, BLOCKS_PER_KILL = 0.05, 12

@@ -118,7 +118,7 @@ def _local(workers: int | None) -> dict[str, Any]:
 
 @contextmanager
 def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
-    kind = _cluster_class(plan["class"])
+    kind = cluster_class(plan["class"])
     with ExitStack() as stack:
         try:
             cluster = kind(**_closed_to_others(kind, plan.get("arguments", {}), stack))
@@ -135,8 +135,14 @@ def _started(plan: Mapping[str, Any]) -> Iterator[Cluster]:
                 cluster.close()
 
 
-def _cluster_class(name: str) -> type[Cluster]:
-    """Return the class of that name; nothing but a Dask cluster is ever called."""
+def cluster_class(name: str) -> type[Cluster]:
+    """Return the class of that name; nothing but a Dask cluster is ever called.
+
+    Raises
+    ------
+    ClusterError
+        If it cannot be loaded, or is anything else.
+    """
     package, _, attribute = name.rpartition(".")
     try:
         found = getattr(import_module(package), attribute)
@@ -152,17 +158,26 @@ def _closed_to_others(kind: type[Cluster], arguments: Mapping[str, Any], stack: 
     own = dict(arguments)
     if issubclass(kind, LocalCluster):
         own["dashboard_address"] = own.get("dashboard_address") or DASHBOARD
-    elif hasattr(kind, "job_cls"):  # jobs of a queue: they find the keys of their connection in a folder
-        folder = TemporaryDirectory(prefix=".mdr-dask-keys-", dir=".", ignore_cleanup_errors=True)
-        own = {"shared_temp_directory": str(Path(stack.enter_context(folder)).absolute()), **own}
+    elif hasattr(kind, "job_cls"):  # jobs of a queue
         own["scheduler_options"] = {"dashboard_address": DASHBOARD, **own.get("scheduler_options", {})}
     else:
         return own
     if own.setdefault("security", True) is True:
         own["security"] = Security.temporary()
+        if hasattr(kind, "job_cls"):
+            folder = TemporaryDirectory(prefix=".mdr-dask-keys-", dir=".", ignore_cleanup_errors=True)
+            own["security"] = _in_files(own["security"], Path(stack.enter_context(folder)).absolute())
     if own["security"] is False:
         del own["security"]
     return own
+
+
+def _in_files(keys: Security, folder: Path) -> Security:
+    """Write keys to files, where jobs of a queue find them and other users do not."""
+    names = [f"tls_{role}_{part}" for role in ("client", "scheduler", "worker") for part in ("cert", "key")]
+    for name in ("tls_ca_file", *names):
+        (folder / name).write_text(getattr(keys, name))
+    return Security(require_encryption=True, **{name: str(folder / name) for name in ("tls_ca_file", *names)})
 
 
 def _most(plan: Mapping[str, Any]) -> int:

@@ -26,6 +26,20 @@ THREAD_WINDOW = 64
 Execute = Callable[[Iterable[Work], Settle], None]
 
 
+def check(resources: Resources) -> None:
+    """Refuse a cluster file that names no Dask cluster, before anything is touched.
+
+    Raises
+    ------
+    ClusterError
+        If it does not.
+    """
+    if resources.cluster is not None:
+        from mdr_dask.execute.clusters import cluster_class
+
+        cluster_class(resources.cluster["class"])
+
+
 @contextmanager
 def executor(resources: Resources, tell: Tell) -> Iterator[Execute]:
     """Yield the function that runs tasks on the resources named."""

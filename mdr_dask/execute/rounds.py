@@ -14,7 +14,7 @@ from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
-from mdr_dask.execute.executors import Execute, executor
+from mdr_dask.execute.executors import Execute, check, executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.plan import Template, templates
@@ -97,7 +97,8 @@ def run(
     ClusterError
         If a cluster cannot be started, goes away, or has no worker for too long.
     """
-    _plan(campaign, url)  # what is refused leaves no lock behind
+    check(resources)  # what is refused leaves no lock behind
+    _plan(campaign, url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         _require_sound(url)
         job = _Job(campaign, url, hold, resources, part, retry_failed, report, tell)
@@ -262,7 +263,7 @@ def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
 
 def _begin_round(progress: Progress, groups: list[Cells]) -> Progress:
     kept = sum(cells.kept for cells in groups)
-    work = sum(cells.seconds(index) for cells in groups for index in cells.template.block_indices())
+    work = sum(cells.seconds(index) for cells in groups if cells.new for index in cells.template.block_indices())
     return replace(
         progress,
         total=progress.total + kept + sum(cells.new for cells in groups),
