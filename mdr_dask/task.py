@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import platform
 import time
@@ -18,6 +19,9 @@ from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Block, Model, Result, Status
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
+
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
+MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: the largest that glibc allows on the heap, and a few of them
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ def run_block(work: Work) -> Outcome:
         raise ClusterError(_other_version(work))
     model = models.load(work.model)
     _one_blas_thread()
+    keep_freed_memory()
     clock = compile_clock() if model.compiling else None
     compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
@@ -277,6 +282,18 @@ def _one_blas_thread() -> None:
     from threadpoolctl import threadpool_limits
 
     threadpool_limits(limits=1, user_api="blas")
+
+
+@lru_cache(maxsize=1)
+def keep_freed_memory() -> None:
+    """Keep arrays of some megabytes within the process: glibc gives them back, and faults on every page the next time.
+
+    Lines of 100000 points took a third longer with it.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if os.name == "posix" else None
+    if mallopt is not None:
+        mallopt(M_MMAP_THRESHOLD, MAPPED)
+        mallopt(M_TRIM_THRESHOLD, TRIMMED)
 
 
 def write_off(work: Work, message: str) -> Outcome:

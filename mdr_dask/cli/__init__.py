@@ -11,6 +11,7 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures, plot
+from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.results import aggregate, fit, show, status
@@ -52,6 +53,7 @@ for command in (
     aggregate,
     fit,
     sensitivity,
+    law,
     plot,
     figures,
     master_curve,

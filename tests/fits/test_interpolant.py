@@ -1,0 +1,107 @@
+"""Laws as tables: the stated error holds, also for plain linear interpolation by xarray; speed; refusals."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import mdr_dask
+from mdr_dask.cli import main
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits.interpolant import law
+from mdr_dask.store import save
+
+FORCE, VELOCITY = np.geomspace(1e-3, 1e2, 20), np.geomspace(1e-4, 1e2, 36)
+SHAPES = {
+    "friction": (lambda f, v: v / (v + f**0.6 + f / 4), FORCE, VELOCITY),
+    "few values": (lambda f, v: v / (v + f**0.6 + f / 4), FORCE[::4], VELOCITY[::5]),
+    "maximum": (lambda f, v: v / (1 + v**2 / f), np.geomspace(0.1, 10, 7), np.geomspace(1e-3, 1e3, 25)),
+    "kink": (np.maximum, np.linspace(1, 3, 9), np.linspace(0.5, 4, 12)),
+    "changing sign": (lambda f, v: np.sin(v) + 0 * f, np.linspace(0, 1, 4), np.linspace(0, 10, 25)),
+    "power": (lambda f, v: f**0.3 * v**-1.2, np.geomspace(0.01, 1, 5), np.geomspace(1, 100, 8)),
+}
+
+
+def study(shape, realisations=1, noise=0.0, seed=0):
+    function, force, velocity = SHAPES[shape]
+    mean = function(force[:, None], velocity)
+    random = np.random.default_rng(seed)
+    values = mean[..., None] * (1 + noise * random.standard_normal((*mean.shape, realisations)))
+    coords = {"force": ("force", force, {"units": "N"}), "velocity": ("velocity", velocity, {"units": "m/s"})}
+    return xr.Dataset({"mu": (("force", "velocity", "realisation"), values, {"units": "1"})}, coords=coords)
+
+
+def inside(shape, number=1000):
+    random = np.random.default_rng(7)
+    axes = SHAPES[shape][1:]
+    drawn = [random.uniform(size=number) for _ in axes]
+    return [
+        np.exp(np.log(a[0]) + u * np.log(a[-1] / a[0])) if a[0] > 0 and a[-1] > 20 * a[0] else a[0] + u * np.ptp(a)
+        for a, u in zip(axes, drawn, strict=True)
+    ]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("realisations", "noise"), [(1, 0.0), (20, 0.05)])
+def test_random_points_lie_within_the_stated_error(shape, realisations, noise):
+    table = law(study(shape, realisations, noise), "mu")
+    force, velocity = inside(shape)
+    found = table.interp(force=("point", force), velocity=("point", velocity))
+    error = np.abs(found.mu - SHAPES[shape][0](force, velocity))
+    assert np.mean(error <= found.mu_error + 1e-12) >= 0.95
+    # and the error is no bound that says nothing
+    assert float(found.mu_error.median()) < max(0.12 * float(np.abs(found.mu).median()), 3 * noise)
+
+
+def test_the_study_itself_is_in_the_table():
+    data = study("friction")
+    table = law(data, "mu")
+    at = table.sel(force=data.force, velocity=data.velocity)
+    np.testing.assert_allclose(at.mu, data.mu[..., 0], rtol=1e-12)
+    assert table.attrs["Conventions"].startswith("CF")
+    assert table.mu.attrs["ancillary_variables"] == "mu_error"
+
+
+def test_a_law_of_a_file_takes_many_points_and_refuses_to_extrapolate(tmp_path):
+    save(law(study("friction"), "mu"), tmp_path / "mu.nc")
+    found = mdr_dask.Law(tmp_path / "mu.nc")
+    force, velocity = inside("friction", 100)
+    mu, error = found(force=force[:, None], velocity=velocity)
+    assert mu.shape == error.shape == (100, 100)
+    truth = SHAPES["friction"][0](force[:, None], velocity)
+    assert np.mean(np.abs(mu - truth) <= error) > 0.95
+    with pytest.raises(DataError, match=r"expected velocity from 0.0001 m/s to 100 m/s, got 101 m/s"):
+        found(force=1.0, velocity=[1.0, 101.0])
+    with pytest.raises(DataError, match="expected force, velocity, got force"):
+        found(force=1.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "what"),
+    [
+        (lambda d: d.isel(force=0, velocity=slice(3)), "at least 4 numbers"),
+        (lambda d: d.stack(case=["force", "velocity"]), "sampled study"),
+        (lambda d: d.where(d.velocity < 10), "cases have no value"),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(change, what):
+    with pytest.raises(FitError, match=what):
+        law(change(study("friction")), "mu")
+
+
+def test_the_command(toy, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text(
+        "name: a\nmodel: toy\nrealisations: 3\nparameters:\n  slope: {linear: [1, 2, 5]}\n"
+        "  position: {geometric: [1 mm, 1 m, 7]}\n"
+    )
+    assert main(["run", "a.yaml", "--quiet"]) == 0
+    assert main(["law", "results/a.zarr", "height", "-o", "height.nc"]) == 0
+    printed = capsys.readouterr().out
+    assert "position: 0.001 m to 1 m" in printed
+    height, error = mdr_dask.Law("height.nc")(slope=1.25, position=0.1)
+    mean = xr.open_zarr("results/a.zarr").height.mean("realisation")
+    assert height == pytest.approx(float(mean.sel(slope=1.25).sel(position=0.1, method="nearest")), rel=1e-6)
+    assert error > 0
+    assert main(["law", "results/a.zarr", "height", "-o", "height.csv"]) == 2
