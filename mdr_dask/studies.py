@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+    from mdr_dask.plots.base import Plot
+
 #: What can be run: the keys of a campaign file, or the path of one.
 Source = Mapping[str, Any] | str | Path | Campaign
 #: What can be looked at: the result of `run` or `open_study`, or the path or URL of a store.
@@ -240,8 +242,25 @@ def fit(study: Study, law: str) -> xr.Dataset | xr.DataTree:
     return next(iter(found.values())) if len(found) == 1 else _tree(found)
 
 
-def plot(study: Study, figure: str, select: Sequence[str] = ()) -> Figure:
-    """Draw a figure by its name, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
+    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+
+    Parameters
+    ----------
+    study : Dataset, DataTree, str or Path
+        A study, or the path of its store.
+    figure : str
+        Name of a figure, or of an output where `view` says how it is drawn.
+    select : sequence of str
+        Parts of the study, as in ``--select``.
+    **view
+        ``over``, an axis or two for a map, ``by``, ``panels`` and ``log``; ``over=()`` draws main effects. See
+        :class:`mdr_dask.plots.outputs.View`.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib; ``.table()`` gives the data drawn.
 
     Raises
     ------
@@ -250,10 +269,15 @@ def plot(study: Study, figure: str, select: Sequence[str] = ()) -> Figure:
     """
     groups = _groups(study)
     model = _model(groups)
-    drawn: Figure = _named(plots.available(model), figure, f"figure of {model}").figure(
-        selection.select_all(groups, select)
-    )
+    found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
+    drawn: Figure = found.figure(selection.select_all(groups, select))
     return drawn
+
+
+def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
+    from mdr_dask.plots.outputs import View, of_output
+
+    return of_output(View(output, (over,) if isinstance(over, str) else tuple(over), **view))
 
 
 def master_curve(
@@ -330,9 +354,9 @@ class StudyAccessor:
         """Fit a law: `mdr_dask.fit` of this study."""
         return fit(self._dataset, law)
 
-    def plot(self, figure: str, select: Sequence[str] = ()) -> Figure:
+    def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""
-        return plot(self._dataset, figure, select)
+        return plot(self._dataset, figure, select, **view)
 
 
 def _plain(value: Any) -> Any:

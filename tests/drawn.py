@@ -360,7 +360,7 @@ def fast_error(groups):
     fast = fast.isel(hold=fast.sizes["hold"] // 2)
     off = fast["worn_profile"] - exact["worn_profile"].drop_vars("xi")
     rms = (off**2).mean("radius") ** 0.5
-    near = int(abs(fast["xi"] - 0.8).argmin())
+    near = int(np.argmin(abs(fast["xi"].values - 0.8)))
     largest = abs(off).max("radius").isel(xi=near)
     volumes = 100 * (fast["wear_volume"] / exact["wear_volume"].drop_vars("xi") - 1).isel(xi=near)
     best = fast["xi"].isel(xi=rms.argmin("xi"))
@@ -399,7 +399,7 @@ EXPECTED = {
     "traction": along("slide_roll_ratio", "traction_coefficient"),
     "wear_development": worn,
     "wear_profiles": worn,
-    "wear_volume": volume,
+    "wear_growth": volume,
     "fast_wear_error": fast_error,
 }
 

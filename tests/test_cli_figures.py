@@ -9,9 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from mdr_dask import __version__, datasets, plots
+import mdr_dask
+from mdr_dask import __version__, plots
 from mdr_dask.cli import main
 from mdr_dask.plots.base import Plot
+from mdr_dask.store import datasets
 
 CAMPAIGN = """\
 name: small
@@ -133,6 +135,15 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
     assert main(["plot", filled, "friction_coefficient", "rms_slope", "--effects", "-o", "drawn"]) == 0
     assert (Path("drawn") / "small-rms_slope-effects.csv").exists()
     assert "Traceback" not in capsys.readouterr().err
+    named = ["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]
+    assert main(named) == 0
+    assert "not drawn: cases other than friction_coefficient < 1e-4" in capsys.readouterr().err
+    slow = pd.read_csv("drawn/slow.csv", comment="#")
+    slow = slow[slow["what"] == "data"]
+    assert len(slow) == int((mean < 1e-4).sum()) > 0
+    figure = mdr_dask.plot(filled, "friction_coefficient", over="velocity", by="normal_force")
+    shown = figure.table()
+    np.testing.assert_array_equal(shown.loc[shown["what"] == "data", "y"], data["y"])
 
 
 @pytest.mark.parametrize(

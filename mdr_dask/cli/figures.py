@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from mdr_dask.cli.campaigns import CAMPAIGN
-from mdr_dask.cli.options import select_option, tell, units_option
+from mdr_dask.cli.options import select_option, tell, units_option, where_option
 from mdr_dask.cli.results import list_names, require_known
 from mdr_dask.cli.running import run
 from mdr_dask.cli.writing import FIGURES, format_option, require_suffix, writing
@@ -45,6 +46,7 @@ class Drawing(click.Command):
 @click.option("--effects", is_flag=True, help="Draw the mean of an output against every parameter that varies.")
 @click.option("--series", multiple=True, help="Only this series; repeat.")
 @select_option
+@where_option
 @click.option("--log", metavar="[x][y][z]", help="Logarithmic axes, z for colours; 'none' for none. Else by the data.")
 @units_option
 @click.option("--size", metavar="WIDTH[xHEIGHT]", help="Printed size: 85mm, 85x60mm.")
@@ -59,6 +61,7 @@ def plot(
     everything: bool,
     series: tuple[str, ...],
     selections: tuple[str, ...],
+    where: str,
     output: Path | None,
     suffix: str,
     **look: Any,
@@ -89,8 +92,23 @@ def plot(
     with page.drawing_for(asked, style_file), _readable(urls):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
         groups = selection.select_all(groups, selections, tell)
+        if where:
+            groups = {key: selection.where(data, where) for key, data in groups.items()}
+            figures = {name: _without(figure, where) for name, figure in figures.items()}
         for (name, figure), path in zip(figures.items(), places, strict=True):
             _draw(figure, groups, path, _provenance(name, urls, str(context.meta.get(COMMAND, ""))), everything)
+
+
+def _without(figure: Plot, where: str) -> Plot:
+    """Return a figure that says which cases it leaves out."""
+    from mdr_dask.plots import style
+
+    def draw(groups: Mapping[str, xr.Dataset]) -> Figure:
+        drawn = figure.draw(groups)
+        style.leave_out(drawn, [f"cases other than {where}"])
+        return drawn
+
+    return replace(figure, draw=draw)
 
 
 def _apart(words: Sequence[str]) -> tuple[list[str], list[str]]:
