@@ -29,6 +29,8 @@ LEAST_SECONDS = 0.1
 SHARED_SECONDS = 30.0
 #: and below it where halving them makes the work of a study this much larger at most.
 REPEATED_WORK = 1.15
+#: Records of blocks that lie in one file.
+RECORDS_TOGETHER = 1000
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
 #: Most values of an axis that are asked for notes.
@@ -103,6 +105,13 @@ class Template:
         """Size of all arrays, uncompressed."""
         each = sum(8 * math.prod(self.extra_shape(output)) for output in self.outputs)
         return math.prod(self.shape) * (each + 1)
+
+    @property
+    def files(self) -> int:
+        """Number of files of the group when it is done: chunks, coordinates, metadata, and records by the thousand."""
+        blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
+        coordinates = len(self.series.axes) + 1 + len(self.extra) + _numbers(self.series.parameters.model_dump())
+        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * coordinates + arrays + 2
 
     def block_indices(self) -> Iterator[BlockIndex]:
         """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""
@@ -179,6 +188,12 @@ def _noted(axis: Axis) -> list[Any]:
     return [axis.values[place] for place in places]
 
 
+def _numbers(tree: Mapping[str, Any]) -> int:
+    """Count the numbers among parameters, nested ones too."""
+    leaves = (_numbers(value) if isinstance(value, Mapping) else isinstance(value, float) for value in tree.values())
+    return sum(leaves)
+
+
 def _as_array(axis: Axis) -> NDArray[Any]:
     if axis.labels is None:
         return np.array(axis.values)
@@ -199,6 +214,7 @@ class Estimate:
     blocks: int
     bytes: int
     seconds: float
+    files: int
     notes: tuple[str, ...]
     compiling: float = 0.0
 
@@ -372,6 +388,7 @@ def estimate(campaign: Campaign) -> Estimate:
         blocks=sum(part.blocks for part in parts),
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
+        files=1 + sum(part.files for part in parts),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         compiling=model.compiling,
     )
@@ -394,6 +411,7 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
         solves=solves * realisations,
         blocks=math.prod(template.grid),
         bytes=template.bytes,
+        files=template.files,
         seconds=seconds * realisations / template.chunks["realisation"],
         notes=template.notes,
     )

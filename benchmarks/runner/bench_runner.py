@@ -13,8 +13,10 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 import toy
 
-from mdr_dask import Resources, datasets, run, store
+from mdr_dask import store
 from mdr_dask.aggregation import aggregate
+from mdr_dask.execute import Resources, run
+from mdr_dask.store import datasets
 
 BLOCKS = 500
 

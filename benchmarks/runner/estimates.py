@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from mdr_dask import load, models
+from mdr_dask import models
+from mdr_dask.campaign import load
 from mdr_dask.models.base import Block, Model
 from mdr_dask.plan import Template, templates
 from mdr_dask.task import _one_blas_thread

@@ -20,7 +20,9 @@ from typing import Any
 
 from numba.core.registry import CPUDispatcher
 
-from mdr_dask import Resources, loads, models, physics, run
+from mdr_dask import models, physics
+from mdr_dask.campaign import loads
+from mdr_dask.execute import Resources, run
 
 CAMPAIGN = """
 name: profile

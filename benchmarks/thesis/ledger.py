@@ -14,8 +14,10 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import Resources, datasets, loads, run
+from mdr_dask.campaign import loads
+from mdr_dask.execute import Resources, run
 from mdr_dask.fits import available
+from mdr_dask.store import datasets
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 

@@ -75,13 +75,17 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
     from mdr_dask import store
     from mdr_dask.plan import estimate
 
-    costs = estimate(study)
-    kept, to_do = 0, costs.results
+    kept, to_do = 0, None
     if store.exists(url):
         from mdr_dask.execute import outlook
 
         progress = outlook(study, url)
         kept, to_do = progress.kept, progress.to_do
+        if not to_do and not study.replication.until and form != "json":
+            click.echo(f"{url}: all {kept} results are there already; nothing to do")
+            return
+    costs = estimate(study)
+    to_do = costs.results if to_do is None else to_do
     if form == "json":
         print_json({"campaign": study.name, "store": url, **costs_row(costs), "kept": kept, "to_do": to_do})
         return

@@ -67,6 +67,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
         f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
     )
     yield f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks"
+    yield f"about {_range(costs.files, more)} files in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
     compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
@@ -94,6 +95,7 @@ def costs_row(costs: Estimate) -> dict[str, Any]:
         "solves": costs.solves,
         "blocks": costs.blocks,
         "bytes": costs.bytes,
+        "files": costs.files,
         "seconds": float(costs.seconds),
         "compiling": costs.compiling,
         "notes": list(costs.notes),

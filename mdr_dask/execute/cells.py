@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask import store
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
-from mdr_dask.plan import BlockIndex, Template
+from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex, Template
 from mdr_dask.store import Hold, Part, Place
 from mdr_dask.task import Work, versions
 
@@ -96,7 +96,7 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
             region = template.region(index)
             wanted, spared = cells.wanted[region], cells.spared[region]
             if wanted.any() or spared.any():
-                if next(begun) % store.TOGETHER == 0:
+                if next(begun) % RECORDS_TOGETHER == 0:
                     store.put_together(url, template.series.name)
                 yield Work(
                     place=Place(place, template.series.name, index, region, laid_out, hold),

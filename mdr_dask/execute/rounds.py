@@ -263,7 +263,7 @@ def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
 
 def _begin_round(progress: Progress, groups: list[Cells]) -> Progress:
     kept = sum(cells.kept for cells in groups)
-    work = sum(cells.seconds(index) for cells in groups for index in cells.template.block_indices())
+    work = sum(cells.seconds(index) for cells in groups if cells.new for index in cells.template.block_indices())
     return replace(
         progress,
         total=progress.total + kept + sum(cells.new for cells in groups),

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.base import Fit
 from mdr_dask.models.base import Block
-from mdr_dask.models.fretting_wear.declaration import FrettingWear, Table
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Pressed
 from mdr_dask.models.fretting_wear.reduction import reduce_block, table_profile
 from mdr_dask.tables import Column, read_sheet, read_table
 
@@ -104,7 +104,7 @@ def _prediction(parameters: FrettingWear, rule: str) -> tuple[Callable[[float], 
         raise FitError(problems[0, 0])
     if not numbers.level[0, 0] > 0.0:
         raise FitError("the amplitude is in gross slip: the law of partial slip cannot be fitted")
-    table, depth = isinstance(parameters.indenter, Table), float(numbers.height[0, 0])
+    table, depth = isinstance(parameters.indenter, Pressed), float(numbers.height[0, 0])
     profile = table_profile(parameters.indenter, depth) if table else PowerProfile(float(numbers.exponent[0, 0]))
     stick = profile.inside(float(numbers.level[0, 0]))
     law = Law(profile, stick, rule, parameters.xi, parameters.hold == "force")

@@ -11,7 +11,7 @@ from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
 from mdr_dask.store.locks import Hold, holding, lock
 from mdr_dask.store.reading import datasets, is_damage, readable, save
-from mdr_dask.store.records import TOGETHER, attempts, kinds, put_together, record, records
+from mdr_dask.store.records import attempts, kinds, put_together, record, records
 from mdr_dask.store.repairing import repair
 from mdr_dask.store.runners import Part, alone, at_work, beside, entrance
 from mdr_dask.store.sound import require_sound
@@ -19,7 +19,6 @@ from mdr_dask.store.study import attributes, exists, is_study, series_names
 from mdr_dask.store.verifying import Finding, Inspection, verify
 
 __all__ = [
-    "TOGETHER",
     "Finding",
     "Hold",
     "Inspection",

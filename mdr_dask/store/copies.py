@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.files import ROOT, group_name, read_bytes
+from mdr_dask.store.files import ROOT, group_name, listed, local, read_bytes
 from mdr_dask.store.records import digest
 
 _NAME = "status/layout.json"
@@ -102,6 +102,24 @@ def read_copy(url: str, series: str) -> Copy | None:
     if stated != digest(json.dumps(held, sort_keys=True).encode()):
         raise damaged
     return Copy(held["series"], files, held["study"], held["own"], held["before"])
+
+
+def groups_laid_out(url: str) -> list[str]:
+    """Return the names of the groups of a study by their copies alone, which are no other study's in a folder below."""
+    path = local(url)
+    if path is None:
+        names = [name for name in listed(url) if name.endswith(_NAME)]
+    else:
+        names = [found.relative_to(path).as_posix() for depth in ("", "*/") for found in path.glob(f"{depth}{_NAME}")]
+    found = [name.removesuffix(_NAME).rstrip("/") for name in names]
+    return [series for series in found if _is_readable(url, series)]
+
+
+def _is_readable(url: str, series: str) -> bool:
+    try:
+        return read_copy(url, series) is not None
+    except StoreError:
+        return False
 
 
 def root_of(copies: list[Copy]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -279,7 +279,7 @@ def _stake(url: str, name: str, owner: str) -> int:
         held = _told(url, _claim(name, number))
         if held.get("owner") != owner:  # it is ours where the answer to the first try was lost
             raise _busy(url, held.get("who", "another process"))
-    elif (not conditional(url) or create(url, _claim(name, number), content)) and not name:
+    elif not name and (not conditional(url) or create(url, _claim(name, number), content)):
         log.warning("%s: nothing here keeps two runs apart (no conditional write): start one at a time", url)
     remove(url, [old for n in standing for old in (_claim(name, n), _life(name, n))])
     return number

@@ -15,14 +15,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from mdr_dask.plan import BlockIndex
+from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex
 from mdr_dask.store.files import group_name, listed, read_bytes, read_many, remove, write_stages
 
 log = logging.getLogger("mdr_dask.store")
 
 _LOOSE = re.compile(r"(\d+(?:\.\d+)*)-(\d+)\.json")
-#: Most records in a file.
-TOGETHER = 1000
 
 
 def digest(content: bytes) -> str:
@@ -123,8 +121,8 @@ def put_together(url: str, series: str) -> None:
     """
     prefix = folder(series)
     loose = [name for name in listed(url, prefix) if _LOOSE.fullmatch(name.removeprefix(prefix))]
-    for first in range(0, len(loose), TOGETHER):
-        some = loose[first : first + TOGETHER]
+    for first in range(0, len(loose), RECORDS_TOGETHER):
+        some = loose[first : first + RECORDS_TOGETHER]
         found = {name: content for name, content in read_many(url, some) if content and opened(content) is not None}
         blocks = [_LOOSE.fullmatch(name.removeprefix(prefix))[1].replace(".", "/") for name in found]  # type: ignore[index]
         ledger = [content for _, content in read_many(url, [group_name(series, f"status/c/{b}") for b in blocks])]

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.copies import copy_name
-from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, listed, local, read_json
+from mdr_dask.store.copies import groups_laid_out
+from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, local, read_json
 
 #: What this program and its earlier versions write. Another codec might run code, and is not opened.
 CODECS = {"bytes", "vlen-utf8", "zstd", "crc32c"}
@@ -103,15 +103,9 @@ def is_study(url: str) -> bool:
 def _root_attributes(url: str) -> dict[str, Any] | None:
     """Return the attributes of whatever Zarr there is, or None if there is none."""
     found = document(url)
-    if found is None and any(name.endswith(copy_name("")) for name in _near(url)):
+    if found is None and groups_laid_out(url):
         raise StoreError(f"{url}: zarr.json is gone; 'mdr-dask verify --repair {url}' puts it back")
     return None if found is None else dict(found.get("attributes", {}))
-
-
-def _near(url: str) -> list[str]:
-    """Return the names of files, where looking for them is cheap or there is no other way."""
-    path = local(url)
-    return [] if path is not None and not path.is_dir() else listed(url)
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:

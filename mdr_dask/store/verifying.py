@@ -15,7 +15,7 @@ import zarr
 
 from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.copies import Copy, copy_name, read_copy, root_of
+from mdr_dask.store.copies import Copy, copy_name, groups_laid_out, read_copy, root_of
 from mdr_dask.store.digests import History, allowed, histories
 from mdr_dask.store.files import CLAIMS, LAYOUT, bytes_of, group_name, listed, read_bytes, read_many
 from mdr_dask.store.layout import group_document
@@ -190,7 +190,7 @@ def _series_of_copy(name: str) -> str:
 def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
     """Return the root's metadata as they stand; nothing if they cannot be read at all."""
     content = read_bytes(url, "zarr.json")
-    copies = any(_is_copy(name) for name in present)
+    copies = bool(groups_laid_out(url))
     if content is None:
         if not copies:
             attributes(url)  # says what is there instead

@@ -12,6 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Coordinate, Model, NamedFile, Number, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.parts.indenter import Other
 from mdr_dask.tables import Column, read_table
 
 
@@ -60,11 +61,6 @@ class Table(Parameters):
     shape: Literal["table"]
     file: NamedFile = Field(description="table with the columns radius and height, and their units")
 
-    @property
-    def power_law(self) -> tuple[float, float]:
-        """A table has none."""
-        return math.nan, math.nan
-
     @field_validator("file")
     @classmethod
     def _is_profile(cls, file: NamedFile) -> NamedFile:
@@ -87,7 +83,9 @@ def profile_columns(file: NamedFile) -> tuple[FloatArray, FloatArray]:
     return table["radius"], table["height"]
 
 
-Indenter = Annotated[Parabola | Cone | Power | Table, Field(discriminator="shape")]
+Indenter = Annotated[Parabola | Cone | Power | Other | Table, Field(discriminator="shape")]
+#: Bodies whose image is known at one depth only.
+Pressed = Other | Table
 
 #: What gives the size of a body in a dimensional campaign.
 _SIZES = {"parabola": "radius", "cone": "angle", "power": "coefficient"}
@@ -197,8 +195,9 @@ class FrettingWear(Parameters):
             )
         if not self.dimensionless:
             self._check_dimensional()
-        if isinstance(self.indenter, Table) and self.depth is None:
-            raise ValueError("a table of a profile needs a dimensional campaign with its depth")
+        if isinstance(self.indenter, Pressed) and self.depth is None:
+            body = "a table of a profile" if isinstance(self.indenter, Table) else f"a {self.indenter.shape}"
+            raise ValueError(f"{body} needs a dimensional campaign with its depth")
         return self
 
     @model_validator(mode="after")

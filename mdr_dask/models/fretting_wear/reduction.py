@@ -10,7 +10,8 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, NamedFile, canonical
-from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Table, profile_columns
+from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Pressed, Table, profile_columns
+from mdr_dask.models.parts.indenter import Other
 
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
@@ -35,12 +36,17 @@ class Numbers:
 
 def indenters(block: Block[FrettingWear]) -> list[Indenter]:
     """Return the indenter of every case, or the one that all share but for numbers that vary."""
+    if isinstance(block.parameters.indenter, Pressed) and any(path.startswith("indenter") for path in block.columns):
+        return [block.case(case).indenter for case in range(block.cases)]
     return list(block.columns["indenter"]) if "indenter" in block.columns else [block.parameters.indenter]
 
 
 def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
     """Return coefficient and exponent of every case, NaN where they are not given."""
-    coefficient, exponent = np.array([one.power_law for one in indenters(block)]).T
+    none = np.nan, np.nan
+    coefficient, exponent = np.array(
+        [none if isinstance(one, Pressed) else one.power_law for one in indenters(block)]
+    ).T
     varied = {path.removeprefix("indenter."): np.asarray(column) for path, column in block.columns.items()}
     exponent = varied.get("exponent", exponent)
     coefficient = varied.get("coefficient", coefficient)
@@ -52,8 +58,8 @@ def _power_laws(block: Block[FrettingWear]) -> tuple[FloatArray, FloatArray]:
 
 
 def has_tables(block: Block[FrettingWear]) -> bool:
-    """Tell whether an indenter is a table."""
-    return any(isinstance(one, Table) for one in indenters(block))
+    """Tell whether an indenter is no power law."""
+    return any(isinstance(one, Pressed) for one in indenters(block))
 
 
 def _column(block: Block[FrettingWear], name: str) -> FloatArray:
@@ -136,10 +142,10 @@ def _first_contact(
 
 
 def table_profile(indenter: Indenter, depth: float) -> TableProfile:
-    """Read a table and press it; cached by content."""
-    if not isinstance(indenter, Table):
-        raise ValueError("tables and formulas of profiles cannot be mixed along one axis")
-    return _pressed_table(indenter.file, depth)
+    """Press a body that is no power law; cached by content."""
+    if not isinstance(indenter, Pressed):
+        raise ValueError("power laws and other profiles cannot be mixed along one axis")
+    return _pressed_table(indenter.file, depth) if isinstance(indenter, Table) else _pressed_body(indenter, depth)
 
 
 @lru_cache(maxsize=64)
@@ -147,6 +153,13 @@ def _pressed_table(file: NamedFile, depth: float) -> TableProfile:
     from mdr_dask.physics.mdr.revolution import from_table
 
     return from_table(*profile_columns(file), depth)
+
+
+@lru_cache(maxsize=64)
+def _pressed_body(indenter: Other, depth: float) -> TableProfile:
+    from mdr_dask.physics.mdr.revolution import from_body
+
+    return from_body(indenter.line(), depth)
 
 
 def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: dict[tuple[int, int], str]) -> None:

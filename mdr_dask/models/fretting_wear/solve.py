@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.fretting_wear.declaration import MODEL, FrettingWear, Indenter, Table, axis
+from mdr_dask.models.fretting_wear.declaration import MODEL, FrettingWear, Indenter, Pressed, axis
 from mdr_dask.models.fretting_wear.reduction import (
     Numbers,
     has_tables,
@@ -43,7 +43,7 @@ Places = list[tuple[int, int]]
 class Task:
     """What makes a solution that several cases share: everything but the number of cycles and xi."""
 
-    table: Table | None
+    table: Pressed | None
     depth: float
     exponent: float
     level: float
@@ -283,7 +283,7 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         )
         for step in parameters.history
     )
-    table = indenter if isinstance(indenter, Table) else None
+    table = indenter if isinstance(indenter, Pressed) else None
     followed = parameters.wear_rule == "exact" or (parameters.wear_rule == "limit" and parameters.hold == "force")
     return Task(
         table,

@@ -71,4 +71,21 @@ class Power(_PowerLaw):
         return self.coefficient, self.exponent
 
 
-Indenter = Annotated[Plane | Cone | Parabola | Power, Field(discriminator="shape")]
+class RoundedCone(Parameters):
+    """A cone with a rounded tip, which goes over into the cone without a kink."""
+
+    shape: Literal["rounded_cone"]
+    angle: float = quantity("rad", "angle between the cone's surface and the plane", gt=0, lt=np.pi / 2)
+    tip_radius: float = quantity("m", "radius of curvature R of the tip", gt=0)
+
+    def line(self) -> Shape:
+        """Return the line that acts like the body, by the MDR rule, in metres."""
+        from mdr_dask.physics.surfaces.shapes import RoundedCone as Line
+
+        steepness = math.tan(self.angle)
+        return Line(steepness, self.tip_radius * steepness)
+
+
+#: Bodies of revolution that are no power law, for sliding and wear alike.
+Other = RoundedCone
+Indenter = Annotated[Plane | Cone | Parabola | Power | Other, Field(discriminator="shape")]

@@ -21,9 +21,9 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say
 NODE_LINE, NODE_SWEPT = 2.5e-8, 1.3e-8  # seconds for every node of a line and of a solution
-STEPPED_LINE, NODE_STEPPED = 1.1e-7, 1.2e-8  # the same of the papers' steps
-POINT_LINE, POINT_SAMPLED = 1.8e-7, 1.6e-8  # and for every Nyquist point gone along from node to node
-NODE_ARM, NODE_GENERAL, GENERAL = 5e-9, 6e-8, 3e-4  # for every node and arm of a general solid, and to begin with
+STEPPED_LINE, NODE_STEPPED = 8e-8, 9e-9  # the same of the papers' steps
+POINT_LINE, POINT_SAMPLED = 2e-7, 8e-9  # and for every Nyquist point gone along from node to node
+NODE_ARM, NODE_GENERAL, GENERAL = 4e-9, 4.5e-8, 3e-4  # for every node and arm of a general solid, and to begin with
 ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
 
 #: Outputs that have errors, and the column of a steady state that each is.
@@ -174,7 +174,8 @@ def _seconds_of_line(
         grid = 2 * COARSEST if auto else int(oversampling)
         return solves * (GENERAL + (NODE_ARM * (len(setting.arms.moduli) + 1) + NODE_GENERAL) * points * grid)
     if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):
-        return points * (POINT_LINE + solves * POINT_SAMPLED)
+        harder = 1 + 2.5 * (1 - getattr(setting.roughness, "hurst", 1.0)) ** 8  # more cases need cubic cells
+        return float(points * (POINT_LINE + solves * POINT_SAMPLED) * harder)
     grid = 4 if auto else int(oversampling)
     checks = 3.5 if auto or any(f"{output}_error" in block.outputs for output in COLUMNS) else 1
     nodes = points * grid

@@ -35,6 +35,13 @@ class Shape(Protocol):
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the height into the elastomer, 0 at the tip, and the slopes on the left and right of every x."""
 
+    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return height and slope of the body of revolution that acts like the line."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Radii at which the body is not smooth."""
+
     def scaled(self, length: float, height: float) -> Shape:
         """Return the shape in other units of length and height."""
 
@@ -59,9 +66,64 @@ class PowerLaw:
         right = np.where(x < 0, steepness, -steepness)
         return -self.coefficient * distance**self.exponent, left, right
 
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The body is smooth but for its tip."""
+        return ()
+
+    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return height and slope of the body of revolution that acts like the line."""
+        height = self.coefficient / mapped(self.exponent) * r**self.exponent
+        return height, np.where(r > 0.0, self.exponent * height / np.where(r > 0.0, r, 1.0), 0.0)
+
     def scaled(self, length: float, height: float) -> PowerLaw:
         """Return the shape in other units of length and height."""
         return PowerLaw(self.coefficient * length**self.exponent / height, self.exponent)
+
+
+@dataclass(frozen=True)
+class RoundedCone:
+    """The line of a cone with a rounded tip: f = s r^2 / (2 b) up to r = b, and s (r - b/2) beyond.
+
+    g = s x^2 / b up to x = b, and s x (x / b (1 - sqrt(1 - b^2 / x^2)) + arccos(b / x)) beyond (Popov, Hess and
+    Willert, Handbook of Contact Mechanics, 2.5.8).
+
+    Parameters
+    ----------
+    steepness : float
+        s, the slope of the cone.
+    blend : float
+        b, the radius at which the tip goes over into the cone without a kink.
+    """
+
+    steepness: float
+    blend: float
+
+    def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the height into the elastomer, and its slope, which is the same on the left and on the right."""
+        place, b = np.abs(x), self.blend
+        outer = np.maximum(place, b)
+        root = np.sqrt((outer - b) * (outer + b))
+        angle = np.arctan2(root, b)
+        beyond = outer * (outer - root) / b + outer * angle
+        line = np.where(place <= b, place**2 / b, beyond)
+        slope = np.where(place <= b, 2.0 * place / b, 2.0 * (outer - root) / b + angle)
+        falling = -self.steepness * np.sign(x) * slope
+        return -self.steepness * line, falling, falling
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The curvature jumps where the tip ends."""
+        return (self.blend,)
+
+    def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return height and slope of the body of revolution that acts like the line."""
+        height = np.where(r <= self.blend, 0.5 * r**2 / self.blend, r - 0.5 * self.blend)
+        return self.steepness * height, self.steepness * np.minimum(r / self.blend, 1.0)
+
+    def scaled(self, length: float, height: float) -> RoundedCone:
+        """Return the shape in other units of length and height."""
+        return RoundedCone(self.steepness * length / height, self.blend / length)
 
 
 def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatArray:

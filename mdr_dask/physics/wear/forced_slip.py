@@ -22,7 +22,15 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import Mesh, Panels, interpolate
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.wear.evolution import Moment, settled
-from mdr_dask.physics.wear.remembered import Body, Past, Place, frozen_depth, plateau_rise, remember, sticking_load
+from mdr_dask.physics.wear.remembered import (
+    Past,
+    Place,
+    VirginBody,
+    frozen_depth,
+    plateau_rise,
+    remember,
+    sticking_load,
+)
 from mdr_dask.physics.wear.slip import PartialSlip, partial_slip
 
 #: How much more closely steps follow the border than the depth: f rises beyond it as a root.
@@ -88,9 +96,9 @@ class ForcedSlip:
         return self.virgin.eta
 
     @cached_property
-    def body(self) -> Body:
+    def body(self) -> VirginBody:
         """The virgin body for compiled code."""
-        return Body(self.virgin.virgin_slip, self.virgin.inner_radius**2, self.virgin.virgin_width)
+        return VirginBody(self.virgin.virgin_slip, self.virgin.inner_radius**2, self.virgin.virgin_width)
 
     @cached_property
     def mesh(self) -> Mesh:

@@ -24,7 +24,7 @@ SHORT = 0.02
 _ABSCISSA, _WEIGHT = gauss(3)
 
 
-class Body(NamedTuple):
+class VirginBody(NamedTuple):
     """The virgin body: its slip, c^2 and 1 - c^2."""
 
     slip: LogTable
@@ -70,7 +70,7 @@ class Past(NamedTuple):
 
 
 @compiled
-def remember(mesh: Mesh, body: Body, past: Past, place: Place, result: FloatArray) -> None:
+def remember(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
     """Put what is known of s and of the worn depth at the nodes, and the load that sticks."""
     nodes, path, stands = result.size // 2, past.path, past.frozen == past.frozen
     last = path.shape[1] - 1
@@ -93,7 +93,7 @@ def remember(mesh: Mesh, body: Body, past: Past, place: Place, result: FloatArra
 
 
 @inlined
-def sticking_load(body: Body, border: float, depth: float, carried: float, place: Place) -> float:
+def sticking_load(body: VirginBody, border: float, depth: float, carried: float, place: Place) -> float:
     """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, on what sticks."""
     radius = math.sqrt(body.square + body.width * border)
     further = body.width * (place.border - border) / (radius + math.sqrt(body.square + body.width * place.border))
@@ -101,14 +101,14 @@ def sticking_load(body: Body, border: float, depth: float, carried: float, place
 
 
 @compiled
-def plateau_rise(body: Body, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
+def plateau_rise(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
     """Put (2/pi) int arccos(b / r) dd along a path of straight pieces, at places beyond it."""
     for i in range(place.size):
         result[i] = _rise(body, path, path.shape[1] - 1, place[i])
 
 
 @compiled
-def frozen_depth(body: Body, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
+def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
     """Put the worn depth over eta that the border left at places it passed, on a path on which it never returned."""
     for i in range(place.size):
         q = place[i]
@@ -125,7 +125,7 @@ def frozen_depth(body: Body, path: FloatArray, place: FloatArray, result: FloatA
 
 
 @compiled
-def _rise(body: Body, path: FloatArray, last: int, q: float) -> float:
+def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
     """Return the rise of the plateau along the first pieces of a path."""
     square, total = body.square + body.width * q, 0.0
     first = _root(q, path[0, 0])

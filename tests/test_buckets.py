@@ -1,0 +1,241 @@
+"""Studies in a bucket, of a real S3 server on the loopback: kills, two runners, a network that drops and stalls."""
+
+import os
+import signal
+import socket
+import socketserver
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from test_execute import run
+from test_locks import small
+
+from mdr_dask import execute, store
+from mdr_dask.cli import main
+from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.execute import Resources
+from mdr_dask.store import files, locks
+
+moto = pytest.importorskip("moto.server")
+pytest.importorskip("s3fs")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore:.*:DeprecationWarning"),
+    pytest.mark.filterwarnings("ignore:.*:ResourceWarning"),
+    pytest.mark.filterwarnings("ignore:.*:pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+class Link(socketserver.ThreadingTCPServer):
+    """A link to a server that can be slow, and that can drop what goes through it."""
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, port: int) -> None:
+        self.target, self.delay, self.cut_after, self.drops, self.seen = port, 0.0, None, 0, 0
+        super().__init__(("127.0.0.1", 0), Pipe)
+        threading.Thread(target=self.serve_forever, daemon=True).start()
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.server_address[1]}"
+
+
+class Pipe(socketserver.BaseRequestHandler):
+    def handle(self) -> None:
+        with socket.create_connection(("127.0.0.1", self.server.target)) as far:
+            back = threading.Thread(target=self.pass_on, args=(far, self.request, False), daemon=True)
+            back.start()
+            self.pass_on(self.request, far, True)
+            back.join()
+
+    def pass_on(self, source: socket.socket, target: socket.socket, forth: bool) -> None:
+        link = self.server
+        try:
+            while data := source.recv(65536):
+                time.sleep(link.delay)
+                link.seen += forth
+                if forth and link.drops and link.seen % link.cut_after == 0:
+                    link.drops -= 1
+                    break
+                target.sendall(data)
+        except OSError:
+            pass
+        for end in (source, target):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+
+@pytest.fixture(scope="module")
+def server():
+    import logging
+
+    logging.getLogger("werkzeug").setLevel(logging.CRITICAL)
+    threaded = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    threaded.start()
+    yield threaded.get_host_and_port()[1]
+    threaded.stop()
+
+
+@pytest.fixture
+def link(server, monkeypatch):
+    """A bucket behind a link; credentials are in the environment, as everywhere."""
+    with Link(server) as link:
+        environment = {
+            "AWS_ACCESS_KEY_ID": "somebody",
+            "AWS_SECRET_ACCESS_KEY": "secret",
+            "AWS_DEFAULT_REGION": "us-east-1",
+            "AWS_ENDPOINT_URL": link.url,
+        }
+        for name, value in environment.items():
+            monkeypatch.setenv(name, value)
+        import boto3
+
+        boto3.client("s3").create_bucket(Bucket="studies")
+        import s3fs
+
+        s3fs.S3FileSystem.clear_instance_cache()
+        files.bytes_of.cache_clear()
+        yield link
+        files.bytes_of.cache_clear()
+        link.shutdown()
+
+
+@pytest.fixture
+def bucket(link, request):
+    return f"s3://studies/{abs(hash(request.node.name))}.zarr"
+
+
+def chunks(url: str) -> dict[str, bytes]:
+    found = dict(files.read_many(url, [name for name in files.listed(url) if "/c/" in name or name.endswith("/c")]))
+    return {name: content for name, content in found.items() if content is not None}
+
+
+def test_a_study_in_a_bucket_is_run_grown_verified_and_mended_like_one_on_a_disk(toy, bucket, url, caplog):
+    assert run(small(toy), bucket).done == 12
+    assert run(small(toy), bucket).kept == 12
+    assert run(small(toy, 9), bucket).done == 6
+    run(small(toy), url)
+    run(small(toy, 9), url)
+    assert chunks(bucket) == chunks(url)
+    assert caplog.text == ""
+    assert store.verify(bucket).findings == []
+    with store.lock(bucket), pytest.raises(StoreBusyError, match=rf"process {os.getpid()} on .* is running"):
+        run(small(toy), bucket)
+    files.remove(bucket, ["height/c/0/0"])
+    files.write_bytes(bucket, "position/c/0", b"")
+    with pytest.raises(StoreError, match="position/c/0 is damaged"):
+        store.datasets(bucket)
+    found, left = store.repair(bucket)
+    assert {finding.name for finding in found.findings} == {"height/c/0/0", "position/c/0"}
+    assert left.findings == []
+    assert run(small(toy, 9), bucket).done == 8
+    assert chunks(bucket) == chunks(url)
+
+
+def test_requests_that_are_dropped_or_slow_lose_nothing(toy, link, bucket, url):
+    run(small(toy), bucket)
+    run(small(toy, 9), url)
+    link.delay, link.cut_after, link.drops = 0.02, 7, 6
+    assert run(small(toy, 9), bucket).done == 6
+    assert link.drops < 6
+    link.delay = 0.0
+    assert chunks(bucket) == chunks(url)
+    assert store.verify(bucket).findings == []
+
+
+def test_a_network_that_is_gone_ends_a_run_in_one_sentence_and_the_next_one_goes_on(
+    toy, link, bucket, url, monkeypatch
+):
+    run(small(toy, 9), url)
+    port, begun = link.target, []
+    monkeypatch.setattr(locks, "SILENCE", 0.5)
+    monkeypatch.setattr(locks, "BEAT", 0.2)
+
+    def report(progress):
+        if progress.blocks and not begun:
+            begun.append(progress.blocks)
+            link.target = 1  # where nobody listens
+            link.cut_after, link.drops = 1, 10**6
+
+    with pytest.raises(StoreError) as caught:
+        execute.run(small(toy, 9), bucket, Resources(threads=1), report)
+    assert "\n" not in str(caught.value)
+    link.target, link.drops = port, 0
+    time.sleep(0.6)
+    progress = run(small(toy, 9), bucket)
+    assert progress.kept > 0
+    assert chunks(bucket) == chunks(url)
+    assert store.verify(bucket).findings == []
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {tests!r})
+import toy, time
+toy.install()
+from test_locks import small
+from mdr_dask import execute
+from mdr_dask.execute import Resources
+compute = toy.MODEL.compute
+object.__setattr__(toy.MODEL, "compute", lambda block: time.sleep(0.1) or compute(block))
+print("begun", flush=True)
+execute.run(small(toy, {count}), {url!r}, Resources(threads=2), lambda progress: print(progress.blocks, flush=True))
+"""
+
+
+@contextmanager
+def process(url: str, count: int):
+    code = SCRIPT.format(tests=str(Path(__file__).parent), count=count, url=url)
+    started = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        yield started
+    finally:
+        started.kill()
+        started.communicate()
+
+
+def test_a_runner_that_is_killed_is_taken_over_when_it_is_silent(toy, bucket, url, monkeypatch, caplog):
+    run(small(toy, 40), url)
+    with process(bucket, 40) as first:
+        while first.stdout.readline().strip() not in ("2", "3"):
+            pass
+        with pytest.raises(StoreBusyError, match=rf"process {first.pid} on .* is running on this store"):
+            run(small(toy, 40), bucket)
+        first.send_signal(signal.SIGKILL)
+        first.wait()
+    monkeypatch.setattr(locks, "SILENCE", 0.5)
+    monkeypatch.setattr(locks, "BEAT", 0.2)
+    time.sleep(0.6)
+    progress = run(small(toy, 40), bucket)
+    assert progress.kept > 0
+    assert progress.kept + progress.done == 80
+    assert f"sign of life of process {first.pid}" in caplog.text
+    assert chunks(bucket) == chunks(url)
+    assert store.verify(bucket).findings == []
+
+
+def test_a_bucket_that_is_missing_and_credentials_that_are_missing_are_one_sentence(link, monkeypatch, capsys):
+    assert main(["status", "s3://nothing-here/a.zarr"]) == 2
+    said = capsys.readouterr().err
+    assert "bucket does not exist" in said
+    assert len(said.splitlines()) == 1
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
+    monkeypatch.setenv("HOME", "/nonexistent")
+    import s3fs
+
+    s3fs.S3FileSystem.clear_instance_cache()
+    files.bytes_of.cache_clear()
+    assert main(["status", "s3://studies/a.zarr"]) == 2
+    said = capsys.readouterr().err
+    assert "redentials" in said
+    assert len(said.splitlines()) == 1
