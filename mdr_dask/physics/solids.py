@@ -81,6 +81,12 @@ def prony(static_modulus: float, moduli: ArrayLike, times: ArrayLike, viscosity:
     ------
     ValueError
         If a number is not finite or has the wrong sign, or the two lists differ in length.
+
+    Examples
+    --------
+    >>> solid = prony(1.0, [9.0], [1e-3])
+    >>> print(abs(complex_modulus(solid, [1.0, 1e3, 1e6])).round(2))
+    [ 1.    7.11 10.  ]
     """
     stiffness, time = (np.asarray(a, dtype=np.float64).reshape(-1) for a in (moduli, times))
     if stiffness.shape != time.shape:

@@ -441,6 +441,13 @@ def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTIN
     LineSolution
         With an outcome other than CONVERGED and a reason if no film was found. Its `error` may exceed the accuracy: on
         the finest grid allowed, or the finest one that converged.
+
+    Examples
+    --------
+    >>> found = solve(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
+    >>> central = found.central_film.scaled(8 * 2e-5 / np.pi)  # a^2/R^2
+    >>> print(f"h_c/R = {central.value:.3e}")
+    h_c/R = 2.546e-05
     """
     outcome, source, steps = _adapted_solution(case, settings)
     failure, state = (outcome, source), source

@@ -135,6 +135,12 @@ class Oil:
         Temperatures in K between which the data hold.
     source : str
         Where the numbers stand.
+
+    Examples
+    --------
+    >>> oil = Oil(313.15, 320e-6, 373.15, 24e-6, 900.0, 288.15, "gold_mineral", 273.15, 393.15, "data sheet")
+    >>> print(f"{float(oil.dynamic(333.15)):.3f} Pa s")
+    0.094 Pa s
     """
 
     T1: float

@@ -25,7 +25,15 @@ def depth(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike) -> Float
 
 
 def normal_force(radius: ArrayLike, amplitude: ArrayLike, exponent: ArrayLike, E_star: ArrayLike) -> FloatArray:
-    """Return F_N = 2 E* d a n / (n + 1) of the contact radius a (thesis eq. 2.10)."""
+    """Return F_N = 2 E* d a n / (n + 1) of the contact radius a (thesis eq. 2.10).
+
+    Examples
+    --------
+    A contact of the radius 1 mm on a sphere of 50 mm, E* = 115 GPa:
+
+    >>> print(f"{normal_force(1e-3, 0.5 / 0.05, 2.0, 115e9):.1f}")
+    3066.7
+    """
     n = np.asarray(exponent, dtype=float)
     return np.asarray(2.0 * np.asarray(E_star) * depth(radius, amplitude, n) * np.asarray(radius) * n / (n + 1.0))
 

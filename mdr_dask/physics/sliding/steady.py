@@ -248,6 +248,16 @@ def steady_sliding(
     Steady
         With ``mu = drag / (load L)``, height and length L in the same unit; `Outcome.OUTSIDE_LINE` where an end of a
         line that is not periodic is in contact.
+
+    Examples
+    --------
+    >>> from mdr_dask.physics.surfaces import roughness
+    >>> from mdr_dask.physics.surfaces.cubic_line import periodic_line
+    >>> amplitude, phase = roughness.amplitudes(500, hurst=0.7), roughness.phases(seed=1, realisation=0, modes=500)
+    >>> height, slope = (roughness.line(amplitude, phase, 2000, derivative=k) for k in (0, 1))
+    >>> found = steady_sliding(periodic_line(height, slope), np.array([1e-4, 1e-3]), np.array([0.5, 0.5]))
+    >>> print((found.drag / 0.5).round(3))
+    [0.243 2.408]
     """
     cells = cut(line)
     return steady_on_cells(cells, blocks_of(cells), deborah, loads, guesses, close)

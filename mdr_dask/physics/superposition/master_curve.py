@@ -125,6 +125,13 @@ def superpose(
     ------
     DataError
         If there are fewer than two curves, too few or not finite points, or the shifted curves leave a gap.
+
+    Examples
+    --------
+    >>> time = np.linspace(0, 2, 9)
+    >>> curves = [(time, 6 - 2 / (1 + np.exp(2 - time - shift))) for shift in (0.0, 1.0, 2.0)]
+    >>> print(superpose([20.0, 40.0, 60.0], curves, reference=20.0).horizontal.round(2))
+    [0. 1. 2.]
     """
     values, sorted_curves = _sorted(groups, curves)
     problem = Problem.of(sorted_curves)

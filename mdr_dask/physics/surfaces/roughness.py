@@ -42,6 +42,11 @@ def amplitudes(modes: int, hurst: float, rolloff: float = 0.0, longest: float = 
     ------
     ValueError
         If no harmonic is left between the long and the short cut-off.
+
+    Examples
+    --------
+    >>> amplitudes(3, hurst=0.5).round(3)
+    array([1.212, 0.606, 0.404])
     """
     k = np.arange(1, modes + 1, dtype=np.float64)
     amplitude = np.maximum(k, rolloff) ** (-hurst - 0.5)
@@ -129,6 +134,13 @@ def line(amplitude: FloatArray, phase: FloatArray, nodes: int, derivative: int =
     ------
     ValueError
         If the grid does not resolve the shortest wavelength.
+
+    Examples
+    --------
+    >>> amplitude = amplitudes(500, hurst=0.7)
+    >>> height = line(amplitude, phases(seed=1, realisation=0, modes=500), nodes=2000)
+    >>> print(f"{height.std():.3f}")
+    1.000
     """
     return line_of_factors(amplitude, np.exp(1j * phase), nodes, derivative)
 

@@ -68,6 +68,13 @@ def exact(
         If the scar would leave the table of the profile.
     NotConvergedError
         If the evolution cannot be advanced.
+
+    Examples
+    --------
+    >>> from mdr_dask.physics.mdr.revolution import PowerProfile
+    >>> few, many = exact(PowerProfile(2.0), 0.5, [1.0, 100.0])
+    >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
+    0.131 0.759
     """
     solve: Solver
     if stick_radius == 0.0:

@@ -106,7 +106,15 @@ def limit_radius(profile: Profile, stick_radius: float) -> float:
 
 
 def limit(profile: Profile, stick_radius: float) -> Worn:
-    """Return the shape that ends all wear at constant depth: g = g0 up to c, then 1."""
+    """Return the shape that ends all wear at constant depth: g = g0 up to c, then 1.
+
+    Examples
+    --------
+    >>> from mdr_dask.physics.mdr.revolution import PowerProfile
+    >>> worn = limit(PowerProfile(2.0), stick_radius=0.5)
+    >>> print(f"{worn.contact_radius:.4f} {worn.wear_volume:.4f}")
+    1.2298 0.7593
+    """
     radius = limit_radius(profile, stick_radius)
     return _worn(profile, _rule(profile, stick_radius, 0.0), radius, stick_radius)
 

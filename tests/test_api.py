@@ -1,0 +1,28 @@
+"""The page of public functions is that of their docstrings, and every example in it runs as it stands."""
+
+import doctest
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from mdr_dask.api import PUBLIC, api_page
+
+ROOMS = sorted({module for rooms in PUBLIC.values() for module, _ in rooms})
+
+
+def test_the_page_is_up_to_date():
+    assert (Path(__file__).parent.parent / "docs/api.md").read_text() == api_page()
+
+
+def test_every_subject_has_an_example():
+    for subject, rooms in PUBLIC.items():
+        things = [getattr(import_module(module), name) for module, names in rooms for name in names]
+        assert all(thing.__doc__ for thing in things), subject
+        assert any(">>>" in thing.__doc__ for thing in things), subject
+
+
+@pytest.mark.parametrize("module", ROOMS)
+def test_examples_run_as_they_stand(module):
+    found = doctest.testmod(import_module(module), optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert found.failed == 0
