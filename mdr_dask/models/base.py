@@ -246,6 +246,8 @@ class Output:
     has_error : bool
         Whether the solver estimates its discretisation error: then its companion `error` comes with it, unless the
         campaign says ``errors: false``.
+    comment : str
+        What it does not tell, for its attribute ``comment`` in the store.
     """
 
     name: str
@@ -254,6 +256,7 @@ class Output:
     dims: tuple[str, ...] = ()
     default: bool = True
     has_error: bool = False
+    comment: str = ""
 
     @property
     def error(self) -> Output:

@@ -108,6 +108,8 @@ def _arrays_in_memory(template: Template) -> dict[str, bytes]:
         attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
         if output.has_error and output.error in template.outputs:
             attrs["ancillary_variables"] = output.error.name
+        if output.comment:
+            attrs["comment"] = output.comment
         _create_array(group, output.name, template, dims, template.extra_shape(output), "float64", attrs)
     flags: dict[str, Any] = {
         "long_name": "state of the case",

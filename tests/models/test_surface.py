@@ -197,3 +197,8 @@ def test_two_rollers_have_spectra_of_their_own(tmp_path):
     np.testing.assert_allclose(rougher.values["film_ratio"], wanted.values["film_ratio"] / np.sqrt(5), rtol=1e-9)
     with pytest.raises(ValidationError, match="the surfaces take the place of rms_roughness"):
         values(surface_1=files[0], surface_2=files[0], rms_roughness=2e-7)
+
+
+def test_outputs_that_are_no_area_and_no_gap_say_so():
+    for name in ("contact_fraction", "indentation_depth"):
+        assert "docs/validity.md" in MODEL.output(name).comment

@@ -22,7 +22,7 @@ from mdr_dask.models.base import (
     quantity,
 )
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
-from mdr_dask.models.parts.surface import Surface, without_exponent
+from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
 from mdr_dask.physics.lubrication.oil import OILS, Oil, walther_constants
 
@@ -233,7 +233,7 @@ class MixedLubrication(Parameters):
 
 OUTPUTS = (
     Output("breakthrough_probability", "1", "share of time with the boundary layer broken anywhere", has_error=True),
-    Output("contact_length", "m", "mean length in intimate contact", has_error=True),
+    Output("contact_length", "m", "mean length in intimate contact", has_error=True, comment=NO_AREA),
     Output("film", "m", "film thickness h0", has_error=True),
     Output("film_ratio", "1", "film thickness over combined rms height", has_error=True),
     Output("asperity_load_share", "1", "share of the load on asperities, the rest is on the film", has_error=True),

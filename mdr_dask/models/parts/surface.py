@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 
+NO_AREA = "length in contact of the line: it says nothing of the area in contact of a rough surface (docs/validity.md)"
+NO_GAP = "approach of the line: it says nothing of mean separation and gaps of a rough surface (docs/validity.md)"
+
+
 class Surface(Parameters):
     """A measured surface, in place of a generated one."""
 

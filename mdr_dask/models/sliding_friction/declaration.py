@@ -8,6 +8,7 @@ from pydantic import Field
 
 from mdr_dask.models.base import Model, Number, Output, deferred, quantity
 from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
+from mdr_dask.models.parts.surface import NO_AREA, NO_GAP
 
 
 class SlidingFriction(SlidingBody):
@@ -24,8 +25,14 @@ class SlidingFriction(SlidingBody):
 
 OUTPUTS = (
     Output("friction_coefficient", "1", "coefficient of friction", has_error=True),
-    Output("indentation_depth", "m", "penetration of the mean line into the undeformed body", has_error=True),
-    Output("contact_fraction", "1", "length in contact over length of the line", has_error=True),
+    Output(
+        "indentation_depth",
+        "m",
+        "penetration of the mean line into the undeformed body",
+        has_error=True,
+        comment=NO_GAP,
+    ),
+    Output("contact_fraction", "1", "length in contact over length of the line", has_error=True, comment=NO_AREA),
     Output("contact_slope", "1", "rms slope of the line over the contact", has_error=True),
     Output("rms_slope", "1", "spectral rms slope of the line"),
     Output(

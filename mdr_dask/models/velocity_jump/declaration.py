@@ -11,6 +11,7 @@ from mdr_dask.models.base import Coordinate, Model, Number, Output, deferred, qu
 from mdr_dask.models.parts.loading_history import Jump, Protocol
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.sliding_body import NUMBERS, SlidingBody, frequency_notes
+from mdr_dask.models.parts.surface import NO_GAP
 
 if TYPE_CHECKING:
     from mdr_dask.physics.solids import LinearSolid
@@ -69,7 +70,9 @@ OUTPUTS = (
     Output(
         "friction_coefficient", "1", "coefficient of friction after the jump", ("relaxation_times",), has_error=True
     ),
-    Output("indentation_depth", "m", "penetration of the mean line", ("relaxation_times",), False, has_error=True),
+    Output(
+        "indentation_depth", "m", "penetration of the mean line", ("relaxation_times",), False, True, comment=NO_GAP
+    ),
     Output("rms_slope", "1", "spectral rms slope of the line"),
 )
 

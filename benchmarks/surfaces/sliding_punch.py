@@ -1,0 +1,162 @@
+"""A rough circular punch that slides over a Kelvin half-space at constant speed, and the lines of the method beside it.
+
+``python -m benchmarks surfaces sliding_punch [POINTS SURFACES]`` computes what is missing in
+docs/evidence/sliding_punch.csv and prints it.
+"""
+
+import csv
+import sys
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy import fft
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from benchmarks.measures import alone, print_table
+from benchmarks.surfaces.punches import free_half_space, spectrum
+from mdr_dask.models.parts.surface import Surface
+from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
+from mdr_dask.physics.surfaces.areal import areal_surface, wavenumbers
+
+TABLE = Path(__file__).parents[2] / "docs/evidence/sliding_punch.csv"
+COLUMNS = (
+    *("points", "surfaces", "deborah", "depth", "load", "friction", "friction_error"),
+    *("line", "line_error", "area", "length"),
+)
+HEADING = "q [rad/m],C2D [m^4]"
+HURST, SEED = 0.8, 15
+DEBORAH = (0.01, 0.1)  # v tau / L: beyond, what leaves the punch comes back through the period of the transform
+DEPTHS = (-1.5, -0.5, 0.5)  # over the rms height
+LINES = 40
+
+
+@lru_cache(maxsize=8)
+def response(points, deborah):
+    """Return what takes forces to displacements of unit modulus E* = 4 G in the frame of the punch.
+
+    A Kelvin half-space has u + v tau du/dx = u_el, with the displacements u_el of the elastic one.
+    """
+    q_x, _ = wavenumbers((2 * points, 2 * points), (2.0, 2.0))
+    return free_half_space(points).response / (1 + 1j * deborah * q_x)[:, None]
+
+
+def slide(height, depth, deborah):
+    """Return the forces on the points of a punch that is pressed in by a depth and slides along x."""
+    points = height.shape[0]
+    place = (np.arange(points) + 0.5) / points - 0.5
+    punch = np.hypot(place[:, None], place) < 0.5
+    kernel = response(points, deborah)
+
+    def displacement(force):
+        padded = np.zeros((2 * points, 2 * points))
+        padded[:points, :points] = force
+        return fft.irfft2(fft.rfft2(padded) * -kernel, padded.shape)[:points, :points]
+
+    wanted = height + depth
+    touching, force = punch & (wanted > 0), np.zeros_like(height)
+    for _ in range(200):
+        where = np.flatnonzero(touching)
+
+        def product(x, where=where):
+            full = np.zeros(height.size)
+            full[where] = x
+            return displacement(full.reshape(height.shape)).ravel()[where]
+
+        operator = LinearOperator((where.size, where.size), product)
+        start = force.ravel()[where]
+        found, _ = gmres(operator, wanted.ravel()[where], start, rtol=1e-7, restart=60, maxiter=20)
+        force = np.zeros(height.size)
+        force[where] = found
+        force = force.reshape(height.shape)
+        gap = displacement(force) - wanted
+        after = punch & (((force > 0) & touching) | (~touching & (gap < -1e-7 * np.abs(wanted).max())))
+        if np.array_equal(after, touching):
+            return force
+        touching, force = after, np.maximum(force, 0)
+    raise RuntimeError("the contact did not settle")
+
+
+def lines(points, load, deborah, count=LINES):
+    """Return mean friction over h / L, contact fraction, and the standard error of the friction, of the lines."""
+    surface = Surface.model_validate({"spectrum": table(points)})
+    parameters = SlidingFriction(
+        length=1.0,
+        points=2 * points,
+        surface=surface,
+        shear_modulus=0.25,
+        relaxation_time=1.0,
+        velocity=deborah,
+        normal_force=load,
+    )
+    found = [alone(MODEL, parameters, k, ("friction_coefficient", "contact_fraction"), SEED) for k in range(count)]
+    friction, fraction = (np.array([float(one[name]) for one in found]) for name in found[0])
+    return friction.mean(), fraction.mean(), friction.std(ddof=1) / np.sqrt(count)
+
+
+@lru_cache(maxsize=4)
+def table(points):
+    """Write the spectrum of the punch, of unit rms height; return the name of the file."""
+    one = spectrum(HURST, points)
+    with tempfile.NamedTemporaryFile("w", suffix=".csv", delete=False) as file:
+        np.savetxt(file, np.column_stack([one.wavenumber, one.density]), "%.17g", ",", header=HEADING, comments="")
+    return file.name
+
+
+def case(points, surfaces, deborah, depth):
+    """Return load over E* L h, friction over h / L of both bodies with standard errors, area and length in contact."""
+    found = []
+    for index in range(surfaces):
+        height = areal_surface(spectrum(HURST, points), (points, points), (1.0, 1.0), SEED, index)
+        force = slide(height, depth, deborah)
+        q_x, _ = wavenumbers(height.shape, (1.0, 1.0))
+        slope = fft.irfft2(1j * q_x[:, None] * fft.rfft2(height), height.shape)
+        friction = abs(float(np.sum(force * slope))) / force.sum()
+        found.append((force.sum(), friction, np.count_nonzero(force > 0) / (np.pi / 4 * height.size)))
+    load, friction, area = np.array(found).T
+    spread = friction.std(ddof=1) / np.sqrt(surfaces)
+    mean, length, error = lines(points, float(load.mean()), deborah)
+    return load.mean(), friction.mean(), spread, mean, error, area.mean(), length
+
+
+def rows():
+    """Return what has been computed, as a list of dictionaries of numbers."""
+    if not TABLE.exists():
+        return []
+    with TABLE.open() as stream:
+        return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(stream)]
+
+
+def compute(points=128, surfaces=2):
+    """Append what is missing, one case after the other."""
+    known = {tuple(row[name] for name in COLUMNS[:4]) for row in rows()}
+    for deborah in DEBORAH:
+        for depth in DEPTHS:
+            if (points, surfaces, deborah, depth) not in known:
+                numbers = case(points, surfaces, deborah, depth)
+                new = not TABLE.exists()
+                with TABLE.open("a", newline="") as stream:
+                    writer = csv.writer(stream, lineterminator="\n")
+                    writer.writerows([COLUMNS] if new else [])
+                    writer.writerow([points, surfaces, deborah, depth, *(f"{number:.6g}" for number in numbers)])
+
+
+def table_of_cases():
+    """Return the rows of the table in docs/validity.md."""
+    for row in sorted(rows(), key=lambda row: (row["points"], row["deborah"], row["load"])):
+        yield (
+            *(f"{row[name]:g}" for name in ("points", "surfaces", "deborah")),
+            f"{row['load']:.3g}",
+            f"{row['friction']:.3g} ± {row['friction_error']:.1g}",
+            f"{row['line']:.3g} ± {row['line_error']:.1g}",
+            f"{row['line'] / row['friction']:.2f}",
+            *(f"{row[name]:.3g}" for name in ("area", "length")),
+        )
+
+
+HEAD = ("points", "surfaces", "v tau / L", "F / (E* L h)", "μL/h, half-space", "μL/h, lines", "ratio", "area", "length")
+
+if __name__ == "__main__":
+    compute(*map(int, sys.argv[1:]))
+    print_table(HEAD, table_of_cases())
