@@ -399,7 +399,7 @@ EXPECTED = {
     "traction": along("slide_roll_ratio", "traction_coefficient"),
     "wear_development": worn,
     "wear_profiles": worn,
-    "wear_volume": volume,
+    "wear_growth": volume,
     "fast_wear_error": fast_error,
 }
 

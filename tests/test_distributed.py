@@ -79,7 +79,7 @@ def test_a_store_that_cannot_be_written_ends_a_distributed_run_with_one_error(to
     shutil.rmtree(f"{url}/status/c/1")
     shutil.rmtree(blocked)
     Path(blocked).touch()
-    with pytest.raises(StoreError, match=r"study\.zarr: writing height failed: "):
+    with pytest.raises(StoreError, match=r"study\.zarr: writing height/c/1/0 failed: "):
         run_on(workers, campaign, url)
 
 
@@ -180,6 +180,7 @@ def test_a_block_whose_worker_died_untold_is_found_in_the_ledger(toy, url, retry
     if retry:
         run(campaign, url)
     sent = []
+    monkeypatch.setattr(execute.rounds, "_settle", lambda *_: None)  # records are put together at the end of a run
     monkeypatch.setattr(executors, "run_block", lambda work: sent.append(work) or task.run_block(work))
     run(campaign, url, retry_failed=retry)
     (work,) = sent

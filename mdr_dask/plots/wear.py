@@ -300,6 +300,6 @@ def dimensionless(data: xr.Dataset) -> bool:
 PLOTS: tuple[Plot, ...] = (
     Plot("wear_development", MODELS, "f(r) and g(x) for growing cycles (thesis figure 6.1)", draw_development),
     Plot("wear_profiles", MODELS, "f(r) and g(x), exact, fast and limit (thesis figures 6.2 and 6.3)", draw_profiles),
-    Plot("wear_volume", MODELS, "worn volume against cycles or path, with the scatter of realisations", draw_volume),
+    Plot("wear_growth", MODELS, "worn volume against cycles or path, with the scatter of realisations", draw_volume),
     Plot("fast_wear_error", MODELS, "error of the fast rule over c and N, and the best xi", draw_fast_error),
 )

@@ -123,8 +123,8 @@ def sizes(url: str, files: Iterable[str]) -> Iterator[tuple[str, int | None]]:
         known = {name.removeprefix(f"{store.path}/"): told["size"] for name, told in found.items()}
         yield from ((name, known.get(name)) for name in files)
         return
-    for name in files:
-        with guarded(url, f"looking at {name}"):
+    with guarded(url, "looking at its files"):
+        for name in files:
             try:
                 size = os.stat(f"{path}/{name}").st_size  # noqa: PTH116 (of a hundred thousand, a Path each is slow)
             except FileNotFoundError:

@@ -48,7 +48,7 @@ JUMPS = {
     *("relaxation_rate", "relaxation_power", "relaxation_course"),
 }
 FILMS = {"film_profile", "film_formula", "film_regimes", "regime_map"}
-SHAPES = {"wear_development", "wear_profiles", "wear_volume"}
+SHAPES = {"wear_development", "wear_profiles", "wear_growth"}
 
 #: Shape of a study: model and parameters, what is special, and the figures that it can hold.
 TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
@@ -186,7 +186,7 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
     "wear: latin hypercube": (
         planted.FRETTING + "  stick_radius: {linear: [0.1, 0.9]}\n  cycles: {geometric: [0.1, 10]}\n" + LHS,
         {},
-        {"wear_profiles", "wear_volume"},
+        {"wear_profiles", "wear_growth"},
     ),
     "wear: error of the fast rule": (
         planted.FRETTING + "  stick_radius: {linear: [0.1, 0.9, 3]}\n  cycles: {geometric: [0.1, 10, 4]}\nseries:\n"
@@ -281,7 +281,7 @@ PARTLY = {
     "temperature",
     "wear_profiles",
     "wear_development",
-    "wear_volume",
+    "wear_growth",
 }
 
 
