@@ -13,7 +13,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 from mdr_dask import store
@@ -31,6 +30,15 @@ seed: 1
 realisations: {realisations}
 parameters: {{position: {{linear: [1 m, {positions} m, {positions}]}}, fail_above: {limit} m}}
 store: {{path: {name}.zarr, blocks: {{position: 10, realisation: 10}}}}
+"""
+#: Starts a command and tells what it took; itself small, since a process begins with the peak memory of its parent.
+LAUNCHER = """
+import os, subprocess, sys, time
+start = time.perf_counter()
+process = subprocess.Popen(sys.argv[1:], stdout=sys.stderr)
+_, code, used = os.wait4(process.pid, 0)
+print(used.ru_utime + used.ru_stime, time.perf_counter() - start, used.ru_maxrss)
+sys.exit(os.waitstatus_to_exitcode(code))
 """
 COMMANDS = {
     "check": ("check", "many.yaml"),
@@ -88,16 +96,14 @@ def fabricate(folder: Path, blocks: int) -> int:
 def measure(folder: Path, arguments: tuple[str, ...]) -> tuple[float, float, float]:
     """Return processor seconds, seconds on the wall and peak memory in MB of a command."""
     environment = {**os.environ, "PYTHONPATH": str(TESTS)}
-    start = time.perf_counter()
-    program = [sys.executable, "-c", "from mdr_dask.cli import main; main()", *arguments]
-    with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(program, cwd=folder, env=environment, stdout=said, stderr=said)
-        _, code, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(code)
-        if process.returncode:
-            said.seek(0)
-            sys.exit(f"{' '.join(arguments)}: {said.read().decode()}")
-    return used.ru_utime + used.ru_stime, time.perf_counter() - start, used.ru_maxrss / 1000
+    program = [sys.executable, "-c", "import sys; from mdr_dask.cli import main; sys.exit(main())", *arguments]
+    launched = subprocess.run(
+        [sys.executable, "-S", "-c", LAUNCHER, *program], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    if launched.returncode:
+        sys.exit(f"{' '.join(arguments)}: {launched.stderr}")
+    processors, wall, peak = map(float, launched.stdout.split())
+    return processors, wall, peak / 1000
 
 
 def main(*counts: int) -> None:
