@@ -27,6 +27,11 @@ def test_error_estimates_beyond_cubic_cells_on_planes_are_honest(benchmark_scrip
         assert over <= 14
 
 
+def test_the_page_of_validity_is_what_its_evidence_says(benchmark_script):
+    script = benchmark_script("surfaces.validity")
+    assert script.text(512) == script.PAGE.read_text()
+
+
 def test_a_campaign_finds_grid_and_lines_for_its_accuracy(benchmark_script, tmp_path):
     script = benchmark_script("friction.campaigns")
     scene = "typical: transition"

@@ -79,7 +79,7 @@ def test_a_store_that_cannot_be_written_ends_a_distributed_run_with_one_error(to
     shutil.rmtree(f"{url}/status/c/1")
     shutil.rmtree(blocked)
     Path(blocked).touch()
-    with pytest.raises(StoreError, match=r"study\.zarr: writing height/c/1/0 failed: "):
+    with pytest.raises(StoreError, match=r"study\.zarr: writing height.* failed: "):
         run_on(workers, campaign, url)
 
 

@@ -74,7 +74,7 @@ WRONG = [
         "no figure of sliding_friction is called 'nothing'; known: contact, lines, regions, velocity",
     ),
     ("plot STORE friction_coefficient", "friction_coefficient is an output: say --over AXIS, or --effects"),
-    ("plot STORE friction_coefficient --over speed", "no axis 'speed' (known: normal_force, velocity"),
+    ("plot STORE friction_coefficient --over speed", "no axis 'speed' (did you mean 'velocity'?)"),
     (
         "plot STORE friction_coefficient --over velocity --effects",
         "expected --over once, twice for a map, or --effects",

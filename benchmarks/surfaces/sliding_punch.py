@@ -133,13 +133,18 @@ def compute(points=128, surfaces=2):
     known = {tuple(row[name] for name in COLUMNS[:4]) for row in rows()}
     for deborah in DEBORAH:
         for depth in DEPTHS:
-            if (points, surfaces, deborah, depth) not in known:
+            if (points, surfaces, deborah, depth) in known:
+                continue
+            try:
                 numbers = case(points, surfaces, deborah, depth)
-                new = not TABLE.exists()
-                with TABLE.open("a", newline="") as stream:
-                    writer = csv.writer(stream, lineterminator="\n")
-                    writer.writerows([COLUMNS] if new else [])
-                    writer.writerow([points, surfaces, deborah, depth, *(f"{number:.6g}" for number in numbers)])
+            except RuntimeError as problem:
+                print(f"v tau / L = {deborah}, depth {depth}: {problem}", file=sys.stderr)
+                continue
+            new = not TABLE.exists()
+            with TABLE.open("a", newline="") as stream:
+                writer = csv.writer(stream, lineterminator="\n")
+                writer.writerows([COLUMNS] if new else [])
+                writer.writerow([points, surfaces, deborah, depth, *(f"{number:.6g}" for number in numbers)])
 
 
 def table_of_cases():

@@ -105,9 +105,14 @@ def main(surfaces=20, points=512):
 
 
 def page(points):
-    """Write page and figure from the table of evidence."""
+    """Write page and figure from the tables of evidence."""
+    draw(collected(points))
+    PAGE.write_text(text(points))
+
+
+def text(points):
+    """Return the page from the tables of evidence."""
     found = collected(points)
-    draw(found)
     ratios, approach, contact, gap = tables(found)
     number = min(len(found["half-space", hurst][0]) for hurst in punches.HURST)
     worst = [
@@ -116,7 +121,7 @@ def page(points):
     head, *cases = sliding_punch.HEAD, *sliding_punch.table_of_cases()
     sliding = "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cases))
     shares = [row["line"] / row["friction"] for row in sliding_punch.rows()]
-    text = TEXT.read_text().format(
+    return TEXT.read_text().format(
         sliding=sliding,
         friction_low=min(shares),
         friction_high=max(shares),
@@ -131,7 +136,6 @@ def page(points):
         contact=contact,
         gap=gap,
     )
-    PAGE.write_text(text)
 
 
 if __name__ == "__main__":

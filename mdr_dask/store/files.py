@@ -10,7 +10,7 @@ import os
 import uuid
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -194,7 +194,8 @@ def _write_local(url: str, root: Path, files: list[tuple[str, bytes]]) -> None:
             _flush(folders)
     except BaseException:
         for leftover in unnamed.values():
-            leftover.unlink(missing_ok=True)
+            with suppress(OSError):  # what went wrong first is what has to be told
+                leftover.unlink()
         raise
 
 

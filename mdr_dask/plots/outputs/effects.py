@@ -53,7 +53,7 @@ def draw_effects(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, li
     axes_of[0].set_ylabel(style.beside(figure, axes_of[0], style.with_unit(how.symbol, how.unit)))
     style.legend(axes_of[0])
     bars = "means over all that varies besides"
-    title(figure, subject(found, view, "against every parameter that varies"), [curves.scalars(data)], bars)
+    title(figure, subject(found, view, "against every parameter that varies"), found, [curves.scalars(data)], bars)
     return figure, told
 
 

@@ -48,7 +48,7 @@ def draw_lines(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, list
     _scale_values(figure, axes_of, found, view)
     bars = curves.meaning_of_bars(*found.values(), outputs=[view.output])
     words = f"against {view.over[0].replace('_', ' ')}"
-    title(figure, subject(found, view, words), [one.held for one in every], bars)
+    title(figure, subject(found, view, words), found, [one.held for one in every], bars)
     return figure, told
 
 

@@ -48,7 +48,13 @@ def draw_map(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, list[s
     words = style.with_unit(quantity.symbol, quantity.unit)
     figure.colorbar(colours, ax=axes_of, label=style.broken(words))
     words = " over {} and {}".format(*(name.replace("_", " ") for name in view.over)).strip()
-    title(figure, subject(found, view, words), [curves.scalars(data) for data in series], _reach(means, quantity.unit))
+    title(
+        figure,
+        subject(found, view, words),
+        found,
+        [curves.scalars(data) for data in series],
+        _reach(means, quantity.unit),
+    )
     return figure, told
 
 

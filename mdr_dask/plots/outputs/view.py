@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from mdr_dask import models
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.plots import curves, drawing, style
 
@@ -173,10 +174,27 @@ def scale(axes: Axes, which: str, name: str, values: xr.DataArray, view: View) -
         style.logarithmic(axes, which)
 
 
-def title(figure: Figure, subject: str, held: Sequence[Mapping[str, xr.DataArray]], bars: str) -> None:
-    """Write over a figure what it shows, what all of it holds fixed, and what bars mean."""
+def title(
+    figure: Figure,
+    subject: str,
+    found: Mapping[str, xr.Dataset],
+    held: Sequence[Mapping[str, xr.DataArray]],
+    bars: str,
+) -> None:
+    """Write over a figure what it shows, what all of it holds fixed, and what bars mean.
+
+    What is at its default, and the entries of structures, are left to the table beside the figure, except those that
+    figures have symbols for.
+    """
     alike = curves.fixed_by_all(held)
-    style.title(figure, subject, curves.fixed_text(alike, [name for name in alike if name not in SETTINGS]), bars)
+    model = models.load(next(iter(found.values())).attrs["model"])
+    plain = {name: field.default for name, field in model.parameters.model_fields.items() if name not in SETTINGS}
+    told = [
+        name
+        for name, value in alike.items()
+        if name in style.QUANTITIES or (name in plain and value.item() != plain[name])
+    ]
+    style.title(figure, subject, curves.fixed_text(alike, told), bars)
 
 
 def subject(found: Mapping[str, xr.Dataset], view: View, words: str) -> str:

@@ -1,0 +1,37 @@
+"""Make the road of campaigns/road.yaml: three maps of one generated asphalt, and their spectrum as `surface` writes it.
+
+``python -m benchmarks surfaces road [FOLDER]``: C2D ~ q^(-2 - 2 H) with H = 0.8 from 2.5 mm down to 10 um, constant
+above, rms height 50 um; 20 nm of white noise of the instrument; 1024 x 1024 points 5 um apart, cut out of a larger
+periodic surface and tilted.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from mdr_dask.cli import main
+from mdr_dask.physics.surfaces.areal import areal_surface
+from mdr_dask.physics.surfaces.spectrum import self_affine
+
+SPACING, POINTS, SEED = 5e-6, 1024, 2026
+SPECTRUM = self_affine(0.8, 8e-3, 1e-5, 5e-5, 2.5e-3)
+
+
+def make(folder):
+    """Write maps, spectrum and figure into a folder; return the spectrum."""
+    side = POINTS * 3 // 2
+    names = []
+    for k in range(3):
+        whole = areal_surface(SPECTRUM, (side, side), (side * SPACING,) * 2, SEED, k)
+        noise = 2e-8 * np.random.default_rng(k).standard_normal((POINTS, POINTS))
+        tilt = 1e-7 * np.arange(POINTS)
+        names.append(str(folder / f"road{k}.npy"))
+        np.save(names[-1], 1e6 * (whole[:POINTS, :POINTS] + noise + tilt).astype(np.float32))
+    files = ["-o", str(folder / "road.csv"), "--plot", str(folder / "road.png")]
+    main(["surface", *names, "--spacing", "5um", "--unit", "um", *files])
+    return folder / "road.csv"
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[2] / "campaigns/data/road")
