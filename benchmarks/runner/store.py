@@ -21,7 +21,8 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 
 import toy
 
-from mdr_dask import Resources, run, store
+from mdr_dask import store
+from mdr_dask.execute import Resources, run
 from mdr_dask.plan import templates
 from mdr_dask.store import files
 from mdr_dask.store.records import sealed

@@ -58,7 +58,7 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     from mdr_dask import store as room
 
     def count() -> list[dict[str, Any]]:
-        return [_count(name, dataset) for name, dataset in room.datasets(store).items()]
+        return [_count(store, name, dataset) for name, dataset in room.datasets(store).items()]
 
     if watch:
         if failures or messages or form:
@@ -94,10 +94,11 @@ def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | No
         click.echo(f"at work: {', '.join(at_work)}")
 
 
-def _count(name: str, dataset: xr.Dataset) -> dict[str, Any]:
+def _count(store: str, name: str, dataset: xr.Dataset) -> dict[str, Any]:
+    from mdr_dask import store as room
     from mdr_dask.models.base import Status
 
-    states = dataset["status"].to_numpy()
+    states = room.ledger(store, name, dataset["status"].shape, recorded=True)
     counts = {state.name.lower(): int((states == state).sum()) for state in Status}
     return {"series": name or "-", "results": states.size, **counts}
 
@@ -108,7 +109,8 @@ def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
     from mdr_dask.models.base import Status
 
     last: dict[tuple[int, ...], dict[str, Any]] = {}
-    for record in sorted(room.records(store, series), key=lambda record: record["attempt"]):
+    telling = [record for record in room.records(store, series) if record["messages"]]
+    for record in sorted(telling, key=lambda record: record["attempt"]):
         for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = room.ledger(store, series, dataset["status"].shape)

@@ -90,6 +90,8 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
         raise StoreError(f"{url}: gone since it was laid out")
     begun = itertools.count(1)
     for cells in groups:
+        if not cells.new:
+            continue
         template = cells.template
         attempts = store.attempts(url, template.series.name)
         for index in template.block_indices():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterable, Mapping
+from operator import itemgetter
 from typing import Any
 
 from zarr.abc.store import ByteRequest, Store
@@ -15,6 +16,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.files import group_name, read_bytes
 from mdr_dask.store.records import digest, records
+from mdr_dask.store.study import document
 
 #: Digests of the chunks that each attempt at a block has written, by array, in the order of the attempts.
 History = tuple[Mapping[str, str], ...]
@@ -23,9 +25,9 @@ History = tuple[Mapping[str, str], ...]
 def histories(found: Iterable[Mapping[str, Any]]) -> dict[BlockIndex, History]:
     """Return the history of every block, from its records; those of earlier versions wrote no digests."""
     known: dict[BlockIndex, History] = {}
-    for record in sorted(found, key=lambda record: int(record["attempt"])):
-        block = tuple(record["block"])
-        known[block] = (*known.get(block, ()), record.get("chunks", {}))
+    attempts = [(int(record["attempt"]), tuple(record["block"]), record.get("chunks", {})) for record in found]
+    for _, block, chunks in sorted(attempts, key=itemgetter(0)):
+        known[block] = (*known.get(block, ()), chunks)
     return known
 
 
@@ -50,6 +52,7 @@ class Checked(WrapperStore[Store]):
         super().__init__(store)
         self._url, self._series = url, series
         self._prefix = group_name(series, "status").removesuffix("status")
+        self._arrays = {"status", *((document(url, series) or {}).get("attributes", {}).get("outputs", ()))}
         self._known: dict[BlockIndex, History] | None = None
         self._lock = threading.Lock()
 
@@ -61,6 +64,8 @@ class Checked(WrapperStore[Store]):
         found = await self._store.get(key, prototype, byte_range)
         if byte_range is None and "/c/" in key:
             name, block = self._place(key)
+            if name not in self._arrays:  # a coordinate, which belongs to the layout
+                return found
             content = None if found is None else found.to_bytes()
             if self._known is None or not self._is_latest(name, block, content):
                 await asyncio.to_thread(self._require, key, name, block, content)

@@ -1,0 +1,88 @@
+"""Stores of many blocks: what is opened and decoded grows no faster than it must, and nothing is overlooked for it."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import toy
+import zarr
+
+from mdr_dask import store
+from mdr_dask.cli import main
+from mdr_dask.errors import StoreError
+from mdr_dask.execute import Resources, run
+from mdr_dask.store import blocks
+from mdr_dask.store.records import opened, sealed
+
+
+@pytest.fixture
+def url(tmp_path, monkeypatch):
+    """A store of 7 x 3 blocks, the last ones cut, in which one case fails."""
+    toy.register(monkeypatch)
+    campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
+    url = str(tmp_path / "many.zarr")
+    run(
+        replace(campaign, blocks={"position": 2, "realisation": 2}, replication=toy.Replication(5, 5, {})),
+        url,
+        Resources(),
+        lambda _: None,
+    )
+    return url
+
+
+def plain(url):
+    return zarr.open_group(url, mode="r")["status"][...]
+
+
+def test_the_ledger_is_that_of_zarr_and_each_different_chunk_is_decoded_once(url, monkeypatch):
+    decoded = []
+    whole = blocks._LedgerChunks.decoded
+
+    def counted(self):
+        decoded.append(len(self.different))
+        return whole(self)
+
+    monkeypatch.setattr(blocks._LedgerChunks, "decoded", counted)
+    expected = plain(url)
+    assert np.array_equal(store.ledger(url, "", (13, 5)), expected)
+    assert np.array_equal(store.ledger(url, "", (4, 2)), expected[:4, :2])
+    grown = store.ledger(url, "", (15, 6))
+    assert np.array_equal(grown[:13, :5], expected)
+    assert not grown[13:].any()
+    assert not grown[:, 5:].any()
+    assert max(decoded) <= 5 < 21  # nothing, whole, cut at the end of an axis, failed
+
+
+def test_a_ledger_that_lacks_chunks_is_that_of_zarr(url):
+    for place in ("0/0", "3/1", "6/2"):
+        Path(url, "status/c", place).unlink()
+    assert (plain(url) == 0).any()
+    assert np.array_equal(store.ledger(url, "", (13, 5)), plain(url))
+
+
+def test_status_names_a_chunk_of_the_ledger_that_belongs_elsewhere(url, capsys):
+    shutil.copy(Path(url, "status/c/6/0"), Path(url, "status/c/2/1"))
+    store.ledger(url, "", (13, 5))
+    with pytest.raises(StoreError, match="status/c/2/1 is not what was written there"):
+        store.ledger(url, "", (13, 5), recorded=True)
+    assert main(["status", url]) == 2
+    assert "status/c/2/1" in capsys.readouterr().err
+
+
+def test_a_run_with_nothing_to_do_does_not_count_attempts(url, monkeypatch):
+    monkeypatch.setattr(store, "attempts", lambda *_: pytest.fail("read the records of a finished study"))
+    campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
+    progress = run(replace(campaign, replication=toy.Replication(5, 5, {})), url, Resources(), lambda _: None)
+    assert (progress.kept, progress.blocks) == (65, 0)
+
+
+@pytest.mark.parametrize(("old", "new"), [(b'"attempt": 1', b'"attempt": 2'), (b'"digest": "', b'"digest": "0')])
+def test_a_record_that_was_changed_is_none(old, new):
+    line = sealed({"attempt": 1, "block": [0, 3], "chunks": {"status": "ab"}, "messages": []})
+    assert opened(line)["block"] == [0, 3]
+    assert opened(json.dumps(json.loads(line), indent=1).encode()) is not None
+    assert old in line
+    assert opened(line.replace(old, new)) is None
