@@ -96,7 +96,7 @@ def plot(
             groups = {key: selection.where(data, where) for key, data in groups.items()}
             figures = {name: _without(figure, where) for name, figure in figures.items()}
         for (name, figure), path in zip(figures.items(), places, strict=True):
-            _draw(figure, groups, path, _provenance(name, urls, str(context.meta.get(COMMAND, ""))), everything)
+            _draw(figure, groups, path, provenance(name, urls, str(context.meta.get(COMMAND, ""))), everything)
 
 
 def _without(figure: Plot, where: str) -> Plot:
@@ -218,7 +218,7 @@ def _called(url: str, urls: Sequence[str], series: str) -> str:
     return f"{store} {series}".strip()
 
 
-def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, provenance: dict[str, str], one_of: bool) -> None:
+def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: dict[str, str], one_of: bool) -> None:
     """Draw a figure into a file, its data beside it; one of all that cannot be drawn is named."""
     from mdr_dask.errors import DataError, FitError
     from mdr_dask.plots import style
@@ -230,13 +230,13 @@ def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, provenance
             raise
         click.echo(f"{figure.name}: left out: {error}", err=True)
         return
-    save(drawn, path, provenance)
+    save(drawn, path, origin)
     click.echo(str(path))
     if style.left_out(drawn):
         click.echo(f"{figure.name}: not drawn: {style.left_out(drawn)}", err=True)
 
 
-def save(figure: Figure, path: Path, provenance: Mapping[str, str]) -> None:
+def save(figure: Figure, path: Path, origin: Mapping[str, str]) -> None:
     """Write a figure, and its data beside it."""
     from mdr_dask.plots import table
 
@@ -244,10 +244,10 @@ def save(figure: Figure, path: Path, provenance: Mapping[str, str]) -> None:
         table.save_picture(figure, path)
     if isinstance(figure, table.Drawn):
         with writing(path.with_suffix(".csv")):
-            table.save_table(figure, path.with_suffix(".csv"), provenance)
+            table.save_table(figure, path.with_suffix(".csv"), origin)
 
 
-def _provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
+def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
     """Return what the table of a figure says of its origin."""
     import hashlib
 

@@ -6,13 +6,18 @@ from pathlib import Path
 
 import click
 
+from mdr_dask.cli.figures import COMMAND, Drawing, provenance, save
 from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table, with_intervals
 from mdr_dask.cli.results import Reading, store_argument
-from mdr_dask.cli.writing import FIGURES, require_suffix, writing
+from mdr_dask.cli.writing import FIGURES, require_suffix
 
 
-@click.command(cls=Reading)
+class Asking(Drawing, Reading):
+    """A command that reads a store and may draw."""
+
+
+@click.command(cls=Asking)
 @store_argument
 @click.argument("output")
 @series_option
@@ -22,8 +27,15 @@ from mdr_dask.cli.writing import FIGURES, require_suffix, writing
 )
 @json_option
 @csv_option
+@click.pass_context
 def sensitivity(
-    store: str, output: str, series: str | None, selections: tuple[str, ...], figure: Path | None, form: str | None
+    context: click.Context,
+    store: str,
+    output: str,
+    series: str | None,
+    selections: tuple[str, ...],
+    figure: Path | None,
+    form: str | None,
 ) -> None:
     """Say which input matters: Sobol indices of an output of a sampled study, with 95 % intervals.
 
@@ -51,8 +63,7 @@ def sensitivity(
     for sentence in _sentences(found.attrs):
         tell(sentence)
     if figure is not None:
-        with writing(figure):
-            drawn(found).savefig(figure, dpi=150)
+        save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))
         tell(str(figure))
 
 

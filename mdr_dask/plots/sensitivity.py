@@ -8,36 +8,34 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.plots import drawing, style
+from mdr_dask.plots.drawing import Mean
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+LABELS = {"first": "first order: alone", "total": "total: with interactions"}
+#: Thickness of a bar, and how far those of one input lie apart, of a row.
+THICK, APART = 0.36, 0.38
+
 
 def sensitivity(indices: xr.Dataset) -> Figure:
     """Draw what `mdr_dask.fits.sensitivity.sobol_indices` found: a bar for every index of every input."""
-    from matplotlib.figure import Figure
-
     inputs = [style.quantity(str(name)).symbol for name in indices["parameter"].to_numpy()]
     kinds = [kind for kind in ("first", "total") if indices[kind].notnull().any()]
-    figure = Figure(figsize=(drawing.PANEL[0], 1.6 + 0.5 * len(inputs)), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = drawing.panels(1, size=(drawing.PANEL[0], 1.6 + 0.5 * len(inputs)))
     for k, kind in enumerate(kinds):
-        value = indices[kind].to_numpy()
-        ends = np.array([value - indices[f"{kind}_low"], indices[f"{kind}_high"] - value])
-        at = np.arange(len(inputs)) + 0.38 * (k - (len(kinds) - 1) / 2)
-        axes.barh(at, value, 0.36, color=style.COLOURS[k], label=_LABELS[kind], alpha=0.85)
-        axes.errorbar(value, at, xerr=ends, fmt="none", ecolor="black", capsize=3, gid=style.DATA)
+        place = xr.zeros_like(indices[kind]) + np.arange(len(inputs)) + APART * (k - (len(kinds) - 1) / 2)
+        unknown = xr.full_like(place, np.nan)
+        axes.barh(place, indices[kind], THICK, color=style.COLOURS[k], label=LABELS[kind], alpha=0.85)
+        along = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
+        drawing.points(axes, indices[kind], Mean(place, unknown, unknown), "black", "", kind, along)
     axes.set_yticks(np.arange(len(inputs)), inputs)
     axes.invert_yaxis()
     axes.axvline(0, color="black", linewidth=0.8)
     axes.set_xlabel("share of the variance")
-    axes.legend(fontsize="small")
-    output = str(indices.attrs["output"]).replace("_", " ")
-    cases, count = indices.attrs["cases"], indices.attrs["realisations"]
-    axes.set_title(
-        f"{output}: Sobol indices\n{cases} cases, {count} realisations; bars: 95 % intervals", fontsize="medium"
-    )
+    handles, labels = axes.get_legend_handles_labels()
+    bars = [(handle, label) for handle, label in zip(handles, labels, strict=True) if label in LABELS.values()]
+    axes.legend(*zip(*bars, strict=True), fontsize="small")
+    about = f"{indices.attrs['cases']} cases, {indices.attrs['realisations']} realisations; bars: 95 % intervals"
+    style.title(figure, f"{str(indices.attrs['output']).replace('_', ' ')}: Sobol indices", about)
     return figure
-
-
-_LABELS = {"first": "first order: alone", "total": "total: with interactions"}
