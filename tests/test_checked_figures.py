@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdr_dask import datasets, execute, load
-from mdr_dask.campaign import Replication
+from mdr_dask import execute
+from mdr_dask.campaign import Replication, load
 from mdr_dask.fits import available
+from mdr_dask.store import datasets
 
 CAMPAIGNS = Path(__file__).parent.parent / "campaigns"
 #: At v -> 0 from statics alone, 200 realisations, H = 0, 0.1, ..., 1.

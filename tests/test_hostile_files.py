@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import zarr
 
-from mdr_dask import cli, datasets
+from mdr_dask import cli
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, StoreError
+from mdr_dask.store import datasets
 
 HEAD = "name: a\nmodel: toy\n"
 HOSTILE = {

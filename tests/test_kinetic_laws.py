@@ -6,10 +6,12 @@ import json
 import numpy as np
 import pytest
 
-from mdr_dask import datasets, execute, load
+from mdr_dask import execute
+from mdr_dask.campaign import load
 from mdr_dask.cli import main
 from mdr_dask.fits import available as fits
 from mdr_dask.plots import available as plots
+from mdr_dask.store import datasets
 
 CAMPAIGN = """
 name: kinetics

@@ -28,7 +28,7 @@ def sensitivity(indices: xr.Dataset) -> Figure:
         unknown = xr.full_like(place, np.nan)
         axes.barh(place, indices[kind], THICK, color=style.COLOURS[k], label=LABELS[kind], alpha=0.85)
         along = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
-        drawing.points(axes, indices[kind], Mean(place, unknown, unknown), "black", "", kind, along)
+        drawing.points(axes, indices[kind], Mean(place, unknown, unknown), "black", "|", kind, along)
     axes.set_yticks(np.arange(len(inputs)), inputs)
     axes.invert_yaxis()
     axes.axvline(0, color="black", linewidth=0.8)

@@ -5,10 +5,12 @@ import io
 import numpy as np
 import pytest
 
-from mdr_dask import datasets, execute, load
+from mdr_dask import execute
+from mdr_dask.campaign import load
 from mdr_dask.errors import DataError
 from mdr_dask.plots import available, style
 from mdr_dask.plots.contact import contact_of
+from mdr_dask.store import datasets
 
 CAMPAIGN = """
 name: contact
