@@ -148,7 +148,7 @@ def test_a_client_without_the_credentials_is_refused_and_no_page_is_served_to_ot
             pages.extend(listening_beyond_this_machine())
             for address in (event.facts["worker"], event.facts["worker"].replace("tls", "tcp")):
                 with pytest.raises((OSError, TypeError, ValueError)):
-                    Client(address, timeout=2)
+                    Client(address, timeout=2, set_as_default=False)
 
     execute.run(toy.campaign(toy.axis("position", [1.0])), url, workers, lambda _: None, tell=look)
     assert [address[:16] for address in addresses] == ["tls://127.0.0.1:"]

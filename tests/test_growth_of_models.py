@@ -21,7 +21,7 @@ MODELS = {
     "fretting_wear": (
         """
 parameters: {{indenter: {{shape: parabola, radius: 10 mm}}, wear_rule: fast, contact_modulus: 115 GPa,
-             shear_modulus: 90 GPa, friction: 0.6, amplitude: 1 um, normal_force: 50 N, hardness: 2 GPa,
+             effective_shear_modulus: 90 GPa, friction: 0.6, amplitude: 1 um, normal_force: 50 N, hardness: 2 GPa,
              wear_coefficient: 1e-4, cycles: {values}, wear_coefficient_scatter: {other}}}
 outputs: [wear_volume, contact_radius]
 """,

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name, value in make(tmp_path, blocks=10, pause=0.2).items():
+    for name, value in make(tmp_path, blocks=60, pause=0.25).items():
         monkeypatch.setenv(name, value)
     return tmp_path
 
@@ -69,7 +69,7 @@ def told_by(driver, stop):
     told = []
     for line in driver.stderr:
         told.append(line.strip())
-        if re.search(r"[1-9]\d* of 20 results", line) and stop.poll() is None:
+        if re.search(r"[1-9]\d* of 120 results", line) and stop.poll() is None:
             stop.kill()
     assert driver.wait() == 2
     return told

@@ -51,7 +51,7 @@ WRONG = [
     ("show STORE friction", "no output 'friction' in this study (did you mean 'friction_coefficient'?)"),
     ("show STORE --series x", "no series 'x'; known: none, leave --series out"),
     ("show STORE --statistic median", "'median' is not one of 'mean'"),
-    ("show STORE --select speed=1", "no axis 'speed' in this study (known: normal_force, velocity"),
+    ("show STORE --select speed=1", "no axis 'speed' in this study (did you mean 'velocity'?)"),
     ("show STORE --select velocity=1kg", "velocity: expected a velocity (such as '1 mm/s'), got '1kg'"),
     ("show STORE --select velocity=2..1", "no velocity 2 m/s .. 1 m/s: it has the values 0.001 m/s, 0.01 m/s"),
     ("show STORE --units velocity=N", "velocity: expected a velocity (such as '1 mm/s'), got 'N'"),

@@ -213,7 +213,7 @@ def test_bad_parameters(given: dict[str, Any], message: str) -> None:
 
 def test_estimate_grows_with_cases_and_accuracy() -> None:
     one = block(("central_film",))
-    many = block(("central_film",), {"load_parameter": np.full(10, 1e-5)})
+    many = block(("central_film",), {"load_parameter": np.geomspace(1e-5, 1e-4, 10)})
     assert seconds(many) == pytest.approx(10 * seconds(one))
 
 

@@ -33,7 +33,7 @@ DIMENSIONAL_FILM = (
     "  viscosity: 0.1 Pa s\n"
 )
 FRETTING = (
-    "  indenter: {shape: parabola, radius: 10 mm}\n  contact_modulus: 115 GPa\n  shear_modulus: 90 GPa\n"
+    "  indenter: {shape: parabola, radius: 10 mm}\n  contact_modulus: 115 GPa\n  effective_shear_modulus: 90 GPa\n"
     "  friction: 0.6\n  normal_force: 50 N\n"
     "  hardness: 2 GPa\n  wear_coefficient: 1e-4\n  cycles: {geometric: [1e3, 1e5, 4]}\n"
 )
