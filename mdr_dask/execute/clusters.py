@@ -22,8 +22,12 @@ from mdr_dask.execute.crew import Crew
 from mdr_dask.execute.events import Event, Tell
 from mdr_dask.execute.resources import Resources
 
-#: Run in every worker process: Ctrl-C reaches them too, and it is for the driver to end them.
-IGNORE_INTERRUPTS = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+#: Run in every worker process: Ctrl-C reaches them too, but the driver ends them, and tells what there is to tell.
+QUIET = """\
+import logging, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+logging.getLogger("distributed").setLevel(logging.CRITICAL)
+"""
 #: Seconds that a scheduler is given to answer.
 SCHEDULER_PATIENCE = 10
 #: Where the page of a scheduler is served: to this machine alone.
@@ -112,7 +116,7 @@ def _connected(address: str) -> Client:
 
 def _local(workers: int | None) -> dict[str, Any]:
     """Return what a cluster file of worker processes on this machine would say."""
-    arguments = {"n_workers": workers, "threads_per_worker": 1, "preload": [IGNORE_INTERRUPTS]}
+    arguments = {"n_workers": workers, "threads_per_worker": 1, "preload": [QUIET]}
     return {"class": "distributed.LocalCluster", "arguments": arguments}
 
 
