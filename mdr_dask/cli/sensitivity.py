@@ -48,7 +48,6 @@ def sensitivity(
     """
     from mdr_dask import store as room
     from mdr_dask.fits.sensitivity import sobol_indices
-    from mdr_dask.plots.sensitivity import sensitivity as drawn
     from mdr_dask.questions import selection
 
     require_suffix(figure, FIGURES)
@@ -63,6 +62,8 @@ def sensitivity(
     for sentence in _sentences(found.attrs):
         tell(sentence)
     if figure is not None:
+        from mdr_dask.plots.sensitivity import sensitivity as drawn
+
         save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))
         tell(str(figure))
 
