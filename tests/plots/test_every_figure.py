@@ -254,6 +254,9 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
     assert len(data), "nothing of the store is drawn"
     known = expected(name, groups)
     assert mismatches(data, known).empty
+    if name in OF_CASES:
+        axes = [{axis["name"] for axis in each.attrs["axes"]} for each in groups.values()]
+        assert data[sorted(set.intersection(*axes) - {*table.attrs["held"]})].notna().all(axis=None)
     told = style.left_out(figure)
     if len(groups) == 1 and not re.search("values of|series|cases|not known", told) and name not in PARTLY:
         assert mismatches(known, data).empty
@@ -267,6 +270,8 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         figure.savefig(io.BytesIO(), dpi=20)
 
 
+#: Figures with a point for each case, whose tables have all its parameters.
+OF_CASES = {"collapse", "indenter", "film_formula", "film_regimes", "regime_map", "jump_law", "relaxation_rate"}
 #: Figures of which a store may hold rows that they do not draw: of one moment, of one case, or as another quantity.
 PARTLY = {
     "collapse",
