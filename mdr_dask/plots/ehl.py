@@ -98,10 +98,11 @@ def _measured(data: xr.Dataset, output: str, factor: float = 1.0) -> drawing.Mea
 def _draw_one_profile(figure: Figure, axes: Axes, family: curves.Family) -> None:
     right = axes.twinx()
     deepest = []
+    pressure = style.quantity("pressure", family.curves[0].data["pressure"])
     for curve in family.curves:
         case = curve.data
         pressed = curve._replace(line="--", marker="", label="")
-        drawing.curve(axes, pressed, case["position"], _measured(case, "pressure", 1e-9))
+        drawing.curve(axes, pressed, case["position"], _measured(case, "pressure", pressure.factor))
         label = curve.label or ("film" if len(family.curves) == 1 else "")
         drawing.curve(
             right, curve._replace(line="-", marker="", label=label), case["position"], _measured(case, "film")
@@ -110,17 +111,19 @@ def _draw_one_profile(figure: Figure, axes: Axes, family: curves.Family) -> None
     if len(family.curves) == 1:
         case = family.curves[0].data
         W = float(groups_of(case.coords.get)[0])
-        p0 = 2e-9 * float(case["contact_modulus"]) * np.sqrt(W / (2 * np.pi))
+        p0 = 2 * pressure.factor * float(case["contact_modulus"]) * np.sqrt(W / (2 * np.pi))
         X = np.linspace(-1, 1, 201)
         dry = p0 * np.sqrt(1 - X**2)
         drawing.law(axes, X, dry, ":", of=case, color="0.5", label="dry contact (Hertz)")
-        style.legend(axes)
     right.set_ylim(0, 3 * max(deepest) if max(deepest) > 0 else 1)
     axes.set_ylim(bottom=0)
     axes.set_xlabel("position $x/a$ (flow to the right)")
-    axes.set_ylabel(style.with_unit("pressure $p$ (dashed)", "GPa"))
+    axes.set_ylabel(style.with_unit("pressure $p$ (dashed)", pressure.unit))
     right.set_ylabel("film $h/R$ (full line)")
-    curves.finish(figure, right, family)
+    if family.bar:
+        curves.colour_bar(figure, [axes], *family.bar)
+    curves.name_varying(right, family)
+    style.legend_below(axes, right)
 
 
 def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -279,7 +282,7 @@ def _draw_along(
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 label = curve.label if output == outputs[0] else ""
                 drawn = curve._replace(line=line if family.joined else "", marker=marker, label=label)
-                drawing.curve(axes, drawn, curve.data[along], _measured(curve.data, output))
+                drawing.curve(axes, drawn, style.shown(along, curve.data[along]), _measured(curve.data, output))
         if len(outputs) > 1:
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 axes.plot([], [], line, marker=marker, ms=3, color="k", label=output.replace("_", " "))

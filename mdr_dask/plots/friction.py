@@ -45,20 +45,20 @@ def is_plane(data: xr.Dataset) -> bool:
 
 
 class _Shown(NamedTuple):
-    """What stands on the axes: friction over what, velocity times what, and both labels."""
+    """What stands on the axes: friction times what, the velocity in which form, and both labels."""
 
     factor: Any
-    speed: Any
+    velocity: Any
     x: str
     y: str
 
 
 def _in_units(data: xr.Dataset) -> _Shown:
     """Return friction against velocity: over the rms slope where that of the spectrum is known."""
-    x = style.label("velocity", data["velocity"])
+    x, velocity = style.label("velocity", data["velocity"]), style.shown("velocity", data["velocity"])
     if on_generated_line(data):
-        return _Shown(1 / spectral_slope(data), 1.0, x, r"$\mu$ / rms slope")
-    return _Shown(1.0, 1.0, x, r"coefficient of friction $\mu$")
+        return _Shown(1 / spectral_slope(data), velocity, x, r"$\mu$ / rms slope")
+    return _Shown(1.0, velocity, x, r"coefficient of friction $\mu$")
 
 
 def _in_numbers(data: xr.Dataset) -> _Shown:
@@ -68,13 +68,13 @@ def _in_numbers(data: xr.Dataset) -> _Shown:
     _, _, number = numbers(data)
     factor = 1 / (np.sqrt(2) * spectral_slope(data))
     x = r"velocity number $v \tau \nabla z / (\sqrt{2} h)$"
-    return _Shown(factor, number / data["velocity"], x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
+    return _Shown(factor, number, x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
 
 
 def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, drawing.Mean]:
     """Return where the points of a curve lie and their means."""
     shown = how(data)
-    return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
+    return shown.velocity, curves.measured(data, MU, shown.factor)
 
 
 def slim(data: xr.Dataset) -> xr.Dataset:
@@ -177,12 +177,11 @@ def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def _draw_regions(axes: Axes, curve: drawing.Curve) -> None:
     data = curve.data
-    velocity, value = _mean_of(data, _in_units)
-    drawing.curve(axes, curve._replace(label="simulated"), velocity, value)
+    speeds, value = _mean_of(data, _in_units)
+    drawing.curve(axes, curve._replace(label="simulated"), speeds, value)
     _, force, number = numbers(data)
-    scale = _number(number / data["velocity"])
+    scale = _number(number / speeds)
     exponent = _number(laws.alpha(data["hurst"]))
-    speeds = np.asarray(velocity.values)
     fine = np.geomspace(speeds.min(), speeds.max(), 300)
     law = np.sqrt(2) * laws.interpolation(_number(force), fine * scale, exponent, laws.BETA)
     drawing.law(axes, fine, law, "k--", of=data, lw=1, label=LAW)

@@ -78,7 +78,7 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
     family = curves.family(found, names[0], "velocity", ("normal_force", "hurst"))
     for axes, output, label in zip(panels, names, (BEFORE, JUMP), strict=True):
         for curve in family.curves:
-            speed = curve.data["velocity"]
+            speed = style.shown("velocity", curve.data["velocity"])
             drawing.curve(axes, curve, speed, _constants(curve.data, output), bars=True)
             if output == names[1] and family.joined:
                 law = jump_law(np.asarray(curve.data[names[0]].values), LAW)
