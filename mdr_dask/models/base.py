@@ -35,6 +35,11 @@ Ways = tuple[tuple[str, ...], ...]
 _WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
+def unquoted(value: Any) -> Any:
+    """Return a whole number in quotes as the number, anything else as it is."""
+    return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
+
+
 class Parameters(BaseModel):
     """Base of every parameter set: SI numbers, checked bounds, no unknown key, immutable.
 
@@ -53,12 +58,7 @@ class Parameters(BaseModel):
         """Read a whole number in quotes as the number, for a number with a unit is a string too."""
         if not isinstance(data, dict):
             return data
-        quoted = {
-            key: int(data[key])
-            for key in data.keys() & _whole_fields(cls)
-            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
-        }
-        return {**data, **quoted} if quoted else data
+        return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
 
     def require_one_way(self) -> None:
         """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
