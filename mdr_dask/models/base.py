@@ -18,7 +18,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationIn
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.tables import described
+from mdr_dask.tables import decoded, described
 
 
 class Status(IntEnum):
@@ -155,15 +155,9 @@ class DataFile(BaseModel):
         Raises
         ------
         DataError
-            If the file has changed since the campaign was read, or is no text in UTF-8.
+            If the file has changed since the campaign was read, or is no text.
         """
-        content = self.read_bytes()
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise DataError(
-                f"{self.path}: expected text in UTF-8, got byte {content[error.start]:#x} at {error.start}"
-            ) from None
+        return decoded(self.read_bytes(), self.path)
 
     def notes(self) -> tuple[str, ...]:
         """Return columns and ranges of a table, as it has them; nothing of any other file."""
