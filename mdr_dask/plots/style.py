@@ -289,5 +289,5 @@ def legend_below(*axes_of: Axes) -> None:
     found = [axes.get_legend_handles_labels() for axes in axes_of]
     handles, labels = ([each for one in found for each in one[k]] for k in range(2))
     if handles:
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
+        place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
         axes_of[-1].legend(handles, labels, ncols=min(3, len(handles)), fontsize="x-small", **place)
