@@ -49,20 +49,24 @@ def dense(places: FloatArray, pieces: int) -> FloatArray:
     return grid
 
 
-def cubic(places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int) -> FloatArray:
-    """Return monotone cubics through values along an axis, at other places."""
+def cubic(
+    places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
+) -> FloatArray:
+    """Return monotone cubics through values along an axis, at other places, on the scale of the axis or another."""
     from scipy.interpolate import PchipInterpolator
 
-    scale = Scale.of(places)
+    scale = scale or Scale.of(places)
     curve = PchipInterpolator(scale.of_values(places), values, axis=axis)
     return np.asarray(curve(scale.of_values(wanted)))
 
 
-def linear(places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int) -> FloatArray:
-    """Return straight lines through values along an axis, at other places."""
+def linear(
+    places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
+) -> FloatArray:
+    """Return straight lines through values along an axis, at other places; scale as in `cubic`."""
     from scipy.interpolate import make_interp_spline
 
-    scale = Scale.of(places)
+    scale = scale or Scale.of(places)
     return np.asarray(make_interp_spline(scale.of_values(places), values, k=1, axis=axis)(scale.of_values(wanted)))
 
 
