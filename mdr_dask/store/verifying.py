@@ -21,6 +21,7 @@ from mdr_dask.store.files import CLAIMS, LAYOUT, bytes_of, group_name, listed, r
 from mdr_dask.store.layout import group_document
 from mdr_dask.store.records import digest, folder, lines, name_of, opened
 from mdr_dask.store.runners import at_work
+from mdr_dask.store.seals import read_seal, seal_name
 from mdr_dask.store.sound import is_root_sound, unsound_files
 from mdr_dask.store.study import attributes
 
@@ -162,6 +163,7 @@ def inspect(url: str) -> Inspection:
         found.notes.append("a run was stopped while it laid the study out; the next one goes on")
     known = {"zarr.json"}
     for group in found.groups:
+        known |= _check_seal(url, group, found, present)
         known |= _check_layout(url, group, found, present)
         known |= _check_blocks(url, group, found, present)
     for name in sorted(present - known):
@@ -245,6 +247,14 @@ def _attributes(root: Mapping[str, Any], series: str) -> dict[str, Any]:
     if not series:
         return dict(root.get("attributes", {}))
     return dict(root.get("consolidated_metadata", {}).get("metadata", {}).get(series, {}).get("attributes", {}))
+
+
+def _check_seal(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
+    """Check that a seal is what was written, whatever it says; return its file."""
+    name = seal_name(group.series)
+    if name in present and read_seal(url, group.series) is None:
+        found.findings.append(Finding("damaged", name, "the seal of what was read before"))
+    return {name}
 
 
 def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
