@@ -23,7 +23,7 @@ from mdr_dask.store.records import digest, folder, lines, name_of, opened
 from mdr_dask.store.runners import at_work
 from mdr_dask.store.seals import read_seal, seal_name
 from mdr_dask.store.sound import is_root_sound, unsound_files
-from mdr_dask.store.study import attributes
+from mdr_dask.store.study import attributes, document
 
 #: How the names of files end that were set aside.
 ASIDE = ".aside"
@@ -192,7 +192,7 @@ def _series_of_copy(name: str) -> str:
 def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
     """Return the root's metadata as they stand; nothing if they cannot be read at all."""
     content = read_bytes(url, "zarr.json")
-    copies = bool(groups_laid_out(url))
+    copies = [copy for name in groups_laid_out(url) if (copy := read_copy(url, name))]
     if content is None:
         if not copies:
             attributes(url)  # says what is there instead
@@ -203,6 +203,11 @@ def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
         if not copies or "mdr_dask_layout" in root["attributes"]:
             attributes(url)
         _series_of_root(root)
+    except StoreError:
+        if not copies or any(copy.study["mdr_dask_layout"] > LAYOUT for copy in copies):
+            raise
+        found.findings.append(Finding("damaged", "zarr.json", "not what was laid out"))
+        return {}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         if not copies:
             raise StoreError(
@@ -293,6 +298,7 @@ def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) 
 def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
     """Return what Zarr has to say of an array, or of one of its blocks, that cannot be read."""
     try:
+        document(url)
         array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
         if block is None:
             array[...]
