@@ -287,7 +287,8 @@ def legend(axes: Axes, heading: str = "") -> None:
 def legend_below(*axes_of: Axes) -> None:
     """Draw one legend for all axes of a panel under it, where curves leave no room."""
     found = [axes.get_legend_handles_labels() for axes in axes_of]
-    handles, labels = ([each for one in found for each in one[k]] for k in range(2))
+    handles = [each for one, _ in found for each in one]
+    labels = [each for _, one in found for each in one]
     if handles:
         place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
         axes_of[-1].legend(handles, labels, ncols=min(3, len(handles)), fontsize="x-small", **place)
