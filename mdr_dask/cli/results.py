@@ -55,17 +55,15 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     from mdr_dask import store as room
     from mdr_dask.questions import progress
 
-    def count() -> list[dict[str, Any]]:
-        return [progress.counts(store, name, dataset) for name, dataset in room.datasets(store).items()]
-
     if watch:
         if failures or messages or form:
             raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, count)
+        watching.watch(store, lambda: [progress.counts(look) for look in progress.looks(store)])
         return
     if not (failures or messages):
-        _print_counts(count(), watching.at_work(store), form)
-        room.require_sound(store, room.series_names(store))
+        looks = progress.looks(store)
+        _print_counts([progress.counts(look) for look in looks], watching.at_work(store), form)
+        room.require_blocks(looks)
         return
     found = [message for name, data in room.datasets(store).items() for message in progress.messages(store, name, data)]
     if not messages:

@@ -11,6 +11,8 @@ from mdr_dask.models.base import Status
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mdr_dask.store import Look
+
 
 class Group(NamedTuple):
     """Messages of one series that say the same.
@@ -32,11 +34,17 @@ class Group(NamedTuple):
     cases: str
 
 
-def counts(url: str, series: str, dataset: xr.Dataset) -> dict[str, Any]:
+def looks(url: str) -> list[Look]:
+    """Look at every series of a study, at no chunk but those of the ledger."""
+    names = store.series_names(url)
+    store.require_laid_out(url, names)
+    return [store.look(url, name) for name in names]
+
+
+def counts(look: Look) -> dict[str, Any]:
     """Return the name of a series, the number of its results, and how many of them are in each state."""
-    states = store.ledger(url, series, dataset["status"].shape, recorded=True)
-    counted = {state.name.lower(): int((states == state).sum()) for state in Status}
-    return {"series": series or "-", "results": states.size, **counted}
+    counted = {state.name.lower(): int((look.status == state).sum()) for state in Status}
+    return {"series": look.chunks.series or "-", "results": look.status.size, **counted}
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -108,7 +108,7 @@ def read_study(url: str) -> Study:
 def _read(url: str) -> Study:
     held, groups = store.attributes(url), store.datasets(url)
     model = str(held["model"])
-    counted = [progress.counts(url, name, data) for name, data in groups.items()]
+    counted = [progress.counts(look) for look in progress.looks(url)]
     records = [record for name in groups for record in store.records(url, name)]
     drawn = list(
         drawn_of(
