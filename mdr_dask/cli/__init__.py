@@ -16,7 +16,6 @@ from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
 from mdr_dask.cli.publishing import report
-from mdr_dask.cli.results import aggregate, fit, show, status
 from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
@@ -61,6 +60,8 @@ for command in (
     plot,
     figures,
     report,
+    serve,
+    publish,
     master_curve,
     surface,
     schema,
