@@ -15,7 +15,7 @@ from mdr_dask.cli.fitting import fit
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
-from mdr_dask.cli.publishing import report
+from mdr_dask.cli.publishing import publish, report, serve
 from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
