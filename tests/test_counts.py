@@ -27,7 +27,7 @@ COMMANDS = {
     "schema -o schema.json": (HEAVY, set()),
     "init sliding_friction -o mine.yaml": (HEAVY - {"pint", "dask", "scipy"}, set()),
     "check study.yaml": ({"distributed", "matplotlib", "pandas", "xarray", "zarr"}, set()),
-    "run done.yaml --dry-run": (STORE - {"pint", "dask", "scipy"}, {"status"}),
+    "run done.yaml --dry-run": ({"distributed", "matplotlib"}, {"status"}),
     "status study.zarr": (STORE - {"pint", "dask", "scipy"}, ...),
     "show study.zarr friction_coefficient": (
         STORE - {"pint", "dask", "scipy"},

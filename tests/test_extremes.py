@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 from schemes import on_line
 
 from mdr_dask.errors import FitError
@@ -52,16 +53,17 @@ DECADES = st.floats(-7.5, 7.5)
 @settings(max_examples=100, deadline=None)
 @given(**ANY_LINE, deborah=DECADES, force=DECADES, scheme=st.sampled_from(SCHEMES), power=st.integers(-60, 60))
 def test_sliding_knows_no_unit_of_height(kind, nodes, seed, deborah, force, scheme, power):
-    """Heights and load by a power of two: every number by that power, bit by bit; and so the friction over slope."""
+    """Heights and load by a power of two: every number by that power, bit by bit; time steps end with a secant."""
     height, slope = line(kind, nodes, seed)
     case, load, factor = np.array([10**deborah]), np.array([10**force]), 2.0**power
     one = on_line(height, slope, case, load, scheme)
     two = on_line(height * factor, slope * factor, case, load * factor, scheme)
     assert one.status[0] == two.status[0]
     if one.status[0] == Outcome.CONVERGED:
-        assert two.drag[0] == one.drag[0] * factor**2
-        assert two.depth[0] == one.depth[0] * factor
-        assert two.contact_fraction[0] == one.contact_fraction[0]
+        rounding = 1e-7 if scheme == "backward_euler" else 0.0
+        assert two.drag[0] == pytest.approx(one.drag[0] * factor**2, rel=rounding, abs=0)
+        assert two.depth[0] == pytest.approx(one.depth[0] * factor, rel=rounding, abs=0)
+        assert two.contact_fraction[0] == pytest.approx(one.contact_fraction[0], rel=rounding, abs=0)
 
 
 @settings(max_examples=60, deadline=None)
@@ -208,8 +210,8 @@ def test_master_curves_know_no_unit_and_no_order(seed, points, noise, along, up,
     assert np.all(np.abs(two.vertical - one.vertical) <= close)
 
 
-#: Numbers that no campaign file lets through, and the ends of what a number can be.
-POISON = np.array([np.nan, np.inf, -np.inf, -1.0, 0.0, 5e-324, 1e-300, 1e300, 1.7e308])
+#: What is no number or of the wrong sign, of which campaigns let little through, and the ends of what a number can be.
+POISON = np.array([np.nan, np.inf, -np.inf, -1.0, 0.0, 5e-324, 1e-300, 1.001e-30, 1e-15, 1e15, 0.999e30, 1e300])
 LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
 KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
 STEEL = {"contact_modulus": 115e9, "effective_shear_modulus": 90e9, "friction": 0.6, "hardness": 2e9}
@@ -248,6 +250,14 @@ POISONED = [
 ]
 
 
+def is_valid(model, parameters):
+    """Return whether a campaign lets parameters through."""
+    with contextlib.suppress(ValidationError):
+        model.parameters.model_validate(parameters)
+        return True
+    return False
+
+
 @pytest.mark.parametrize(("row", "name"), POISONED)
 def test_a_number_that_is_none_fails_alone_and_says_why(row, name):
     """Among good cases of one block, for every number of every model; finite values where it is done after all."""
@@ -255,8 +265,11 @@ def test_a_number_that_is_none_fails_alone_and_says_why(row, name):
     model = load(model_name)
     outputs = model.with_companions([output.name for output in model.outputs if output.default])
     good = float(parameters[name])
-    column = np.concatenate([[good], POISON, [good]])
     kept = model.parameters.model_validate(parameters)
+    let_through = [value for value in POISON.tolist() if is_valid(model, parameters | {name: value})]
+    assert np.all(np.isfinite(let_through))
+    assert max(np.abs(let_through), default=0) < 1e30
+    column = np.array([good, *let_through, good])
     found = model.compute(Block(kept, {name: column}, column.size, (1,), 5, outputs))
     alone = model.compute(Block(kept, {name: column[:1]}, 1, (1,), 5, outputs))
     assert alone.status[0, 0] == Status.DONE
@@ -268,7 +281,6 @@ def test_a_number_that_is_none_fails_alone_and_says_why(row, name):
             assert found.messages.get((k, 0)), f"{name} = {value:g} is told as {found.status[k, 0]} without a reason"
             assert all(np.all(np.isnan(found.values[output][k])) for output in outputs)
             continue
-        assert not value < 0, f"{name} = {value:g} was computed"
         for output in outputs:
             if not output.endswith("_error"):
                 assert np.all(np.isfinite(found.values[output][k])), f"{output} at {name} = {value:g}"
