@@ -3,6 +3,5 @@
 from mdr_dask.campaign.definition import Axis, Campaign, Replication, Series, Tolerance
 from mdr_dask.campaign.read import load, loads
 from mdr_dask.campaign.schema import json_schema
-from mdr_dask.campaign.written import written_units
 
-__all__ = ["Axis", "Campaign", "Replication", "Series", "Tolerance", "json_schema", "load", "loads", "written_units"]
+__all__ = ["Axis", "Campaign", "Replication", "Series", "Tolerance", "json_schema", "load", "loads"]

@@ -20,7 +20,7 @@ START = 2.0
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
     """Yield what a campaign was understood to be: the axes of each series, what its data hold, what it costs."""
     from mdr_dask import models
-    from mdr_dask.campaign import written_units
+    from mdr_dask.campaign.written import written_units
 
     written = written_units(campaign.text)
     for series in campaign.series:

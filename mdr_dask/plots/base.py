@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from mdr_dask.campaign import written_units
+from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
 from mdr_dask.store import is_damage
