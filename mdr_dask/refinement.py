@@ -281,7 +281,7 @@ def _missed(places: FloatArray, lines: Mean, tolerance: Tolerance) -> FloatArray
         rows = np.flatnonzero((known == pattern).all(axis=1))
         columns = np.flatnonzero(pattern)
         whole = np.flatnonzero(np.diff(columns) == 1)
-        found = _departure(places[columns], lines.groups[:, rows][..., columns], lines.error[rows][:, columns])
+        found = departure(places[columns], lines.groups[:, rows][..., columns], lines.error[rows][:, columns])
         size = np.abs(lines.groups[0, rows][:, columns]).max(axis=-1, keepdims=True)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * size)
         ratio = np.divide(found, allowed, out=np.zeros_like(found), where=allowed > 0).max(axis=0)
@@ -289,7 +289,7 @@ def _missed(places: FloatArray, lines: Mean, tolerance: Tolerance) -> FloatArray
     return worst
 
 
-def _departure(places: FloatArray, groups: FloatArray, error: FloatArray) -> FloatArray:
+def departure(places: FloatArray, groups: FloatArray, error: FloatArray) -> FloatArray:
     """Return by how much interpolation may err in each space, less what scatter and grid explain.
 
     Parameters
@@ -310,7 +310,7 @@ def _departure(places: FloatArray, groups: FloatArray, error: FloatArray) -> Flo
 
     seen = np.concatenate([_beside_spline(places, groups), _left_out(places, groups)], axis=-2)
     count = max(len(groups) - 1, 1)
-    around = seen[1:] - seen[1:].mean(axis=0)
+    around = seen[1:] - seen[0]
     scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=0))  # jackknife; none for one realisation
     widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
     found: FloatArray = (np.abs(seen[0]) - widely * scatter).max(axis=-2)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Parameters
+from mdr_dask.models.base import DataFile, Parameters
 
 _DIGITS = 14
 
@@ -169,6 +169,8 @@ class Campaign:
         The file as written, and where it was read.
     remarks : tuple of str
         Questions about bare numbers that are far from usual, each with its place.
+    measured : DataFile or None
+        Table of measurements of an output, for the fit ``calibration``.
     """
 
     name: str
@@ -183,3 +185,4 @@ class Campaign:
     text: str
     source: str
     remarks: tuple[str, ...] = ()
+    measured: DataFile | None = None

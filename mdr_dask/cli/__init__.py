@@ -11,10 +11,11 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures, plot
+from mdr_dask.cli.fitting import fit
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
-from mdr_dask.cli.results import aggregate, fit, show, status
+from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify

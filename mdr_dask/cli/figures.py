@@ -237,14 +237,17 @@ def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: di
 
 
 def save(figure: Figure, path: Path, origin: Mapping[str, str]) -> None:
-    """Write a figure, and its data beside it."""
+    """Write a figure, and its data beside it; a table there that is of no figure is not written over."""
     from mdr_dask.plots import table
 
+    beside = path.with_suffix(".csv")
+    if isinstance(figure, table.Drawn) and beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
+        raise click.UsageError(f"{beside}: a table that is of no figure stands there; give the figure another name")
     with writing(path):
         table.save_picture(figure, path)
     if isinstance(figure, table.Drawn):
-        with writing(path.with_suffix(".csv")):
-            table.save_table(figure, path.with_suffix(".csv"), origin)
+        with writing(beside):
+            table.save_table(figure, beside, origin)
 
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:

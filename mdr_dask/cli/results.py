@@ -1,4 +1,4 @@
-"""Commands around a store: status, show, aggregate, fit."""
+"""Commands around a store: status, show, aggregate."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ import click
 from mdr_dask.cli import watching
 from mdr_dask.cli.answers import check_target, print_answer, write_answer
 from mdr_dask.cli.options import (
-    csv_option,
     json_option,
-    limit_option,
     question_options,
-    series_option,
     tell,
 )
-from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_intervals
+from mdr_dask.cli.printing import print_json, print_rows, printable
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from mdr_dask.store import Look
 
 
 class Reading(click.Command):
@@ -57,17 +56,15 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     """
     from mdr_dask import store as room
 
-    def count() -> list[dict[str, Any]]:
-        return [_count(store, name, dataset) for name, dataset in room.datasets(store).items()]
-
     if watch:
         if failures or messages or form:
             raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, count)
+        watching.watch(store, lambda: [_count(look) for look in _looks(store)])
         return
     if not (failures or messages):
-        _print_counts(count(), watching.at_work(store), form)
-        room.require_sound(store, room.series_names(store))
+        looks = _looks(store)
+        _print_counts([_count(look) for look in looks], watching.at_work(store), form)
+        room.require_blocks(looks)
         return
     groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
@@ -94,13 +91,19 @@ def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | No
         click.echo(f"at work: {', '.join(at_work)}")
 
 
-def _count(store: str, name: str, dataset: xr.Dataset) -> dict[str, Any]:
+def _looks(store: str) -> list[Look]:
     from mdr_dask import store as room
+
+    names = room.series_names(store)
+    room.require_laid_out(store, names)
+    return [room.look(store, name) for name in names]
+
+
+def _count(look: Look) -> dict[str, Any]:
     from mdr_dask.models.base import Status
 
-    states = room.ledger(store, name, dataset["status"].shape, recorded=True)
-    counts = {state.name.lower(): int((states == state).sum()) for state in Status}
-    return {"series": name or "-", "results": states.size, **counts}
+    counts = {state.name.lower(): int((look.status == state).sum()) for state in Status}
+    return {"series": look.chunks.series or "-", "results": look.status.size, **counts}
 
 
 def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
@@ -210,46 +213,6 @@ def _answer(
     answer = table(dataset, question, 0, tell)
     rows = write_answer(answer, output)
     click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
-
-
-@click.command(cls=Reading)
-@store_argument
-@click.argument("names", nargs=-1)
-@series_option
-@limit_option
-@json_option
-@csv_option
-def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form: str | None) -> None:
-    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
-
-    \b
-    mdr-dask fit results/friction_force.zarr
-    mdr-dask fit results/friction_force.zarr zone_one --json
-    """
-    from mdr_dask import fits as room
-    from mdr_dask import store as stores
-    from mdr_dask.questions import selection
-
-    model = stores.attributes(store)["model"]
-    known = room.available(model)
-    if not names:
-        list_names(model, {name: law.summary for name, law in known.items()})
-        return
-    require_known(names, list(known), f"law for {model}")
-    groups = stores.datasets(store)
-    if series is not None:
-        groups = {series: selection.group(groups, series)}
-    for name in names:
-        found = known[name].results(groups)
-        for group, result in found.items():
-            if (len(names) > 1 or len(found) > 1) and not form:
-                click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
-            rows, units = table(result)
-            if not form:
-                rows, units = with_intervals(rows, units)
-            print_rows(
-                [{"series": group, **row} for row in rows] if group and form else rows, units, form or "table", limit
-            )
 
 
 def list_names(model: str, summaries: dict[str, str]) -> None:

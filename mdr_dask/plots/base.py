@@ -25,7 +25,7 @@ class Plot:
     name : str
         As in ``mdr-dask plot STORE NAME``.
     models : tuple of str
-        Models whose stores it understands.
+        Models whose stores it understands; none stands for all models.
     summary : str
         One line: what against what, and the figure of the thesis it redraws.
     draw : callable, mapping of str to Dataset -> Figure

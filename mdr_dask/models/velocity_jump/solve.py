@@ -258,7 +258,7 @@ def seconds(block: Block[VelocityJump]) -> float:
         nodes = group.setting.roughness.points * group.oversampling
         if isinstance(group, _Marched):
             errors = any(f"{name}_error" in block.outputs for name in TRANSIENT)
-            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS) * (1.4 if errors else 1.0)
+            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS) * (1.7 if errors else 1.0)
             total += group._different()[0].size * per_case * len(block.realisations)
         else:
             total += nodes**2 * SECONDS_STEPPED * len(block.realisations)
