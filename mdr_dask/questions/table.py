@@ -109,8 +109,8 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     total = prod(maker.sizes.values())
     if question.where and not question.group_by:
         return Table(maker.frames(ROWS), units, None)
-    total = None if maker.has_spared else total
-    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < prod(maker.sizes.values())), units, total)
+    known = None if maker.has_spared else total
+    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, known)
 
 
 class _Maker:
