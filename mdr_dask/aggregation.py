@@ -17,7 +17,7 @@ from mdr_dask import bootstrap
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 #: Results that one step of the bootstrap holds in memory.
-_STEP = 2**22
+_STEP = 2**20
 
 
 @dataclass(frozen=True)

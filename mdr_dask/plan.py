@@ -108,10 +108,10 @@ class Template:
 
     @property
     def files(self) -> int:
-        """Number of files of the group when it is done: chunks, coordinates, metadata, and records by the thousand."""
+        """Number of files of the group when it is done: chunks, coordinates, metadata, and what is told of them."""
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
         coordinates = len(self.series.axes) + 1 + len(self.extra) + _numbers(self.series.parameters.model_dump())
-        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * coordinates + arrays + 2
+        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * coordinates + arrays + 3
 
     def block_indices(self) -> Iterator[BlockIndex]:
         """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""

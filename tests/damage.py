@@ -32,6 +32,7 @@ KINDS = {
     "record": "**/status/records/*.jsonl",
     "loose record": "**/status/records/*.json",
     "copy of the layout": "**/status/layout.json",
+    "seal": "**/status/seal.json",
 }
 
 
@@ -163,6 +164,8 @@ def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: ra
     shutil.rmtree(work, ignore_errors=True)
     shutil.copytree(sound, work)
     url = str(work)
+    for name in store.series_names(url) * draw.randrange(2):  # else it is a copy, of which nothing is sealed
+        store.seal(url, name)
     files = sorted(work.glob(KINDS[kind]))
     if not files:
         return None
@@ -176,7 +179,7 @@ def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: ra
     try:
         found = store.verify(url)
         unfinished = (kind, harm) == ("ledger", "delete") and found.notes  # as if a task had been killed
-        verified = bool(found.findings or unfinished)
+        verified = bool(found.findings or unfinished or (kind, harm) == ("seal", "delete"))  # then nothing is lost
     except StoreError:
         verified = True
 

@@ -159,7 +159,7 @@ def test_aggregates_are_written_to_files(filled, tmp_path, capsys, suffix):
     if suffix == ".csv":
         assert "friction_coefficient_mean" in path.read_text().splitlines()[0]
     else:
-        opened = xr.open_dataset(path, engine="scipy" if suffix == ".nc" else "zarr")
+        opened = xr.open_dataset(path, engine="h5netcdf" if suffix == ".nc" else "zarr")
         assert opened.friction_coefficient_interval.sizes["bound"] == 2
         opened.close()
 

@@ -118,7 +118,7 @@ def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys)
         "velocity > 5 mm/s",
     ]
     assert "variables over" in told(capsys, "show", study, *arguments, "-o", str(path)).out
-    with xr.open_dataset(path, engine="scipy") as found:
+    with xr.open_dataset(path) as found:
         assert found.velocity.attrs["units"] == "km/h"
         assert found.load_number.dims == ("normal_force",)
         assert found.friction_coefficient_mean.isnull().sum() == 3 * 2

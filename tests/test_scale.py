@@ -14,7 +14,7 @@ from mdr_dask import store
 from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources, run
-from mdr_dask.store import blocks
+from mdr_dask.store import ledgers, sound
 from mdr_dask.store.records import opened, sealed
 
 
@@ -39,13 +39,13 @@ def plain(url):
 
 def test_the_ledger_is_that_of_zarr_and_each_different_chunk_is_decoded_once(url, monkeypatch):
     decoded = []
-    whole = blocks._LedgerChunks.decoded
+    whole = ledgers.Ledger.decoded
 
-    def counted(self):
+    def counted(self, *where):
         decoded.append(len(self.different))
-        return whole(self)
+        return whole(self, *where)
 
-    monkeypatch.setattr(blocks._LedgerChunks, "decoded", counted)
+    monkeypatch.setattr(ledgers.Ledger, "decoded", counted)
     expected = plain(url)
     assert np.array_equal(store.ledger(url, "", (13, 5)), expected)
     assert np.array_equal(store.ledger(url, "", (4, 2)), expected[:4, :2])
@@ -67,7 +67,7 @@ def test_status_names_a_chunk_of_the_ledger_that_belongs_elsewhere(url, capsys):
     shutil.copy(Path(url, "status/c/6/0"), Path(url, "status/c/2/1"))
     store.ledger(url, "", (13, 5))
     with pytest.raises(StoreError, match="status/c/2/1 is not what was written there"):
-        store.ledger(url, "", (13, 5), recorded=True)
+        store.require_sound(url, [""])
     assert main(["status", url]) == 2
     assert "status/c/2/1" in capsys.readouterr().err
 
@@ -77,6 +77,59 @@ def test_a_run_with_nothing_to_do_does_not_count_attempts(url, monkeypatch):
     campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
     progress = run(replace(campaign, replication=toy.Replication(5, 5, {})), url, Resources(), lambda _: None)
     assert (progress.kept, progress.blocks) == (65, 0)
+
+
+def test_what_is_sealed_is_not_read_again(url, monkeypatch):
+    assert store.look(url, "").is_sealed
+    read = []
+    for room in (ledgers, sound):
+        many = room.read_many
+        monkeypatch.setattr(
+            room, "read_many", lambda u, names, many=many: many(u, (read.append(n) or n for n in names))
+        )
+    monkeypatch.setattr(sound, "records", lambda *_: pytest.fail("read the records of a sealed study"))
+    assert np.array_equal(store.look(url, "").status, plain(url))
+    assert store.require_sound(url, [""])
+    assert [name for name in read if name.startswith(("height/c/", "status/c/"))] == []
+
+
+def swap_names(one, other):
+    aside = one.with_name("aside")
+    one.rename(aside)
+    other.rename(one)
+    aside.rename(other)
+
+
+@pytest.mark.parametrize("sealed", [True, False])
+@pytest.mark.parametrize("array", ["height", "status"])
+def test_chunks_that_change_their_places_are_named_however_many_there_are(url, array, sealed, monkeypatch):
+    monkeypatch.setattr(sound, "FEW", 3)
+    if not sealed:
+        Path(url, "status/seal.json").unlink()
+    swap_names(Path(url, array, "c/2/1"), Path(url, array, "c/6/0"))
+    if array == "status" or sealed:  # values of more blocks than a look reads are for `verify`
+        with pytest.raises(StoreError, match=f"{array}/c/2/1 is not what was written there"):
+            store.require_sound(url, [""])
+
+
+def test_a_copy_of_a_study_is_read_again_and_sealed_by_the_next_run(url, tmp_path):
+    copy = str(tmp_path / "copy.zarr")
+    shutil.copytree(url, copy)
+    assert not store.look(copy, "").is_sealed
+    assert np.array_equal(store.ledger(copy, "", (13, 5)), plain(url))
+    campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
+    run(replace(campaign, replication=toy.Replication(5, 5, {})), copy, Resources(), lambda _: None)
+    assert store.look(copy, "").is_sealed
+
+
+def test_a_seal_that_is_damaged_or_of_another_study_is_no_seal(url):
+    seal = Path(url, "status/seal.json")
+    content = seal.read_bytes()
+    for harm in (b"", content[:-3], content.replace(b'"series": ""', b'"series": "a"'), b"[]\n", b"{}\n"):
+        seal.write_bytes(harm)
+        assert not store.look(url, "").is_sealed
+        assert np.array_equal(store.ledger(url, "", (13, 5)), plain(url))
+        assert [(f.kind, f.name) for f in store.verify(url).findings] == [("damaged", "status/seal.json")]
 
 
 @pytest.mark.parametrize(("old", "new"), [(b'"attempt": 1', b'"attempt": 2'), (b'"digest": "', b'"digest": "0')])

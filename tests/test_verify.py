@@ -51,7 +51,7 @@ def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm):
 def test_the_command_lists_what_it_finds_and_mends_it(toy, url, capsys):
     run(small(toy), url)
     assert main(["verify", url]) == 0
-    assert f"{url}: 25 files, 2 blocks: no faults" in capsys.readouterr().out
+    assert f"{url}: 26 files, 2 blocks: no faults" in capsys.readouterr().out
     Path(url, "height/c/0/1").unlink()
     Path(url, "notes.txt").write_text("mine")
     assert main(["verify", url, "--json"]) == 1

@@ -2,7 +2,8 @@
 
 Blocks hold 100 results each; in one of a hundred blocks a case fails. A store is fabricated: two blocks are computed,
 and their chunks stand for all. Every command is a process of its own; its processor time, its time on the wall and its
-peak memory are those that the operating system tells.
+peak memory are those that the operating system tells. The cheap checks are those of `run` and `status`, timed inside a
+process; before the store is sealed they are those of a copy.
 """
 
 from __future__ import annotations
@@ -46,6 +47,21 @@ COMMANDS = {
     "run, finished": ("run", "many.yaml", "--quiet"),
     "status": ("status", "many.zarr"),
     "status --failures": ("status", "many.zarr", "--failures"),
+}
+
+
+#: One act inside a process of its own, timed without its start.
+ACT = """
+import sys, time
+from mdr_dask import execute, store
+start = time.process_time(), time.perf_counter()
+{act}
+print(time.process_time() - start[0], time.perf_counter() - start[1], 0)
+"""
+ACTS = {
+    "cheap checks of a copy": "store.require_sound('many.zarr', [''])",
+    "sealing it": "store.seal('many.zarr', '')",
+    "cheap checks": "store.require_sound('many.zarr', [''])",
 }
 
 
@@ -93,31 +109,35 @@ def fabricate(folder: Path, blocks: int) -> int:
     return rows * columns
 
 
-def measure(folder: Path, arguments: tuple[str, ...]) -> tuple[float, float, float]:
-    """Return processor seconds, seconds on the wall and peak memory in MB of a command."""
+def measure(folder: Path, program: tuple[str, ...], launcher: tuple[str, ...] = ()) -> tuple[float, float, float]:
+    """Return processor seconds, seconds on the wall and peak memory in MB of a program, as it or its launcher tells."""
     environment = {**os.environ, "PYTHONPATH": str(TESTS)}
-    program = [sys.executable, "-c", "import sys; from mdr_dask.cli import main; sys.exit(main())", *arguments]
-    launched = subprocess.run(
-        [sys.executable, "-S", "-c", LAUNCHER, *program], cwd=folder, env=environment, capture_output=True, text=True
-    )
-    if launched.returncode:
-        sys.exit(f"{' '.join(arguments)}: {launched.stderr}")
-    processors, wall, peak = map(float, launched.stdout.split())
+    command = [sys.executable, *launcher, *program]
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{' '.join(program)}: {done.stderr}")
+    processors, wall, peak = map(float, done.stdout.split()[-3:])
     return processors, wall, peak / 1000
 
 
 def main(*counts: int) -> None:
-    print("| blocks | results | files | command | processors | wall | peak memory |\n|---|---|---|---|---|---|---|")
+    print("| blocks | results | files | what | processors | wall | peak memory |\n|---|---|---|---|---|---|---|")
     for count in counts:
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch)
             blocks = fabricate(folder, count)
             found = sum(len(names) for *_, names in os.walk(folder / "many.zarr"))
-            for name, arguments in COMMANDS.items():
-                measure(folder, arguments)
-                processors, wall, memory = measure(folder, arguments)
+            acts = {name: (("-c", ACT.format(act=act)), ()) for name, act in ACTS.items()}
+            start = "import sys; from mdr_dask.cli import main; sys.exit(main())"
+            program = (sys.executable, "-c", start)
+            commands = {name: ((*program, *command), ("-S", "-c", LAUNCHER)) for name, command in COMMANDS.items()}
+            for name, (arguments, launcher) in (acts | commands).items():
+                if name in commands:
+                    measure(folder, arguments, launcher)  # for the caches of the disk
+                processors, wall, memory = measure(folder, arguments, launcher)
+                peak = f"{memory:.0f} MB" if memory else ""
                 sizes = f"{blocks} | {100 * blocks} | {found}"
-                print(f"| {sizes} | {name} | {processors:.2f} s | {wall:.2f} s | {memory:.0f} MB |", flush=True)
+                print(f"| {sizes} | {name} | {processors:.2f} s | {wall:.2f} s | {peak} |", flush=True)
 
 
 if __name__ == "__main__":

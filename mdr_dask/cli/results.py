@@ -24,6 +24,8 @@ from mdr_dask.cli.writing import writing
 if TYPE_CHECKING:
     import xarray as xr
 
+    from mdr_dask.store import Look
+
 
 class Reading(click.Command):
     """A command that reads a store, its first argument."""
@@ -57,17 +59,15 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     """
     from mdr_dask import store as room
 
-    def count() -> list[dict[str, Any]]:
-        return [_count(store, name, dataset) for name, dataset in room.datasets(store).items()]
-
     if watch:
         if failures or messages or form:
             raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, count)
+        watching.watch(store, lambda: [_count(look) for look in _looks(store)])
         return
     if not (failures or messages):
-        _print_counts(count(), watching.at_work(store), form)
-        room.require_sound(store, room.series_names(store))
+        looks = _looks(store)
+        _print_counts([_count(look) for look in looks], watching.at_work(store), form)
+        room.require_blocks(looks)
         return
     groups = room.datasets(store)
     found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
@@ -94,13 +94,19 @@ def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | No
         click.echo(f"at work: {', '.join(at_work)}")
 
 
-def _count(store: str, name: str, dataset: xr.Dataset) -> dict[str, Any]:
+def _looks(store: str) -> list[Look]:
     from mdr_dask import store as room
+
+    names = room.series_names(store)
+    room.require_laid_out(store, names)
+    return [room.look(store, name) for name in names]
+
+
+def _count(look: Look) -> dict[str, Any]:
     from mdr_dask.models.base import Status
 
-    states = room.ledger(store, name, dataset["status"].shape, recorded=True)
-    counts = {state.name.lower(): int((states == state).sum()) for state in Status}
-    return {"series": name or "-", "results": states.size, **counts}
+    counts = {state.name.lower(): int((look.status == state).sum()) for state in Status}
+    return {"series": look.chunks.series or "-", "results": look.status.size, **counts}
 
 
 def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:

@@ -100,25 +100,21 @@ def run(
     check(resources)  # what is refused leaves no lock behind
     _plan(campaign, url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
-        _require_sound(url)
+        sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
         job = _Job(campaign, url, hold, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
             progress = _run_rounds(job, execute)
-        _settle(job, progress)
+        _settle(job, progress, sealed)
         return progress
 
 
-def _require_sound(url: str) -> None:
-    """Refuse to go on with a store that cheap checks find damaged."""
-    if store.exists(url):
-        store.require_sound(url, store.series_names(url))
-
-
-def _settle(job: _Job, progress: Progress) -> None:
+def _settle(job: _Job, progress: Progress, sealed: bool) -> None:
     """Leave few files, and say what the last digits of the results may depend on if it is not the same for all."""
     names = store.series_names(job.url)
     for name in names:
         store.put_together(job.url, name)
+        if progress.blocks or not sealed:
+            store.seal(job.url, name)
     if progress.blocks:
         kinds = store.kinds(job.url, names)
         if len(kinds) > 1:

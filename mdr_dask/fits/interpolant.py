@@ -219,7 +219,7 @@ class Law:
     def __init__(self, path: str | Path) -> None:
         from scipy.interpolate import RegularGridInterpolator
 
-        with xr.open_dataset(path, engine="zarr" if str(path).endswith(".zarr") else "scipy") as opened:
+        with xr.open_dataset(path, engine="zarr" if str(path).endswith(".zarr") else None) as opened:
             self.table = opened.load()
         self.output = str(next(name for name, array in self.table.items() if "ancillary_variables" in array.attrs))
         value = self.table[self.output]

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
+#: Bytes of an array that are worked on at a time, by each core.
+PIECE = 2**20
+
+
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
     """Answer a question with arrays; cases that the condition leaves out are NaN.
 
@@ -30,7 +34,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     Returns
     -------
     Dataset
-        Statistics and the counts of states along ``state``, or single results and their ``status``.
+        Lazy: statistics and the counts of states along ``state``, or single results and their ``status``.
 
     Raises
     ------
@@ -45,6 +49,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)])
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])
     data = select(dataset[list(dict.fromkeys([*shown.data_vars, *used, STATUS]))], question.selections, tell)
+    data = _in_pieces(data)
     if question.group_by:
         kept = Columns(data).truth(question.where) if question.where else None
         data = averaged(data, question.group_by, kept)
@@ -59,3 +64,11 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
         found = aggregate(data[[*shown.data_vars]], question.statistics).assign({COUNTS: states})
         found = found.assign({CASES: data[CASES]} if CASES in data else {})
     return in_units(found.assign(numbers), question.units)
+
+
+def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
+    """Return lazy arrays whose pieces are small and hold all realisations."""
+    import dask
+
+    with dask.config.set({"array.chunk-size": PIECE}):
+        return dataset.chunk({dim: -1 if dim == "realisation" else "auto" for dim in dataset.sizes})

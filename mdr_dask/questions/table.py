@@ -10,6 +10,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdr_dask.aggregation import QUANTILES, aggregate
 from mdr_dask.errors import DataError
@@ -91,7 +92,8 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     Returns
     -------
     Table
-        Without an order asked for, rows are made while the frames are read, and memory does not grow with them.
+        Rows are made while the frames are read. Without an order asked for, memory does not grow with them; with one,
+        it holds the numbers of the columns.
 
     Raises
     ------
@@ -101,8 +103,8 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     maker = _Maker(dataset, question, tell)
     units = maker.units()
     if question.sort:
-        ordered = maker.ordered(limit)
-        return Table(iter([ordered[0]]), units, ordered[1])
+        order = maker.order()
+        return Table(maker.picked(order[: limit or None]), units, order.size)
     total = prod(maker.sizes.values())
     if question.where and not question.group_by:
         return Table(maker.frames(ROWS), units, None)
@@ -133,44 +135,49 @@ class _Maker:
 
     def units(self) -> dict[str, str]:
         """Return the units of the columns; whatever is wrong with the question is found here."""
-        rows = self._rows(dict.fromkeys(self._dims, slice(0, 1)))
+        rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
         return self._frame(rows)[1]
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
         """Yield the rows in the order of the axes, so many at a time or somewhat more."""
-        for rows in self._boxes(most, whole):
+        for _, rows in self._boxes(self._data, most, whole):
             if rows.sizes["row"]:
                 yield self._frame(rows)[0]
 
-    def ordered(self, limit: int) -> tuple[pd.DataFrame, int]:
-        """Return the first rows in the order asked for, all if there is no limit, and the number of all rows."""
-        import pandas as pd
+    def order(self) -> NDArray[np.intp]:
+        """Return the places of the rows among all rows, in the order asked for."""
+        question = self._question
+        named = {name for text in (question.where, *question.sort) if text for name in parse(text).names}
+        needs = self._data[[*needed(self._data, named), *({STATUS, COUNTS, CASES} & self._data.data_vars.keys())]]
+        found = [(places, *self._keys(rows)) for places, rows in self._boxes(needs, ROWS, whole=True)]
+        places, *keys = (np.concatenate(part) for part in zip(*found, strict=True))
+        ordered: NDArray[np.intp] = places[np.lexsort([_ranks(key) for key in reversed(keys)])]
+        return ordered
 
-        keys = [f" {number}" for number in range(len(self._question.sort))]  # no column is called so
-        best, total = pd.DataFrame(), 0
-        for rows in self._boxes(ROWS, whole=True):
-            total += rows.sizes["row"]
-            order = pd.DataFrame(dict(zip(keys, self._keys(rows), strict=True))).sort_values(keys, kind="stable")
-            order = order[:limit] if limit else order
-            frame, _ = self._frame(rows.isel(row=order.index.to_numpy()))
-            best = pd.concat([best, frame.assign(**{key: order[key].to_numpy() for key in keys})], ignore_index=True)
-            if limit:
-                best = best.sort_values(keys, kind="stable")[:limit]
-        return best.sort_values(keys, kind="stable").drop(columns=keys), total
+    def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
+        """Yield the rows at these places, in their order."""
+        data = self._data.load() if places.size > ROWS else self._data
+        for start in range(0, places.size, ROWS):
+            along = np.unravel_index(places[start : start + ROWS], tuple(self.sizes.values()))
+            at = {dim: ("row", index) for dim, index in zip(self._dims, along, strict=True)}
+            yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
-    def _boxes(self, most: int, whole: bool) -> Iterator[xr.Dataset]:
-        """Yield the rows that the condition keeps."""
-        if whole and self._data.nbytes <= WHOLE:
-            self._data = self._data.load()
-        chunks = next((array.encoding.get("chunks") for array in self._data.data_vars.values()), None) or ()
+    def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
+        """Yield the rows that the condition keeps, with their places among all rows."""
+        if whole and data.nbytes <= WHOLE:
+            data = data.load()
+        chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
+        before = 0
         for box in boxes(self.sizes, max(most, min(prod(chunks), ROWS) if whole else most), chunks):
-            rows = self._rows(box)
-            yield rows.isel(row=np.flatnonzero(self._kept(rows)))
+            rows = self._rows(data, box)
+            kept = np.flatnonzero(self._kept(rows))
+            yield before + kept, rows.isel(row=kept)
+            before += rows.sizes["row"]
 
-    def _rows(self, box: Mapping[str, slice]) -> xr.Dataset:
-        part = self._data.isel(dict(box))
+    def _rows(self, data: xr.Dataset, box: Mapping[str, slice]) -> xr.Dataset:
+        part = data.isel(dict(box))
         return (part.stack(row=self._dims, create_index=False) if self._dims else part.expand_dims("row")).load()
 
     def _kept(self, rows: xr.Dataset) -> Any:
@@ -212,6 +219,13 @@ class _Maker:
         units = {key: str(value.attrs.get("units", "1")) for key, value in flat.items()}
         size = rows.sizes["row"]
         return pd.DataFrame({key: np.broadcast_to(value.to_numpy(), size) for key, value in flat.items()}), units
+
+
+def _ranks(key: NDArray[Any]) -> NDArray[Any]:
+    """Return numbers in the order of a key: of words, their places in the alphabet."""
+    import pandas as pd
+
+    return pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:

@@ -5,16 +5,17 @@ for every parameter. The driver lays arrays out; a block is written by whoever c
 array, ``status`` last. Readers see consolidated metadata, which is replaced in one write.
 """
 
-from mdr_dask.store.blocks import Place, is_written, layout_mark, ledger, read_block, values, write_block
+from mdr_dask.store.blocks import Place, is_written, layout_mark, read_block, values, write_block
 from mdr_dask.store.files import absolute
 from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
+from mdr_dask.store.ledgers import ledger
 from mdr_dask.store.locks import Hold, holding, lock
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, put_together, record, records
 from mdr_dask.store.repairing import repair
 from mdr_dask.store.runners import Part, alone, at_work, beside, entrance
-from mdr_dask.store.sound import require_sound
+from mdr_dask.store.sound import Look, look, require_blocks, require_laid_out, require_sound, seal
 from mdr_dask.store.study import attributes, exists, is_study, series_names
 from mdr_dask.store.verifying import Finding, Inspection, verify
 
@@ -22,6 +23,7 @@ __all__ = [
     "Finding",
     "Hold",
     "Inspection",
+    "Look",
     "Part",
     "Place",
     "Stored",
@@ -43,6 +45,7 @@ __all__ = [
     "layout_mark",
     "ledger",
     "lock",
+    "look",
     "put_together",
     "read_block",
     "readable",
@@ -50,8 +53,11 @@ __all__ = [
     "record",
     "records",
     "repair",
+    "require_blocks",
+    "require_laid_out",
     "require_sound",
     "save",
+    "seal",
     "series_names",
     "values",
     "verify",

@@ -1,32 +1,27 @@
-"""Blocks and their ledger: what a task reads and writes."""
+"""Blocks: what a task reads and writes."""
 
 from __future__ import annotations
 
 import hashlib
-import json
-import math
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
-from operator import lt
 from typing import Any
 
 import numpy as np
 import zarr
 from numpy.typing import NDArray
 from zarr.abc.store import Store
-from zarr.core.buffer import Buffer, default_buffer_prototype
+from zarr.core.buffer import Buffer
 from zarr.storage import WrapperStore
 
 from mdr_dask.errors import StoreError
-from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.digests import Checked
-from mdr_dask.store.files import bytes_of, group_name, guarded, read_bytes, read_many, write_stages
+from mdr_dask.store.files import bytes_of, group_name, guarded, read_bytes, write_stages
 from mdr_dask.store.locks import Hold, holding
-from mdr_dask.store.records import digest, name_of, records, sealed
+from mdr_dask.store.records import digest, name_of, sealed
 from mdr_dask.store.study import document
 
 
@@ -114,98 +109,6 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
         return {name: np.array(arrays[name][place.region]) for name in outputs}, np.array(
             arrays["status"][place.region]
         )
-
-
-def ledger(url: str, series: str, shape: tuple[int, ...], recorded: bool = False) -> NDArray[np.int8]:
-    """Return the ``status`` array of a group as it stands now, with what the shape has beyond it as missing.
-
-    Another part may have grown it beyond the shape meanwhile. If asked, it is refused unless it is as `recorded`.
-    """
-    found = np.full(shape, Status.MISSING, dtype=np.int8)
-    if document(url, series) is None:
-        return found
-    chunks = _recorded(url, series) if recorded else _ledger_chunks(url, series)
-    try:
-        with guarded(url, "reading status"):
-            status = chunks.decoded()
-    except StoreError as error:
-        raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
-    common = tuple(map(slice, np.minimum(shape, status.shape)))
-    found[common] = status[common]
-    return found
-
-
-def _recorded(url: str, series: str) -> _LedgerChunks:
-    """Read the ledger, again if a block is not as recorded: a run may write, and put records together, meanwhile."""
-    fault: BlockIndex = ()
-    for _ in range(2):
-        chunks = _ledger_chunks(url, series)
-        found = chunks.unrecorded(records(url, series))
-        if found is None:
-            return chunks
-        fault = found
-    name = group_name(series, f"status/c/{'/'.join(map(str, fault))}")
-    what = f"damaged, {name} is not what was written there"
-    raise StoreError(f"{url}: {what}; 'mdr-dask verify {url}' names all that is")
-
-
-@dataclass(frozen=True)
-class _LedgerChunks:
-    """The ledger as it is stored: each different chunk once, since those of blocks that are done are alike.
-
-    Parameters
-    ----------
-    document : mapping
-        Metadata of the array.
-    different : tuple of bytes or None
-        Each different content; the first is that of chunks that are not there.
-    which : int array, shape of the grid of blocks
-        The content of every chunk, by its number.
-    """
-
-    document: Mapping[str, Any]
-    different: tuple[bytes | None, ...]
-    which: NDArray[np.intp]
-
-    def unrecorded(self, told: Iterable[Mapping[str, Any]]) -> BlockIndex | None:
-        """Return a block whose chunk is none that its records tell of, None if there is no such block."""
-        digests = [None if content is None else digest(content) for content in self.different]
-        is_told, is_written = np.zeros((2, *self.which.shape), dtype=bool)
-        for record in told:
-            block, written = tuple(record["block"]), record.get("chunks", {}).get("status")
-            if written is not None and len(block) == self.which.ndim and all(map(lt, block, self.which.shape)):
-                is_told[block] = True
-                is_written[block] |= digests[self.which[block]] == written
-        faults = np.argwhere(is_told & ~is_written & (self.which > 0))
-        return tuple(faults[0].tolist()) if len(faults) else None
-
-    def decoded(self) -> NDArray[np.int8]:
-        """Return the array; the contents are decoded together, as chunks of one array, one behind the other."""
-        shape, chunk = self.document["shape"], self.document["chunk_grid"]["configuration"]["chunk_shape"]
-        buffer = default_buffer_prototype().buffer
-        below = "/0" * (len(chunk) - 1)
-        files = {f"c/{i}{below}": buffer.from_bytes(one) for i, one in enumerate(self.different) if one is not None}
-        stacked = [len(self.different) * chunk[0], *chunk[1:]]
-        files["zarr.json"] = buffer.from_bytes(json.dumps({**self.document, "shape": stacked}).encode())
-        array: Any = zarr.open_array(zarr.storage.MemoryStore(files), mode="r", zarr_format=3)
-        parts = np.asarray(array[...]).reshape(-1, *chunk)[self.which]
-        dims = self.which.ndim
-        beside = parts.transpose([axis for dim in range(dims) for axis in (dim, dims + dim)])
-        whole = beside.reshape([count * length for count, length in zip(self.which.shape, chunk, strict=True)])
-        return np.asarray(whole[tuple(map(slice, shape))])
-
-
-def _ledger_chunks(url: str, series: str) -> _LedgerChunks:
-    """Read all chunks of the ledger of a group that there is."""
-    held = document(url, series) or {}
-    status = held["consolidated_metadata"]["metadata"]["status"]
-    lengths = status["chunk_grid"]["configuration"]["chunk_shape"]
-    grid = [math.ceil(size / length) for size, length in zip(status["shape"], lengths, strict=True)]
-    prefix = group_name(series, "status/c/")
-    names = (prefix + "/".join(place) for place in product(*([str(i) for i in range(count)] for count in grid)))
-    different: dict[bytes | None, int] = {None: 0}
-    which = [different.setdefault(content, len(different)) for _, content in read_many(url, names)]
-    return _LedgerChunks(status, tuple(different), np.array(which, dtype=np.intp).reshape(grid))
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:

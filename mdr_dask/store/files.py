@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import hashlib
 import itertools
 import json
 import os
@@ -29,6 +30,8 @@ CLAIMS = ".claims/"
 #: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 
+#: Stamps of files that are not there, and of empty ones; and the largest of others.
+GONE, EMPTY, MOST = 0, 1, 2**63 - 1
 #: Requests to a server at a time.
 AT_ONCE = 64
 
@@ -131,24 +134,31 @@ def _content(file: str) -> bytes | None:
     return content if len(content) == size else Path(file).read_bytes()
 
 
-def sizes(url: str, files: Iterable[str]) -> Iterator[tuple[str, int | None]]:
-    """Yield name and number of bytes of files in order, None for those that are gone."""
+def stamps(url: str, files: Iterable[str]) -> Iterator[int]:
+    """Yield a number for each file, in order, that differs after the file was written: `GONE` and `EMPTY` say so."""
     path = local(url)
     if path is None:
         store = bytes_of(url)
         with guarded(url, "listing it"):
+            store.fs.invalidate_cache()
             found = sync(store.fs._find(store.path, detail=True))
-        known = {name.removeprefix(f"{store.path}/"): told["size"] for name, told in found.items()}
-        yield from ((name, known.get(name)) for name in files)
+        known = {name.removeprefix(f"{store.path}/"): _stamp_of(told) for name, told in found.items()}
+        yield from (known.get(name, GONE) for name in files)
         return
     with guarded(url, "looking at its files"):
         for name in files:
             try:
-                size = os.stat(f"{path}/{name}").st_size  # noqa: PTH116 (of a hundred thousand, a Path each is slow)
-            except FileNotFoundError:
-                yield name, None
+                told = os.stat(f"{path}/{name}")  # noqa: PTH116 (of a hundred thousand, a Path each is slow)
+            except (FileNotFoundError, NotADirectoryError):
+                yield GONE
             else:
-                yield name, size
+                yield hash((told.st_ino, told.st_size, told.st_mtime_ns)) & MOST if told.st_size else EMPTY
+
+
+def _stamp_of(told: Mapping[str, Any]) -> int:
+    """Return a number for what a server says of an object, its ETag and the time of writing among it."""
+    text = repr(sorted(told.items())).encode()
+    return int.from_bytes(hashlib.blake2b(text, digest_size=7).digest()) if told.get("size") else EMPTY
 
 
 def write_bytes(url: str, name: str, content: bytes) -> None:

@@ -94,7 +94,7 @@ def _check_axes(url: str, dataset: xr.Dataset) -> None:
 
 
 def save(dataset: xr.Dataset, path: Path) -> None:
-    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``; lists in attrs become text, which is all that netCDF holds."""
+    """Write a Dataset to ``FILE.zarr`` or ``FILE.nc``; a lazy one piece by piece, lists in attrs as text."""
     plain = dataset.copy()
     plain.attrs = {
         name: value if isinstance(value, str | int | float) else json.dumps(value)
@@ -102,7 +102,7 @@ def save(dataset: xr.Dataset, path: Path) -> None:
         if value is not None and name != "mdr_dask_layout"  # no study that could be run on
     }
     if path.suffix == ".nc":
-        plain.to_netcdf(path, engine="scipy")
+        plain.to_netcdf(path, engine="h5netcdf")
         return
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Consolidated metadata is currently not part")

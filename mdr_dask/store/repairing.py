@@ -11,6 +11,7 @@ from mdr_dask.store.files import read_bytes, read_json, read_many, remove, write
 from mdr_dask.store.layout import OF_SERIES, group_document
 from mdr_dask.store.records import folder, lines, opened
 from mdr_dask.store.runners import alone
+from mdr_dask.store.seals import seal_name
 from mdr_dask.store.sound import unsound_files
 from mdr_dask.store.verifying import ASIDE, Group, Inspection, inspect
 
@@ -36,6 +37,7 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
                 remove(url, [group.chunk(name, block) for name in group.data])  # the ledger first
             _set_aside_records(url, group)
             _set_aside(url, group.strangers)
+            remove(url, [seal_name(group.series)])  # the next run seals what it has looked at
         return found, inspect(url)
 
 

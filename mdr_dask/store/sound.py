@@ -5,29 +5,153 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.errors import StoreError
-from mdr_dask.models.base import Status
 from mdr_dask.plan import BlockIndex
-from mdr_dask.store.blocks import ledger
 from mdr_dask.store.copies import Copy, copy_name, read_copy, root_of
 from mdr_dask.store.digests import allowed, histories
-from mdr_dask.store.files import ROOT, group_name, read_many, sizes
+from mdr_dask.store.files import EMPTY, GONE, ROOT, read_many, write_stages
+from mdr_dask.store.ledgers import Ledger, done_blocks, read_ledger
 from mdr_dask.store.records import digest, records
+from mdr_dask.store.seals import Chunks, Seal, read_seal
 from mdr_dask.store.study import document
 
-#: Groups of at most so many chunks, and so many bytes, are read whole: that is cheap.
+#: A look reads at most so many chunks of values that no seal knows, and so many bytes of them: that is cheap.
 FEW, SMALL = 2000, 2**26
+#: Bytes that are read at most to seal them, at the end of a run.
+SEALED = 2**30
 #: Most faults that a message names.
 NAMED = 3
 
 
-def require_sound(url: str, series: Sequence[str]) -> None:
-    """Refuse a study that the cheap checks find damaged.
+@dataclass(frozen=True)
+class Look:
+    """What a look at a group finds: the stamps of all its chunks, and the ledger.
+
+    Parameters
+    ----------
+    url : str
+        Path or URL of the store.
+    held : mapping
+        Metadata of the group.
+    chunks : Chunks
+        Where its chunks lie.
+    seal : Seal
+        What was known before.
+    stamps : mapping of str to int64 array, shape of the grid of blocks
+        Of every array, the ledger first.
+    ledger : Ledger
+        What is in the ledger.
+    """
+
+    url: str
+    held: Mapping[str, Any]
+    chunks: Chunks
+    seal: Seal
+    stamps: Mapping[str, NDArray[np.int64]]
+    ledger: Ledger
+
+    @cached_property
+    def status(self) -> NDArray[np.int8]:
+        """The ledger as an array."""
+        return self.ledger.decoded(self.url, self.held)
+
+    @cached_property
+    def unsealed(self) -> dict[str, NDArray[np.bool_]]:
+        """Which chunks of each array are there and have not the stamp of the seal."""
+        return {name: (stamps > EMPTY) & ~self._same(name) for name, stamps in self.stamps.items()}
+
+    def _same(self, array: str) -> NDArray[np.bool_]:
+        return np.asarray(self.stamps[array] == self.seal.known(array, self.chunks.grid))
+
+    @property
+    def has_digests(self) -> bool:
+        """Whether its records can say what was written; those of version 0.1 wrote no chunks of nothing but nan."""
+        return bool(self.held["attributes"]["mdr_dask_layout"] > 1)
+
+    @property
+    def is_sealed(self) -> bool:
+        """Whether nothing has to be read to know that every chunk is what was written."""
+        return not (self.has_digests and any(unsealed.any() for unsealed in self.unsealed.values()))
+
+    def faults(self) -> Iterator[str]:
+        """Yield what is wrong with blocks in the ledger: chunks that are gone, empty, or not what was written."""
+        if not self.has_digests:
+            return
+        done = done_blocks(self.status, self.chunks.lengths)
+        outputs = list(self.stamps)[1:]
+        for array in outputs:
+            for block in _blocks(done & (self.stamps[array] <= EMPTY)):
+                what = "missing" if self.stamps[array][block] == GONE else "empty"
+                yield f"{self.chunks.name(array, block)} is {what}"
+        asked = {array: self.unsealed[array] & done for array in outputs}
+        if sum(map(np.count_nonzero, asked.values())) > FEW:
+            asked = {}
+        for array, block, is_sound in self.compared({"status": self.unsealed["status"], **asked}, SMALL):
+            if not is_sound:
+                yield f"{self.chunks.name(array, block)} is not what was written there"
+
+    def compared(self, asked: Mapping[str, NDArray[np.bool_]], most: int) -> Iterator[tuple[str, BlockIndex, bool]]:
+        """Yield array and block of chunks, and whether each is what records tell, until so many bytes were read."""
+        if not any(mask.any() for mask in asked.values()):
+            return
+        history = histories(records(self.url, self.chunks.series))
+        ledger = self.ledger.digests
+        for array, mask in asked.items():
+            blocks = _blocks(mask)
+            names = [self.chunks.name(array, block) for block in blocks]
+            held = map(ledger.__getitem__, self.ledger.which[mask])
+            for block, content in zip(blocks, held if array == "status" else self._read(names, most), strict=False):
+                attempts = history.get(block, ())
+                if array == "status":
+                    expected = {attempt["status"] for attempt in attempts if "status" in attempt}
+                else:
+                    expected = allowed(attempts, ledger[self.ledger.which[block]], array)
+                yield array, block, not expected or content in expected
+
+    def _read(self, names: Iterable[str], most: int) -> Iterator[str]:
+        """Yield the digests of files, until so many bytes were read."""
+        for _, content in read_many(self.url, names):
+            yield digest(content or b"")
+            most -= len(content or b"")
+            if most < 0:
+                return
+
+
+def _blocks(mask: NDArray[np.bool_]) -> list[BlockIndex]:
+    return [tuple(block) for block in np.argwhere(mask).tolist()]
+
+
+def look(url: str, series: str) -> Look:
+    """Look at a group of a study: at the stamp of each chunk, and at the ledger as far as no seal knows it."""
+    held = document(url, series) or {}
+    chunks = Chunks.of(series, held)
+    seal = read_seal(url, series) or Seal.nothing(series, chunks.grid)
+    stamps = {array: chunks.stamps(url, array) for array in chunks.further}
+    return Look(url, held, chunks, seal, stamps, read_ledger(url, chunks, seal, stamps["status"]))
+
+
+def seal(url: str, series: str) -> None:
+    """Read what no seal knows of a group, if it is not too much, and seal what is as it was written."""
+    found = look(url, series)
+    if found.is_sealed:
+        return
+    stamps = {array: np.where(found._same(array), known, 0) for array, known in found.stamps.items()}
+    for array, block, is_sound in found.compared(found.unsealed, SEALED):
+        if is_sound:
+            stamps[array][block] = found.stamps[array][block]
+    ledger = found.ledger.only(stamps["status"] != GONE)
+    write_stages(url, [dict([Seal(found.seal.series, stamps, ledger.different, ledger.which).file()])])
+
+
+def require_sound(url: str, series: Sequence[str]) -> bool:
+    """Refuse a study that the cheap checks find damaged; return whether all of it is sealed.
 
     Raises
     ------
@@ -35,11 +159,22 @@ def require_sound(url: str, series: Sequence[str]) -> None:
         If it is; the first faults are named.
     """
     require_laid_out(url, series)
-    for name in series:
-        chunks = _chunks(url, name)
-        _refuse(url, (f"{chunk} is {what}" for chunk, what in _lacking(url, chunks)))
-        if len(chunks) <= FEW:
-            _refuse(url, (f"{chunk} is not what was written there" for chunk in _changed(url, name, chunks)))
+    looks = [look(url, name) for name in series]
+    require_blocks(looks)
+    return all(found.is_sealed for found in looks)
+
+
+def require_blocks(looks: Iterable[Look]) -> None:
+    """Refuse a study of which a look has found damage; what changes meanwhile is looked at again.
+
+    Raises
+    ------
+    StoreError
+        If a second look finds it too; the first faults are named.
+    """
+    for found in looks:
+        if any(found.faults()):
+            _refuse(found.url, look(found.url, found.chunks.series).faults())
 
 
 def require_laid_out(url: str, series: Sequence[str]) -> None:
@@ -107,54 +242,3 @@ def is_root_sound(root: dict[str, Any], copies: list[Copy]) -> bool:
         )
     except (KeyError, TypeError, AttributeError):
         return False
-
-
-def _chunks(url: str, series: str) -> dict[str, tuple[str, BlockIndex]]:
-    """Return the chunks, with array and block, that the ledger says there are: those of blocks with cases done."""
-    held = document(url, series) or {}
-    if held["attributes"]["mdr_dask_layout"] == 1:  # then chunks of nothing but nan were not written
-        return {}
-    arrays = held["consolidated_metadata"]["metadata"]
-    status = arrays["status"]
-    states = ledger(url, series, tuple(status["shape"]))
-    blocks = done_blocks(states, status["chunk_grid"]["configuration"]["chunk_shape"])
-    found: dict[str, tuple[str, BlockIndex]] = {}
-    for name in held["attributes"]["outputs"]:
-        prefix = group_name(series, f"{name}/c/")
-        further = "/0" * (len(arrays[name]["shape"]) - blocks.ndim)
-        for block in np.argwhere(blocks).tolist():
-            found[f"{prefix}{'/'.join(map(str, block))}{further}"] = name, tuple(block)
-    return found
-
-
-def _lacking(url: str, chunks: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield the chunks that are gone or empty."""
-    for name, size in sizes(url, chunks):
-        if not size:
-            yield name, "missing" if size is None else "empty"
-
-
-def _changed(url: str, series: str, chunks: Mapping[str, tuple[str, BlockIndex]]) -> Iterator[str]:
-    """Yield the chunks that are not what was written, if they are small together."""
-    if sum(size or 0 for _, size in sizes(url, chunks)) > SMALL:
-        return
-    history = histories(records(url, series))
-    ledgers = {block: group_name(series, f"status/c/{'/'.join(map(str, block))}") for _, block in chunks.values()}
-    parts = dict(zip(ledgers, (content for _, content in read_many(url, ledgers.values())), strict=True))
-    for block, name in ledgers.items():
-        written = {attempt["status"] for attempt in history.get(block, ()) if "status" in attempt}
-        if written and digest(parts[block] or b"") not in written:
-            yield name
-    for (chunk, (name, block)), (_, content) in zip(chunks.items(), read_many(url, chunks), strict=True):
-        expected = allowed(history.get(block, ()), digest(parts[block] or b""), name)
-        if expected and digest(content or b"") not in expected:
-            yield chunk
-
-
-def done_blocks(status: NDArray[np.int8], chunks: Sequence[int]) -> NDArray[np.bool_]:
-    """Return which blocks have a case that is done."""
-    done = status == Status.DONE
-    for axis, length in enumerate(chunks):
-        if done.shape[axis]:
-            done = np.logical_or.reduceat(done, range(0, done.shape[axis], length), axis=axis)
-    return np.asarray(done)

@@ -21,8 +21,9 @@ from mdr_dask.store.files import CLAIMS, LAYOUT, bytes_of, group_name, listed, r
 from mdr_dask.store.layout import group_document
 from mdr_dask.store.records import digest, folder, lines, name_of, opened
 from mdr_dask.store.runners import at_work
+from mdr_dask.store.seals import read_seal, seal_name
 from mdr_dask.store.sound import is_root_sound, unsound_files
-from mdr_dask.store.study import attributes
+from mdr_dask.store.study import attributes, document
 
 #: How the names of files end that were set aside.
 ASIDE = ".aside"
@@ -162,6 +163,7 @@ def inspect(url: str) -> Inspection:
         found.notes.append("a run was stopped while it laid the study out; the next one goes on")
     known = {"zarr.json"}
     for group in found.groups:
+        known |= _check_seal(url, group, found, present)
         known |= _check_layout(url, group, found, present)
         known |= _check_blocks(url, group, found, present)
     for name in sorted(present - known):
@@ -190,7 +192,7 @@ def _series_of_copy(name: str) -> str:
 def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
     """Return the root's metadata as they stand; nothing if they cannot be read at all."""
     content = read_bytes(url, "zarr.json")
-    copies = bool(groups_laid_out(url))
+    copies = [copy for name in groups_laid_out(url) if (copy := read_copy(url, name))]
     if content is None:
         if not copies:
             attributes(url)  # says what is there instead
@@ -201,6 +203,11 @@ def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
         if not copies or "mdr_dask_layout" in root["attributes"]:
             attributes(url)
         _series_of_root(root)
+    except StoreError:
+        if not copies or any(copy.study["mdr_dask_layout"] > LAYOUT for copy in copies):
+            raise
+        found.findings.append(Finding("damaged", "zarr.json", "not what was laid out"))
+        return {}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         if not copies:
             raise StoreError(
@@ -247,6 +254,14 @@ def _attributes(root: Mapping[str, Any], series: str) -> dict[str, Any]:
     return dict(root.get("consolidated_metadata", {}).get("metadata", {}).get(series, {}).get("attributes", {}))
 
 
+def _check_seal(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
+    """Check that a seal is what was written, whatever it says; return its file."""
+    name = seal_name(group.series)
+    if name in present and read_seal(url, group.series) is None:
+        found.findings.append(Finding("damaged", name, "the seal of what was read before"))
+    return {name}
+
+
 def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) -> set[str]:
     """Check metadata and coordinates; return the files that belong to them."""
     if group.copy is not None:
@@ -283,6 +298,7 @@ def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) 
 def _reading(url: str, path: str, block: BlockIndex | None = None) -> str | None:
     """Return what Zarr has to say of an array, or of one of its blocks, that cannot be read."""
     try:
+        document(url)
         array: Any = zarr.open_group(bytes_of(url), mode="r", use_consolidated=True, zarr_format=3)[path]
         if block is None:
             array[...]

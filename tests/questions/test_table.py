@@ -135,6 +135,23 @@ def test_orders_put_what_is_not_there_last(study, limit, most, monkeypatch):
     assert found["velocity"][3] == 1.0
 
 
+def test_an_order_of_all_rows_comes_in_frames(study, monkeypatch):
+    monkeypatch.setattr(room, "ROWS", 5)
+    frames = list(table(study, Question(sort=("velocity",)), tell=silent).frames)
+    assert [len(frame) for frame in frames] == [5, 5, 2]
+    assert pd.concat(frames)["velocity"].is_monotonic_increasing
+
+
+def test_arrays_are_made_piece_by_piece(study, monkeypatch):
+    question = Question(columns=("load_number",), outputs=("friction_coefficient",), where="velocity < 0.5")
+    plain = labelled(study, question)
+    monkeypatch.setattr("mdr_dask.questions.labelled.PIECE", 64)
+    lazy = labelled(study, question)
+    assert lazy.friction_coefficient_mean.data.npartitions > 2
+    assert all(array.chunks for array in lazy.filter_by_attrs(units="1").data_vars.values() if array.ndim > 1)
+    xr.testing.assert_identical(lazy.compute(), plain.compute())
+
+
 def test_groups_of_complete_realisations_are_plain_means_over_cases(study):
     whole = study.isel(normal_force=[1, 2], velocity=slice(1, None))
     found = rows(whole, outputs=("friction_coefficient",), group_by=("velocity",))
