@@ -104,7 +104,7 @@ def interpolated(force, velocity):
 
 @BOTH
 def test_interpolation(lines, scatter):
-    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter, studies=150)})
+    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter, studies=200)})
     assert coverage(found, "alpha", 0.35) >= LEAST
     assert coverage(found, "beta", 1.5) >= LEAST
     assert judged(found, "yes") >= LEAST
