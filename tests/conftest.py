@@ -2,8 +2,9 @@ import hypothesis
 import pytest
 import toy as toy_model
 
-# the same examples every time; `--hypothesis-profile=default` looks for new ones
-hypothesis.settings.register_profile("repeatable", derandomize=True)
+# the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("repeatable")
 
 
