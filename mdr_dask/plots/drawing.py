@@ -85,8 +85,9 @@ def _coordinates(values: Any) -> dict[str, xr.DataArray]:
     """Return the parameters of every point of an array, each in its shape."""
     if not isinstance(values, xr.DataArray):
         return {}
+    shape = dict(values.sizes)
     return {
-        str(name): coord.broadcast_like(values).transpose(*values.dims).assign_attrs(coord.attrs)
+        str(name): xr.DataArray(coord.variable.set_dims(shape).transpose(*shape), attrs=coord.attrs)
         for name, coord in values.coords.items()
     }
 
