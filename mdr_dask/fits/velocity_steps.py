@@ -132,7 +132,7 @@ def _fitted(trace: Trace, lengths: FloatArray) -> _Linear:
     state = trace.state(lengths)
     columns = np.stack([np.ones_like(state), np.broadcast_to(trace.logarithm, state.shape), state], axis=-1)
     normal = np.swapaxes(columns, -1, -2) @ columns
-    spreads = np.linalg.pinv(normal, hermitian=True)
+    spreads: FloatArray = np.linalg.pinv(normal, hermitian=True).astype(np.float64)
     constants = (spreads @ (np.swapaxes(columns, -1, -2) @ trace.friction[:, None]))[..., 0]
     left = trace.friction - (columns @ constants[..., None])[..., 0]
     return _Linear(constants, spreads, (left**2).sum(axis=-1))
@@ -187,7 +187,7 @@ def rate_and_state(trace: Trace) -> xr.Dataset:
 def _independent(trace: Trace, fit: _Linear, lengths: FloatArray) -> float:
     """Return how many rows there are that know nothing of each other, from how residuals go along with the next."""
     left = _left(trace, fit, lengths)
-    along = float(left[1:] @ left[:-1] / max(left @ left, 1e-300))
+    along = float(left[1:] @ left[:-1]) / max(float(left @ left), 1e-300)
     number = left.size
     return number * (1 - along) / (1 + along) if along > 2 / np.sqrt(number) else float(number)
 
@@ -202,7 +202,7 @@ def _left(trace: Trace, fit: _Linear, lengths: FloatArray) -> FloatArray:
 
 def _interval(fit: _Linear, weights: FloatArray, parts: FloatArray, number: float) -> FloatArray:
     """Return median and ends of intervals of a linear combination, from Student's t for each slip length."""
-    freedom: float = max(number - 3, 1.0)
+    freedom = float(np.maximum(number - 3, 1.0))
     middle = fit.constants @ parts
     scatter = fit.squares / freedom
     width = np.sqrt(np.maximum(scatter * np.einsum("i,kij,j->k", parts, fit.spreads, parts), 1e-30))
@@ -212,8 +212,8 @@ def _interval(fit: _Linear, weights: FloatArray, parts: FloatArray, number: floa
     def below(value: float, wanted: float) -> float:
         return float(share @ stdtr(freedom, (value - middle) / width)) - wanted
 
-    ends = middle.min() - 60 * width.max(), middle.max() + 60 * width.max()
-    return np.array([brentq(below, *ends, args=(wanted,)) for wanted in SHARES])
+    low, high = float(middle.min() - 60 * width.max()), float(middle.max() + 60 * width.max())
+    return np.array([brentq(below, low, high, args=(wanted,)) for wanted in SHARES])
 
 
 def _dataset(trace: Trace, found: Mapping[str, FloatArray], left: FloatArray, is_open: bool) -> xr.Dataset:
