@@ -18,9 +18,10 @@ def friction(length, scatter, rng):
     """The closed solution of the slip law behind each of the two steps, apart from the recursion of the fit."""
     slip, decade = np.concatenate([[0.0], np.cumsum(np.diff(TIME) * VELOCITY[1:])]), np.log(10)
     up, down = (np.flatnonzero(np.diff(VELOCITY))[k] for k in (0, 1))
-    state = np.where(slip > slip[up], -decade * (1 - np.exp(-(slip - slip[up]) / length)), 0.0)
+    since = np.maximum(slip - slip[up], 0.0), np.maximum(slip - slip[down], 0.0)
+    state = -decade * (1 - np.exp(-since[0] / length))
     last = -decade * (1 - np.exp(-(slip[down] - slip[up]) / length))
-    state = np.where(slip > slip[down], last * np.exp(-(slip - slip[down]) / length), state)
+    state = np.where(slip > slip[down], last * np.exp(-since[1] / length), state)
     steady = 0.62 + TRUE["direct_effect"] * np.log(VELOCITY / VELOCITY[0]) + TRUE["evolution_effect"] * state
     return steady + scatter * rng.normal(size=TIME.size)
 
