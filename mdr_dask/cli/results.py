@@ -111,6 +111,8 @@ def _count(look: Look) -> dict[str, Any]:
 
 def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
     """Return what still holds of the messages of a group: the last attempt's, where the ledger says the same."""
+    import numpy as np
+
     from mdr_dask import store as room
     from mdr_dask.models.base import Status
 
@@ -120,7 +122,10 @@ def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
         for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = room.ledger(store, series, dataset["status"].shape)
-    return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
+    states = {
+        place: ledger[place] for place in last if len(place) == ledger.ndim and np.less(place, ledger.shape).all()
+    }
+    return [last[place] for place, state in states.items() if state == Status[last[place]["status"].upper()]]
 
 
 def _shared(messages: list[dict[str, Any]]) -> str:
