@@ -1,7 +1,8 @@
 """Files of strangers, made up by hypothesis: ``python -m benchmarks runner fuzz [EXAMPLES] [SEED] [KIND]``.
 
-So many examples of every kind (campaigns, texts, tables, cluster files, metadata, records, stores, runs) are given to
-the commands that read them. Told is what no such file may do: a traceback, a hang, a word for the terminal, exit code 3.
+So many examples of every kind (campaigns, texts, runs, tables, cluster files, metadata, records, stores) are given to
+the commands that read them. Told is what no such file may do: a traceback, a hang, something for the terminal, exit
+code 3.
 """
 
 from __future__ import annotations

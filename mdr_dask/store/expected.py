@@ -63,7 +63,7 @@ class _Study(_Document):
     model: str
     model_version: int
     seed: int
-    accuracy: float | None = None
+    accuracy: float | None
     title: str
     history: list[str]
 
