@@ -71,7 +71,7 @@ class Column:
     unit : str
         SI unit of what is read, ``"1"`` for a pure number. Angular frequencies (``rad/s``) take Hz and rpm too.
     other_names : tuple of str
-        Further spellings; blanks, underscores, hyphens and capitals do not matter.
+        Further spellings; blanks, underscores, hyphens, dots and capitals do not matter.
     needed : bool
         Whether a table without it is refused.
     above, least : float, optional
@@ -403,5 +403,5 @@ def _in_si(number: str, unit: str, wanted: str) -> float:
 
 
 def _folded(name: str) -> str:
-    """Return a name without what does not matter: blanks, underscores, hyphens, capitals, kinds of primes."""
-    return re.sub(r"[\s_-]+", " ", name.strip().casefold()).translate(_PRIMES)
+    """Return a name without what does not matter: blanks, underscores, hyphens, dots, capitals, kinds of primes."""
+    return re.sub(r"[\s_.-]+", " ", name.strip().casefold()).translate(_PRIMES)

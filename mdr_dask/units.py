@@ -209,6 +209,18 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
 
 
+def seconds(duration: float) -> str:
+    """Return a duration as a person says it."""
+    if duration < 60:
+        return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
+    minutes, rest = divmod(round(duration), 60)
+    if minutes < 10:
+        return f"{minutes} min {rest} s"
+    if minutes < 60:
+        return f"{minutes} min"
+    return f"{minutes // 60} h {minutes % 60} min"
+
+
 #: Units that people forget to write, by the SI unit that is read in their place.
 _FORGOTTEN = {
     "m": ("mm", "um", "nm", "km"),

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from mdr_dask.models.base import Parameters
+from mdr_dask.models.base import DataFile, Parameters
 
 
 @dataclass(frozen=True)
@@ -107,6 +107,8 @@ class Campaign:
         The file as written, and where it was read.
     remarks : tuple of str
         Questions about bare numbers that are far from usual, each with its place.
+    measured : DataFile or None
+        Table of measurements of an output, for the fit ``calibration``.
     """
 
     name: str
@@ -121,3 +123,4 @@ class Campaign:
     text: str
     source: str
     remarks: tuple[str, ...] = ()
+    measured: DataFile | None = None

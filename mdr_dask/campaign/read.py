@@ -11,11 +11,12 @@ from mdr_dask import models
 from mdr_dask.campaign.definition import Campaign, Replication, Series, Tolerance
 from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
+from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
-from mdr_dask.errors import ModelError, did_you_mean
-from mdr_dask.models.base import Model
+from mdr_dask.errors import DataError, ModelError, did_you_mean
+from mdr_dask.models.base import DataFile, Model
 from mdr_dask.units import to_si
 
 
@@ -60,7 +61,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
             what = f"expected a mapping with the keys name, model and parameters, got {shown(document.data)}"
             problems.add(document.place(()), "", what)
         problems.raise_if_any()
-    spec, wrong = _spec(document, problems)
+    spec, wrong = _spec(document, directory, problems)
     model = None if "model" in wrong else _model(document, spec, problems)
     if model is None:
         problems.raise_if_any()
@@ -72,6 +73,9 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     outputs = _outputs(document, spec, model, problems)
     replication = _replication(document, spec, model, outputs, problems)
     _check_blocks(document, spec, series, problems)
+    measured = spec.measured.table if spec.measured else None
+    if measured and series:
+        _check_measured(document, measured, spec.model, outputs, series, problems)
     problems.raise_if_any()
     return Campaign(
         name=spec.name,
@@ -86,10 +90,11 @@ def loads(text: str, source: str, directory: str) -> Campaign:
         text=text,
         source=source,
         remarks=remarks,
+        measured=measured,
     )
 
 
-def _spec(document: Document, problems: Problems) -> tuple[CampaignSpec, set[str]]:
+def _spec(document: Document, directory: str, problems: Problems) -> tuple[CampaignSpec, set[str]]:
     """Return the checked keys and the names of those that are wrong, which then have a stand-in."""
     wrong: set[str] = set()
 
@@ -97,7 +102,7 @@ def _spec(document: Document, problems: Problems) -> tuple[CampaignSpec, set[str
         wrong.add(str(path[0]))
         problems.add(document.key_place(path) if key else document.place(path), dotted(path), what)
 
-    context = {"to_si": to_si}
+    context = {"to_si": to_si, "directory": directory}
     try:
         return CampaignSpec.model_validate(document.data, context=context), wrong
     except ValidationError as error:
@@ -169,6 +174,22 @@ def _tolerance(given: float | str | ToleranceSpec, unit: str) -> Tolerance:
     if min(tolerance.relative, tolerance.absolute) < 0 or tolerance == Tolerance():
         raise ValueError("expected a tolerance above 0")
     return tolerance
+
+
+def _check_measured(
+    document: Document,
+    table: DataFile,
+    model: str,
+    outputs: tuple[str, ...],
+    series: tuple[Series, ...],
+    problems: Problems,
+) -> None:
+    path: Path = ("measured", "table")
+    try:
+        require_readable(table.read_text(), table.name, model, outputs, series)
+    except DataError as error:
+        for line in str(error).splitlines():
+            problems.add(document.place(path), dotted(path), line)
 
 
 def _check_blocks(document: Document, spec: CampaignSpec, series: tuple[Series, ...], problems: Problems) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import NamedFile, Parameters, quantity
 
 _LONGEST_NAME = 100
 
@@ -113,6 +113,15 @@ class StoreSpec(Parameters):
     )
 
 
+class MeasuredSpec(Parameters):
+    """What was measured."""
+
+    table: NamedFile = Field(
+        description="table of measured points, relative to the campaign file: columns for conditions, for one output, "
+        "and perhaps for its standard_error, with units in brackets"
+    )
+
+
 class CampaignSpec(Parameters):
     """A campaign file."""
 
@@ -128,6 +137,9 @@ class CampaignSpec(Parameters):
         None, min_length=1, description="groups of cases by name, each replacing some of the parameters above"
     )
     sampling: Sampling = Field("grid", description="how varied parameters are combined")
+    measured: MeasuredSpec | None = Field(
+        None, description="what `mdr-dask fit STORE calibration` explains, by the axes that the table does not name"
+    )
     accuracy: float | None = quantity(
         "1", "error allowed for the outputs, as a part of their value", default=None, gt=0, lt=1
     )

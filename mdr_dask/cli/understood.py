@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.cli.progress import seconds
-from mdr_dask.units import shown
+from mdr_dask.units import seconds, shown
 
 if TYPE_CHECKING:
     from mdr_dask.campaign import Axis, Campaign

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
@@ -88,6 +88,10 @@ def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
+#: Smallest size of a quantity other than 0, in SI; its reciprocal is the largest.
+LEAST = 1e-30
+
+
 def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
     """Declare a physical parameter.
 
@@ -121,7 +125,17 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = [usual] if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
+    if unit != "m^(1-n)":  # of a body r^50 any number may be meant
+        field.metadata.append(AfterValidator(_conceivable))
     return field
+
+
+def _conceivable(value: Any) -> Any:
+    """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
+    for number in value if isinstance(value, tuple) else (value,):
+        if isinstance(number, float) and number != 0 and not LEAST <= abs(number) <= 1 / LEAST:
+            raise ValueError(f"expected a size between {LEAST:g} and {1 / LEAST:g} in SI units, got {number:g}")
+    return value
 
 
 def unit_of(parameters: type[BaseModel], name: str) -> str | None:

@@ -25,7 +25,7 @@ class Plot:
     name : str
         As in ``mdr-dask plot STORE NAME``.
     models : tuple of str
-        Models whose stores it understands.
+        Models whose stores it understands; none stands for all models.
     summary : str
         One line: what against what, and the figure of the thesis it redraws.
     draw : callable, mapping of str to Dataset -> Figure
@@ -65,8 +65,7 @@ class Plot:
 
 
 def _prepared(data: xr.Dataset) -> xr.Dataset:
-    """Return a series with its coordinates read once, and parameters of one value fixed."""
-    data = data.assign_coords({name: value.copy(data=value.to_numpy()) for name, value in data.coords.items()})
+    """Return a series with parameters of one value fixed."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])

@@ -92,7 +92,7 @@ def test_equal_cases_are_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
         }
     )
     result = compute(same)
-    assert solved == [2, 2] * len(same.realisations)  # and once on the coarser grid of the error
+    assert solved == [2] * len(same.realisations)
     assert distinct(same) == result.solves == 2 * len(same.realisations)
 
 

@@ -17,7 +17,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.transients.ends import Ends, Line, ends_on
-from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jumps
+from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jumps
 
 
 class Settings(NamedTuple):
@@ -47,7 +47,7 @@ class Settings(NamedTuple):
     of_change_before: float = 0.1
     of_others: float = 0.5
     of_contact: float = 0.1
-    of_transient: float = 1.4
+    of_transient: float = 2.0
     few: float = 20.0
     of_few: float = 0.3
     of_a_peak: float = 1.0
@@ -165,27 +165,30 @@ def solve_jumps(problem: Problem, aim: Aim) -> Jumps:
         jumps.trace[k] = levels.after[k] + (jump.trace - jump.after)
         jumps.depth[k] = levels.depth[k] + (jump.depth - fine.depth[k, 1])
     if aim.with_errors and near is not None:
-        # what is left out on one grid is left out on the other
-        skipped = np.array([jump.left_out > 0 for jump in marched])
-        course = aim.course._replace(per_decade=aim.course.per_decade / 2, accuracy=0.0)
-        rough = velocity_jumps(half, problem.loads, problem.deborah, near, course, skipped)
-        for k, (one, other) in enumerate(zip(marched, rough, strict=True)):
-            change, sinking = _changes(one, other, fine.depth[k], near.depth[k])
-            jumps.trace_error[k] = SETTINGS.of_transient * change + errors.after[k]
-            jumps.depth_error[k] = SETTINGS.of_transient * sinking + errors.depth[k]
+        paths = retraced(half, problem.loads, problem.deborah, near, marched)
+        for k, (jump, path) in enumerate(zip(marched, paths, strict=True)):
+            change, sinking = SETTINGS.of_transient * _changes(jump, path, (fine, near), k, aim.course.times)
+            jumps.trace_error[k], jumps.depth_error[k] = change + errors.after[k], sinking + errors.depth[k]
     return jumps
 
 
-def _changes(fine: Jump, coarse: Jump, depth: FloatArray, coarse_depth: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far transients of drag and depth on two grids differ from each time on, or what is left out."""
-    if coarse.outcome != Outcome.CONVERGED:  # where a coarse grid has no solution nothing is known
-        return np.full(fine.trace.size, np.inf), np.full(fine.trace.size, np.inf)
-    drag = np.abs((fine.trace - fine.after) - (coarse.trace - coarse.after))
-    sinking = np.abs((fine.depth - depth[1]) - (coarse.depth - coarse_depth[1]))
-    later = [np.maximum.accumulate(change[::-1])[::-1] for change in (drag, sinking)]
-    if fine.left_out > 0:
-        return np.maximum(later[0], fine.left_out), np.maximum(later[1], abs(depth[1] - depth[0]))
-    return later[0], later[1]
+def _changes(jump: Jump, path: FloatArray, grids: tuple[Ends, Ends], k: int, times: FloatArray) -> FloatArray:
+    """Return how far transients of drag and depth on two grids differ from each time on, or what is left out.
+
+    Both are counted from their own ends, of which these are the k-th. Nothing is known where one has no solution.
+    """
+    moments, both = np.zeros(1), [np.array([[ends.at[k]], [ends.depth[k, 0]]]) for ends in grids]
+    if jump.moments:
+        moments, both = path[0], [jump.path[1:, ::EVERY], path[1:]]
+    fine, coarse = (rows - [[ends.after[k]], [ends.depth[k, 1]]] for rows, ends in zip(both, grids, strict=True))
+    change = np.abs(fine - coarse)
+    change[np.isnan(change)] = np.inf
+    later = np.maximum.accumulate(change[:, ::-1], axis=1)[:, ::-1]
+    found: FloatArray = later[:, np.searchsorted(moments, times, "right") - 1]
+    if jump.left_out > 0:
+        depth = grids[0].depth[k]
+        found = np.maximum(found, [[jump.left_out], [abs(depth[1] - depth[0])]])
+    return found
 
 
 def _refined(problem: Problem, aim: Aim, coarse: Ends, fine: Ends) -> tuple[Levels, Levels]:

@@ -13,6 +13,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
     Moment,
     Wakes,
+    foreseen,
     left_before,
     losing,
     meeting,
@@ -197,7 +198,7 @@ def touch(now: Moment, reachable: Reachable, work: Workspace) -> int:
                 spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
                 least_free, known_at = (u - spread) * fade_of_cell, probe
                 if gap > 0:
-                    guess = probe - gap / rise if rise > 0 else cell + low
+                    guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
                     begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
                     h, slope, _ = height_at(track, begin)
                     edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0

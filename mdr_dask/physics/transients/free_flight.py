@@ -22,17 +22,22 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
+FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
 class Moment(NamedTuple):
-    """A moment after the jump: the line, the state before the jump, the depths so far, time, and Deborah number."""
+    """A moment after the jump: the line, the state before the jump, the depths so far, time, and Deborah number.
+
+    `left` is the part exp(-time) that is left of a displacement at the jump.
+    """
 
     track: Track
     first: Patches
     history: History
     time: float
     deborah: float
+    left: float
 
 
 class Wakes(NamedTuple):
@@ -116,11 +121,10 @@ def left_before(now: Moment, x: float) -> tuple[float, float]:
     s = x - now.deborah * now.time
     s -= np.floor((s - track.origin) / track.cells) * track.cells
     low = patch_before(first, s)
-    fade = np.exp(-now.time)
     if s <= first.end[low]:
         h, slope, _ = height_at(track, s)
-        return (first.depth + h) * fade, slope * fade
-    u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * fade
+        return (first.depth + h) * now.left, slope * now.left
+    u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * now.left
     return u, -u / first.deborah
 
 
@@ -137,6 +141,37 @@ def wake_at(now: Moment, wakes: Wakes, x: float) -> tuple[float, float, float]:
         if value > u:
             u, slope, gain = value, value_slope, 0.0
     return u, slope, gain
+
+
+@inlined
+def foreseen(
+    line: tuple[float, float, float, float], depth: float, wake: tuple[float, float], low: float, high: float
+) -> float:
+    """Return where in a cell the line rises through a wake that fades as it does at `high`, where it is below the line.
+
+    Parameters
+    ----------
+    line : tuple of float
+        Coefficients of the height in the cell.
+    depth : float
+    wake : tuple of float
+        Displacement at `high`, and its slope along the line.
+    low, high : float
+        Places in the cell.
+    """
+    c0, c1, c2, c3 = line
+    u, falls = wake[0], -wake[1]
+    rate, y = falls / u if u > 0 else 0.0, high
+    for _ in range(FORESEEN_STEPS):
+        free = u * np.exp(rate * (high - y))
+        rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
+        if rise <= 0:
+            break
+        step = (free - depth - c0 - y * (c1 + y * (c2 + y * c3))) / rise
+        y = min(max(y + step, low), high)
+        if abs(step) < FORESEEN:
+            break
+    return y
 
 
 @inlined

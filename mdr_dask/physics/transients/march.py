@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import FloatArray
@@ -103,7 +104,9 @@ def _balance(
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
-    moment = Moment(marching.track, marching.first, history, history.time[now], marching.deborah)
+    moment = Moment(
+        marching.track, marching.first, history, history.time[now], marching.deborah, np.exp(-history.time[now])
+    )
     low, high = marching.low, marching.high
     for trial in range(TRIALS):
         history.depth[now], history.rate[now] = guess, a * guess + b
@@ -128,6 +131,15 @@ def _balance(
         if trial > 4 and not low < guess < high:
             guess = 0.5 * (low + high)
     return Outcome.DEPTH_NOT_FOUND, 0.0
+
+
+@compiled
+def _weights(found: Trajectory, now: int) -> tuple[float, float]:
+    """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate."""
+    if now > 1:
+        return _rate_weights(found.time, found.depth, now, min(now, 3))
+    taken = found.time[1] - found.time[0]
+    return 2 / taken, -2 * found.depth[0] / taken - found.rate[0]
 
 
 @njit(nogil=True, cache=True)
@@ -159,11 +171,10 @@ def march(marching: Marching, pace: Pace, aim: Aim, found: Trajectory, work: Wor
         if pace.until - time[now] < 0.1 * step:
             time[now] = pace.until
         taken = time[now] - time[now - 1]
+        weights = _weights(found, now)
         if now == 1:
-            weights = 2 / taken, -2 * depth[0] / taken - rate[0]
             foretold = depth[0] + taken * rate[0]
         else:
-            weights = _rate_weights(time, depth, now, min(now, 3))
             bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
             foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
         depth[now] = min(max(foretold, marching.low), marching.high)
@@ -183,3 +194,34 @@ def march(marching: Marching, pace: Pace, aim: Aim, found: Trajectory, work: Wor
         if settled and time[now - 1] > SETTLED * near:
             break
     return now, Outcome.CONVERGED
+
+
+@njit(nogil=True, cache=True)
+def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
+    """March through given moments along depths that are nearly right, by one step of Newton for each.
+
+    Parameters
+    ----------
+    marching, work
+        As in `march`.
+    depths : array, shape (moments,)
+        Depths on another grid, from whose course those found depart slowly.
+    found : Trajectory
+        Its times are given; written from the second entry on.
+
+    Returns
+    -------
+    outcome : int
+        An `Outcome`, or `LEFT_LIMITS`.
+    """
+    time, depth, rate, drag = found
+    for now in range(1, time.size):
+        depth[now] = depths[now] + (depth[now - 1] - depths[now - 1])
+        if not marching.low <= depth[now] <= marching.high:
+            return LEFT_LIMITS
+        weights = _weights(found, now)
+        history = History(time, depth, rate, now + 1, weights[0])
+        outcome, drag[now] = _balance(marching, history, weights, np.inf, work)
+        if outcome != Outcome.CONVERGED:
+            return outcome
+    return Outcome.CONVERGED

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
-from mdr_dask.arrays import BoolArray, FloatArray, IntArray
+from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
-from mdr_dask.physics.transients.contact_search import Reachable, workspace_for
+from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.ends import Ends, Line, ends_on
-from mdr_dask.physics.transients.march import LEFT_LIMITS, Aim, Marching, Pace, Trajectory, march
+from mdr_dask.physics.transients.march import LEFT_LIMITS, Aim, Marching, Pace, Trajectory, march, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
 
@@ -65,6 +66,7 @@ SETTINGS = Settings()
 WHOLE = 1 - 1e-12  # of a line in contact, but for rounding
 SHALLOW = 0.01  # of the least depth of the ends: no march goes below
 FINE_STEPS = 24.0  # steps per decade of which the settings speak
+EVERY = 2  # of the moments of a path that are marched on another grid
 
 
 class Course(NamedTuple):
@@ -98,8 +100,8 @@ class Jump(NamedTuple):
         Steady at v_1, at t_0+, and steady at v_2.
     trace, depth : array, shape (times,)
         Drag and depth at the times asked for.
-    moments : int
-        Number of moments computed; the rest is in equilibrium.
+    path : array, shape (3, moments)
+        Time, drag and depth at the moments computed; the rest is in equilibrium.
     left_out : float
         Estimated size of a transient that is not computed, because all of it lies within the accuracy.
     outcome : Outcome
@@ -110,9 +112,14 @@ class Jump(NamedTuple):
     after: float
     trace: FloatArray
     depth: FloatArray
-    moments: int
+    path: FloatArray
     left_out: float
     outcome: Outcome
+
+    @property
+    def moments(self) -> int:
+        """Number of moments computed."""
+        return int(self.path.shape[1])
 
 
 def pace_after(course: Course, deborah: float, change: float, load: float) -> Pace:
@@ -160,7 +167,6 @@ def velocity_jumps(
     deborah: FloatArray,
     ends: Ends,
     course: Course,
-    left_out: BoolArray | None = None,
 ) -> list[Jump]:
     """Return the jumps of many cases on one line, of which none depends on the others.
 
@@ -172,22 +178,40 @@ def velocity_jumps(
         Of the same line.
     course : Course
         What is asked of the march.
-    left_out : array, shape (cases,), optional
-        Cases whose transient is left out, however large.
     """
     jumps = []
     for k in range(loads.size):
         if ends.outcome[k] != Outcome.CONVERGED:
             jumps.append(_failed(course.times, Outcome(ends.outcome[k])))
         else:
-            one = course if left_out is None or not left_out[k] else course._replace(accuracy=np.inf)
-            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, one).solve())
+            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, course).solve())
     return jumps
+
+
+def retraced(line: Line, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump]) -> list[FloatArray]:
+    """Return the paths of jumps on another grid at every second of their moments, with NaN where none is found.
+
+    Parameters
+    ----------
+    line, loads, deborah, ends
+        As in :func:`velocity_jumps`, on the other grid.
+    jumps : list of Jump
+        The same cases, whose paths are followed.
+    """
+    paths = []
+    for k, jump in enumerate(jumps):
+        path = jump.path[:, ::EVERY].copy()
+        path[1:] = np.nan
+        if jump.outcome == Outcome.CONVERGED == ends.outcome[k] and jump.moments:
+            course = Course(path[0], 1.0)
+            path = _Relaxation.of(line, loads[k], deborah[k], ends, k, course).retrace(jump.path[:, ::EVERY])
+        paths.append(path)
+    return paths
 
 
 def _failed(times: FloatArray, outcome: Outcome) -> Jump:
     nothing = np.full(times.size, np.nan)
-    return Jump(np.nan, np.nan, np.nan, nothing, nothing, 0, 0.0, outcome)
+    return Jump(np.nan, np.nan, np.nan, nothing, nothing, np.empty((3, 0)), 0.0, outcome)
 
 
 class _Relaxation(NamedTuple):
@@ -236,7 +260,7 @@ class _Relaxation(NamedTuple):
             self.after,
             self.after * constant,
             (self.depth[1] - self.line.cells.top) * constant,
-            0,
+            np.empty((3, 0)),
             0.0,
             Outcome.CONVERGED,
         )
@@ -247,14 +271,19 @@ class _Relaxation(NamedTuple):
             trace = np.where(times > 0, self.after, self.at)
             sinking = np.where(times > 0, self.depth[1], self.depth[0]) - self.line.cells.top
             return jump._replace(trace=trace, depth=sinking, left_out=transient)
-        low, high = float(self.depth.min()), float(self.depth.max())
-        margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
-        for _ in range(SETTINGS.widenings):
-            found = self.march(jump, (max(low - margin, SHALLOW * low), high + margin), transient)
+        for limits in self.limits(self.depth):
+            found = self.march(jump, limits, transient)
             if found is not None:
                 return found
-            margin *= 4
         return _failed(times, Outcome.DEPTH_NOT_FOUND)
+
+    def limits(self, depths: FloatArray) -> Iterator[tuple[float, float]]:
+        """Yield wider and wider limits around depths."""
+        low, high = float(depths.min()), float(depths.max())
+        margin = SETTINGS.margin * (high - low) + SETTINGS.negligible * self.load / self.line.track.cells
+        for _ in range(SETTINGS.widenings):
+            yield max(low - margin, SHALLOW * low), high + margin
+            margin *= 4
 
     def transient(self) -> float:
         """Estimate the size of the transient: the difference of its ends alone does not bound one that crosses its end.
@@ -272,11 +301,7 @@ class _Relaxation(NamedTuple):
         equilibrium = SETTINGS.equilibrium * (FINE_STEPS / course.per_decade) ** 3
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
         close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
-        found = Trajectory(*np.empty((4, SETTINGS.moments)))
-        for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
-            column[0] = value
-        marching = Marching(self.line.track, self.first, self.reachable(*limits), self.deborah[1], self.load, *limits)
-        work = workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
+        marching, found, work = self.begun(limits, SETTINGS.moments)
         count, outcome = march(marching, self.pace, Aim(self.depth[1], self.after, close, settled), found, work)
         if outcome == LEFT_LIMITS:
             return None
@@ -286,37 +311,63 @@ class _Relaxation(NamedTuple):
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
         ends = np.array([self.after, self.depth[1]])
-        trace, sinking = _at_times(time, np.stack([drag, depth]), course.times, ends)
-        return jump._replace(trace=trace, depth=sinking - self.line.cells.top, moments=count)
+        path = np.stack([time, drag, depth])
+        trace, sinking = _at_times(time, path[1:], course.times, ends)
+        path[2] -= self.line.cells.top
+        return jump._replace(trace=trace, depth=sinking - self.line.cells.top, path=path)
 
-    def reachable(self, low: float, high: float) -> Reachable:
-        """Return where elements can be in contact between two depths."""
-        slowest = self.line.patches(low, float(self.deborah.min()), np.empty(SWEEP_SUMS))
-        floor = np.empty(self.line.track.height.size)
-        _fill(self.line.track, slowest, floor)
-        active = high + self.line.track.peak > np.minimum(floor[:-1], floor[1:])
-        active[1:] |= active[:-1].copy()
-        active[:-1] |= active[1:].copy()
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
-        runs: IntArray = edges.reshape(-1, 2).astype(np.int64)
-        return Reachable(runs, floor)
+    def begun(self, limits: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
+        """Return a march between two depths at its first moment, with room for all of them."""
+        found = Trajectory(*np.empty((4, moments)))
+        for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
+            column[0] = value
+        slowest = self.line.patches(limits[0], float(self.deborah.min()), np.empty(SWEEP_SUMS))
+        reachable = _reachable(self.line.track, slowest, limits[1])
+        marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits)
+        return marching, found, workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
+
+    def retrace(self, path: FloatArray) -> FloatArray:
+        """Return the path on this grid at the moments of a path on another one, NaN where none is found."""
+        top, found = self.line.cells.top, path.copy()
+        depths = path[2] + top
+        for limits in self.limits(np.append(depths + (self.depth[0] - depths[0]), self.depth)):
+            marching, trajectory, work = self.begun(limits, path.shape[1])
+            trajectory.time[:] = path[0]
+            outcome = retrace(marching, depths, trajectory, work)
+            if outcome == Outcome.CONVERGED:
+                found[1], found[2] = trajectory.drag, trajectory.depth - top
+                return found
+        found[1:] = np.nan
+        return found
 
 
 @njit(nogil=True, cache=True)
-def _fill(track: Track, state: Patches, floor: FloatArray) -> None:
-    """Write the displacement of a steady state at the nodes."""
-    k, decay, flying = -1, np.exp(-1 / state.deborah), False
+def _reachable(track: Track, slowest: Patches, high: float) -> Reachable:
+    """Return where elements can be in contact up to a depth, from the steady state at the least depth and speed."""
+    floor = np.empty(track.height.size)
+    k, decay, flying = -1, np.exp(-1 / slowest.deborah), False
     for i in range(floor.size):
-        while k + 1 < state.count and state.start[k + 1] <= i:
+        while k + 1 < slowest.count and slowest.start[k + 1] <= i:
             k += 1
         if k < 0:
             floor[i] = -np.inf
-        elif i <= state.end[k]:
-            floor[i], flying = state.depth + track.height[i], False
-        elif flying and state.start[k] <= i - 1:
+        elif i <= slowest.end[k]:
+            floor[i], flying = slowest.depth + track.height[i], False
+        elif flying and slowest.start[k] <= i - 1:
             floor[i] = floor[i - 1] * decay
         else:
-            floor[i], flying = state.pressed[k] * np.exp(-(i - state.end[k]) / state.deborah), True
+            floor[i], flying = slowest.pressed[k] * np.exp(-(i - slowest.end[k]) / slowest.deborah), True
+    last = floor.size - 1
+    runs, count = np.empty((last // 2 + 1, 2), np.int64), 0
+    for i in range(last):
+        if high + track.peak[i] > min(floor[i], floor[i + 1]):
+            begin, end = max(i - 1, 0), min(i + 2, last)
+            if count > 0 and begin <= runs[count - 1, 1]:
+                runs[count - 1, 1] = end
+            else:
+                runs[count, 0], runs[count, 1] = begin, end
+                count += 1
+    return Reachable(runs[:count].copy(), floor)
 
 
 def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray) -> FloatArray:

@@ -29,7 +29,7 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
         everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf))
         work = workspace_for(nodes, barriers)
-        found = touch(Moment(line.track, first, history, LONG, deborah), everywhere, work)
+        found = touch(Moment(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
         sums = np.empty(SUMS)
         start, end = patches_at(line.cells, line.blocks, *barriers_for(line.track), deborah, depth, sums)
         assert found == start.size

@@ -8,7 +8,8 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.follow import follow
-from mdr_dask.physics.transients.velocity_jump import Course, Jump, velocity_jump
+from mdr_dask.physics.transients.ends import Line, ends_on
+from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jump, velocity_jumps
 
 POINTS, OVERSAMPLING = 100, 8
 REACH, LOAD = 0.1, 0.3
@@ -226,3 +227,32 @@ def test_transient_within_the_accuracy_is_not_computed() -> None:
             assert short.moments == 0
             assert error < 1.4 * short.left_out <= 1.4 * accuracy * long.after
     assert 0 < skipped < 16
+
+
+@pytest.mark.parametrize("reach", [1e-3, REACH])
+def test_a_path_is_retraced_at_every_second_moment(reach: float) -> None:
+    """On the grid of the march itself the difference is that of the steps; on a coarser one that of the nodes, too."""
+    loads, deborah, apart = np.array([LOAD]), np.array([[reach, 1.2 * reach]]), []
+    grids = [Line.of(periodic_line(*line(oversampling=nodes))) for nodes in (8, 4)]
+    ends = [ends_on(grid, loads, deborah) for grid in grids]
+    jumps = velocity_jumps(grids[0], loads, deborah, ends[0], Course(TIMES, WAVENUMBER, 12))
+    path = jumps[0].path[:, ::EVERY]
+    for grid, known in zip(grids, ends, strict=True):
+        other = retraced(grid, loads, deborah, known, jumps)[0]
+        assert np.array_equal(other[0], path[0])
+        assert other[1, 0] == known.at[0]
+        apart.append(np.abs((other[1] - known.after[0]) - (path[1] - ends[0].after[0])).max())
+    span = np.ptp(path[1])
+    assert 0 < apart[0] < 0.03 * span
+    assert 0.9 * apart[0] < apart[1] < 0.3 * span
+
+
+def test_a_path_without_a_solution_on_the_other_grid_is_unknown() -> None:
+    loads, deborah = np.array([LOAD]), np.array([[REACH, 1.2 * REACH]])
+    grid = Line.of(periodic_line(*line()))
+    ends = ends_on(grid, loads, deborah)
+    jumps = velocity_jumps(grid, loads, deborah, ends, Course(TIMES, WAVENUMBER, 8))
+    nowhere = ends._replace(outcome=np.array([Outcome.DEPTH_NOT_FOUND], np.int8))
+    path = retraced(grid, loads, deborah, nowhere, jumps)[0]
+    assert np.all(np.isnan(path[1:]))
+    assert path.shape[1] == -(-jumps[0].moments // EVERY)

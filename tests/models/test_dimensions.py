@@ -1,0 +1,236 @@
+"""Other units of length, mass and time: every number of every model changes by the power that its unit says.
+
+Factors are powers of two, so that nothing is rounded by the change itself. What is left out of a row's units is fixed
+by a number with a unit in the physics: the poles of Roelands' and Dowson's laws (pressure, viscosity), gas constant and
+degrees.
+"""
+
+import re
+from functools import reduce
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import BaseModel
+
+from mdr_dask.models import load
+from mdr_dask.models.base import Block, Status, unit_of
+
+BASE = {
+    "1": (0, 0, 0),
+    "rad": (0, 0, 0),
+    "K": (0, 0, 0),
+    "m": (1, 0, 0),
+    "s": (0, 0, 1),
+    "Hz": (0, 0, -1),
+    "kg": (0, 1, 0),
+    "N": (1, 1, -2),
+    "Pa": (-1, 1, -2),
+    "ohm": (0, 0, 0),
+    "S": (0, 0, 0),
+}
+FREE = ("length", "mass", "time")
+#: Units in which a pressure and a viscosity keep their numbers.
+AT_ONE_PRESSURE = ("length",)
+
+
+def powers(unit, exponent=None):
+    """Return the powers of length, mass and time in a unit such as ``kg/m^3``, ``N/m`` or ``Pa*s``."""
+    if unit == "m^(1-n)":
+        return np.array([1 - exponent, 0, 0])
+    if unit.startswith("ohm m"):  # of the length only: electrical units have no mass here
+        return np.array([1, 0, 0])
+    total, sign = np.zeros(3), 1
+    for part in re.split(r"([*/ ])", unit):
+        if part in "*/ ":
+            sign = -1 if part == "/" else sign
+            continue
+        name, _, power = part.partition("^")
+        total = total + sign * int(power or 1) * np.array(BASE[name])
+    return total
+
+
+def scaled(parameters, factors):
+    """Return a parameter set in other units: every quantity, also those in structures and lists."""
+    changes = {}
+    for name in type(parameters).model_fields:
+        value, unit = getattr(parameters, name), unit_of(type(parameters), name)
+        if isinstance(value, BaseModel):
+            changes[name] = scaled(value, factors)
+        elif unit is not None and isinstance(value, float | tuple):
+            factor = float(np.prod(factors ** powers(unit, getattr(parameters, "exponent", None))))
+            changes[name] = value * factor if isinstance(value, float) else tuple(one * factor for one in value)
+    return parameters.model_copy(update=changes)
+
+
+KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
+LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
+ARMS = {"material": {"prony": {"static_modulus": 1e7, "moduli": (1e7, 3e8), "times": (1e-2, 1e-4), "viscosity": 50.0}}}
+LAW = {
+    "static_modulus": 3e6,
+    "loss_modulus": 1e6,
+    "frequency": 1e3,
+    "exponent": 0.2,
+    "lowest": 1.0,
+    "highest": 1e5,
+}
+JUMP = LINE | {"oversampling": 2, "relaxation_times": (0.0, 0.1, 1.0)}
+FRETTING = {
+    "contact_modulus": 115e9,
+    "effective_shear_modulus": 90e9,
+    "friction": 0.6,
+    "hardness": 2e9,
+    "wear_coefficient": 1e-4,
+    "amplitude": 5e-7,
+    "cycles": 2e4,
+    "accuracy": 0.03,
+    "points": 20,
+}
+BALL = {"indenter": {"shape": "parabola", "radius": 0.01}, "normal_force": 50.0}
+FILM = {
+    "radius": 0.01,
+    "line_load": 1e5,
+    "mean_velocity": 1.0,
+    "viscosity": 0.08,
+    "pressure_viscosity": 2e-8,
+    "slide_roll_ratio": 0.1,
+}
+ROLLERS = {
+    "rms_roughness": 2e-7,
+    "points": 20_000,
+    "roller_radius": 1e-3,
+    "normal_force": 100.0,
+    "rotation_speed": 10.0,
+    "temperature": 333.15,
+    "cutoff_force": 100.0,
+    "trace_points": 100,
+    "layer_thickness": 5e-9,
+}
+#: What to compute, what may be free, and how far rounding goes: one row for each way through a model.
+ROWS = {
+    "friction": ("sliding_friction", LINE | KELVIN, FREE),
+    "friction, roll-off": (
+        "sliding_friction",
+        LINE | KELVIN | {"rolloff_wavelength": 5e-3, "longest_wavelength": 0.01, "oversampling": 4},
+        FREE,
+    ),
+    "friction, papers' steps": ("sliding_friction", LINE | KELVIN | {"scheme": "backward_euler"}, FREE),
+    "friction, cone": ("sliding_friction", LINE | KELVIN | {"indenter": {"shape": "cone", "angle": 0.05}}, FREE),
+    "friction, ball": ("sliding_friction", LINE | KELVIN | {"indenter": {"shape": "parabola", "radius": 1.0}}, FREE),
+    "friction, power": (
+        "sliding_friction",
+        LINE | KELVIN | {"indenter": {"shape": "power", "exponent": 4.0, "coefficient": 1e3}},
+        FREE,
+    ),
+    "friction, rounded cone": (
+        "sliding_friction",
+        LINE | KELVIN | {"indenter": {"shape": "rounded_cone", "angle": 0.05, "tip_radius": 0.01}},
+        FREE,
+    ),
+    "friction, arms": ("sliding_friction", LINE | ARMS, FREE),
+    "friction, power law": ("sliding_friction", LINE | {"material": {"power_law": LAW}}, FREE),
+    "jump": ("velocity_jump", JUMP | KELVIN, FREE),
+    "jump, arms": ("velocity_jump", JUMP | ARMS, FREE),
+    "steps": (
+        "velocity_jump",
+        JUMP
+        | KELVIN
+        | {"protocol": {"shape": "steps", "times": (0.0, 5e-4), "velocities": (0.06, -0.1), "forces": (2.0, 1.0)}},
+        FREE,
+    ),
+    "ramp": (
+        "velocity_jump",
+        JUMP
+        | KELVIN
+        | {"protocol": {"shape": "ramp", "start": "rest", "duration": 1e-3, "velocity": 0.2, "force": 2.0}},
+        FREE,
+    ),
+    "oscillation": (
+        "velocity_jump",
+        JUMP
+        | KELVIN
+        | {"protocol": {"shape": "oscillation", "amplitude": 0.02, "frequency": 250.0, "force_amplitude": 0.5}},
+        FREE,
+    ),
+    "wear": ("fretting_wear", FRETTING | BALL, FREE),
+    "wear, force": ("fretting_wear", FRETTING | BALL | {"hold": "force"}, FREE),
+    "wear, fast": ("fretting_wear", FRETTING | BALL | {"wear_rule": "fast"}, FREE),
+    "wear, limit": ("fretting_wear", FRETTING | BALL | {"wear_rule": "limit"}, FREE),
+    "wear, cone": (
+        "fretting_wear",
+        FRETTING | {"indenter": {"shape": "cone", "angle": 0.05}, "depth": 1e-6},
+        FREE,
+    ),
+    "wear, rounded cone": (
+        "fretting_wear",
+        FRETTING | {"indenter": {"shape": "rounded_cone", "angle": 0.05, "tip_radius": 0.01}, "depth": 1e-6},
+        FREE,
+    ),
+    "wear, history": (
+        "fretting_wear",
+        FRETTING
+        | BALL
+        | {"cells": 40, "history": ({"cycles": 1e4}, {"cycles": 1e4, "amplitude_factor": 1.5, "load_factor": 1.2})},
+        FREE,
+    ),
+    "wear, path": (
+        "fretting_wear",
+        {name: FRETTING[name] for name in ("contact_modulus", "hardness", "wear_coefficient", "accuracy", "points")}
+        | BALL
+        | {"path": 0.1},
+        FREE,
+    ),
+    "film": ("ehl_line", FILM | {"compressible": False}, FREE),
+    "film, compressible": ("ehl_line", FILM, AT_ONE_PRESSURE),
+    "film, starved, Eyring": (
+        "ehl_line",
+        FILM | {"compressible": False, "inlet": -1.5, "shear_law": "eyring", "eyring_stress": 5e6},
+        FREE,
+    ),
+    "film, Roelands": ("ehl_line", FILM | {"viscosity_law": "roelands"}, AT_ONE_PRESSURE),
+    "rollers": ("mixed_lubrication", ROLLERS | {"film_thickness": 4e-7}, AT_ONE_PRESSURE),
+    "rollers, slip, formula": ("mixed_lubrication", ROLLERS | {"slide_roll_ratio": 0.1}, AT_ONE_PRESSURE),
+    "rollers, EHL, strong layer": (
+        "mixed_lubrication",
+        ROLLERS | {"slide_roll_ratio": 0.05, "film_formula": "ehl", "layer_shear_strength": 1e6},
+        AT_ONE_PRESSURE,
+    ),
+}
+
+
+def solved(model, parameters):
+    outputs = model.with_companions([output.name for output in model.outputs])
+    return model.compute(Block(parameters, {}, 1, (1,), 5, outputs, None))
+
+
+def units_of(model, parameters):
+    known = {output.name: output.unit for output in (*model.outputs, *model.companions.values())}
+    return known | (model.units(parameters) if model.units else {})
+
+
+@pytest.mark.parametrize("name", ROWS)
+@settings(max_examples=1, deadline=None)
+@given(data=st.data())
+def test_every_output_changes_as_its_unit_says(name, data):
+    model_name, numbers, free = ROWS[name]
+    model = load(model_name)
+    drawn = {unit: 2.0 ** data.draw(st.integers(-3, 3).filter(bool), unit) for unit in free}
+    if free == AT_ONE_PRESSURE:
+        drawn |= {"mass": drawn["length"], "time": 1.0}
+    factors = np.array([drawn[unit] for unit in FREE])
+    plain = model.parameters.model_validate(numbers)
+    other = scaled(plain, factors)
+    assert other != plain
+    one, two = solved(model, plain), solved(model, other)
+    assert one.status[0, 0] == two.status[0, 0] == Status.DONE, [*one.messages.values(), *two.messages.values()]
+    changed = 0
+    for output, unit in units_of(model, plain).items():
+        if output not in one.values:
+            continue
+        factor = float(reduce(np.multiply, factors ** powers(unit)))
+        value, found = one.values[output][0, 0], two.values[output][0, 0]
+        scale = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
+        np.testing.assert_allclose(found / factor, value, rtol=1e-8, atol=1e-9 * scale, err_msg=output)
+        changed += factor != 1 and np.any(found != value)
+    assert changed or all(unit == "1" for unit in units_of(model, plain).values())
