@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.figures import COMMAND, provenance, save
+from mdr_dask.cli.figures import COMMAND, save
 from mdr_dask.cli.options import csv_option, json_option, limit_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_aligned, print_rows, printable, short, table, with_intervals
 from mdr_dask.cli.results import list_names, require_known, store_argument
@@ -86,6 +86,7 @@ def fit(
             _print(result, group, form, limit)
     if figure is not None:
         from mdr_dask.plots.calibration import calibration as drawn
+        from mdr_dask.plots.table import provenance
 
         save(drawn(groups), figure, provenance("calibration", [store], str(context.meta[COMMAND])))
         tell(str(figure))

@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.tables import described
+from mdr_dask.tables import decoded, described
 
 
 class Status(IntEnum):
@@ -33,6 +33,11 @@ class Status(IntEnum):
 
 Ways = tuple[tuple[str, ...], ...]
 _WHOLE = re.compile(r"[+-]?\d{1,18}")
+
+
+def unquoted(value: Any) -> Any:
+    """Return a whole number in quotes as the number, anything else as it is."""
+    return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
 class Parameters(BaseModel):
@@ -53,12 +58,7 @@ class Parameters(BaseModel):
         """Read a whole number in quotes as the number, for a number with a unit is a string too."""
         if not isinstance(data, dict):
             return data
-        quoted = {
-            key: int(data[key])
-            for key in data.keys() & _whole_fields(cls)
-            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
-        }
-        return {**data, **quoted} if quoted else data
+        return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
 
     def require_one_way(self) -> None:
         """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
@@ -169,15 +169,9 @@ class DataFile(BaseModel):
         Raises
         ------
         DataError
-            If the file has changed since the campaign was read, or is no text in UTF-8.
+            If the file has changed since the campaign was read, or is no text.
         """
-        content = self.read_bytes()
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise DataError(
-                f"{self.path}: expected text in UTF-8, got byte {content[error.start]:#x} at {error.start}"
-            ) from None
+        return decoded(self.read_bytes(), self.path)
 
     def notes(self) -> tuple[str, ...]:
         """Return columns and ranges of a table, as it has them; nothing of any other file."""

@@ -170,7 +170,7 @@ def test_units_size_and_style_of_the_page(stores, tmp_path):
     axes = figure.axes[0]
     assert axes.spines["left"].get_linewidth() == 3
     assert axes.get_xlabel() == "rotation speed [rad/s]"
-    assert "[percent]" in axes.get_ylabel()
+    assert "[%]" in axes.get_ylabel()
     np.testing.assert_allclose(axes.lines[0].get_xdata(), data["rotation_speed"])
     np.testing.assert_allclose(np.nanmax(axes.lines[0].get_ydata()) / 100, data["film_ratio"].max(), rtol=0.3)
     assert axes.get_legend_handles_labels()[1][0] == "$F_N$ = 200 N, temperature = 313.1 K"
