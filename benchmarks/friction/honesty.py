@@ -1,9 +1,10 @@
 """How honest the error estimate of sliding friction is: ``python -m benchmarks friction honesty [cases [seed]]``.
 
 Light, slow planes first, F/(GhL) in 1e-6..1 and v tau slope/h in 1e-6..0.3, to three accuracies against oversampling
-128. Then random cases in all regions, solved with ``oversampling: auto``, against oversampling 128; every tenth is a line of 9000
-or 30000 points under the loads of the spacing series of the PRL campaign, against oversampling 64. Then the long lines
-of that series, against 32 or 64: the grid of the reference has to be that fine, or its own error is what is seen.
+128. Then random cases in all regions, solved with ``oversampling: auto``, against oversampling 128; every tenth is a
+line of 9000 or 30000 points under the loads of the spacing series of the PRL campaign, against oversampling 64. Then
+the long lines of that series, against 32 or 64: the grid of the reference has to be that fine, or its own error is what
+is seen.
 """
 
 import sys
@@ -99,9 +100,7 @@ def summary(errors, estimates):
 
 def main(cases=500, seed=0):
     accuracies = 0.05, 0.01, 0.002
-    print(
-        "| light, slow planes, accuracy | below the estimate | largest error / estimate | median | beyond the accuracy |"
-    )
+    print("| light, slow planes | below the estimate | largest error / estimate | median | beyond the accuracy |")
     print("|---|---|---|---|---|")
     for accuracy, (errors, estimates) in zip(accuracies, light_planes(400, accuracies, seed), strict=True):
         (share, over), ratio = summary(errors, estimates), np.max(errors / (estimates + ROUNDING))
