@@ -34,6 +34,7 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Non
 def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str, goal: float | None = None) -> None:
     """Write a figure of error over processor time: a panel each title, in it a curve each method."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     figure = Figure(figsize=(max(3.6 * len(panels), 6.4), 4.2), layout="constrained")
     for axes, (title, curves) in zip(
@@ -44,6 +45,9 @@ def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str
         if goal is not None:
             axes.axhline(goal, color="0.6", linewidth=1)
         axes.set(title=title, xlabel="processor time (s)")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
     figure.axes[0].set_ylabel(error)
     figure.axes[0].legend(fontsize="x-small")

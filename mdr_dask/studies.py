@@ -223,8 +223,17 @@ def table(
     return found
 
 
-def fit(study: Study, law: str) -> xr.Dataset | xr.DataTree:
+def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = None) -> xr.Dataset | xr.DataTree:
     """Fit a law, each constant with its interval, as ``mdr-dask fit`` does.
+
+    Parameters
+    ----------
+    study : Dataset, DataTree, str or Path
+        A study, or the path of its store.
+    law : str
+        Its name; ``calibration`` explains measured points.
+    measured : str, Path or DataFrame, optional
+        Table of measured points, in place of the campaign's; units stand in brackets behind the names of its columns.
 
     Returns
     -------
@@ -237,6 +246,10 @@ def fit(study: Study, law: str) -> xr.Dataset | xr.DataTree:
         If the study has not what the law needs.
     """
     groups = _groups(study)
+    if measured is not None:
+        from mdr_dask.fits.calibration import with_table
+
+        groups = with_table(groups, measured)
     model = _model(groups)
     found: dict[str, xr.Dataset] = _named(fits.available(model), law, f"law for {model}").results(groups)
     return next(iter(found.values())) if len(found) == 1 else _tree(found)
@@ -350,9 +363,9 @@ class StudyAccessor:
         """Reduce over realisations: `mdr_dask.aggregate` of this study."""
         return aggregate(self._dataset, **asked)
 
-    def fit(self, law: str) -> xr.Dataset | xr.DataTree:
+    def fit(self, law: str, **asked: Any) -> xr.Dataset | xr.DataTree:
         """Fit a law: `mdr_dask.fit` of this study."""
-        return fit(self._dataset, law)
+        return fit(self._dataset, law, **asked)
 
     def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""

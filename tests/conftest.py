@@ -2,9 +2,18 @@ import hypothesis
 import pytest
 import toy as toy_model
 
-# the same examples every time; `--hypothesis-profile=default` looks for new ones
-hypothesis.settings.register_profile("repeatable", derandomize=True)
+# the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
+hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("repeatable")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def disk_is_not_waited_for():
+    """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mdr_dask.store.files.flush", lambda path: None)
+        yield
 
 
 @pytest.fixture

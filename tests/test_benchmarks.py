@@ -4,6 +4,7 @@ import importlib
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 
@@ -25,6 +26,38 @@ def test_error_estimates_beyond_cubic_cells_on_planes_are_honest(benchmark_scrip
         assert number >= 55
         assert share >= 0.87
         assert over <= 14
+
+
+#: Solver and the error that its best setting of the short version stays below.
+SOLVERS = {
+    "friction": 2e-3,
+    "indenters": 2e-4,
+    "solids": 1e-4,
+    "jumps": 0.05,
+    "histories": 0.05,
+    "transforms": 1e-12,
+    "wear": 0.02,
+    "films": 1e-3,
+    "rollers": 0.1,
+    "master_curves": 0.03,
+}
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solver_is_measured_against_its_reference(benchmark_script, solver):
+    """The short version of the page: easy cases, two settings, a reference of three digits."""
+    script = benchmark_script("accuracy.measure")
+    assert set(script.SOLVERS) == set(SOLVERS)
+    points = list(script.SOLVERS[solver](True))
+    assert np.nanmin([point.error for point in points]) < SOLVERS[solver]
+    assert all(point.seconds >= 0 and not point.error <= 0 for point in points)
+    about = benchmark_script("accuracy.page").ABOUT
+    assert {point.solver for point in points} <= set(about)
+
+
+def test_the_page_of_accuracy_is_what_its_table_says(benchmark_script):
+    script = benchmark_script("accuracy.page")
+    assert script.text(script.read()) == script.PAGE.read_text()
 
 
 def test_the_page_of_validity_is_what_its_evidence_says(benchmark_script):

@@ -11,10 +11,12 @@ import click
 
 from mdr_dask.cli.campaigns import check, init, models, schema
 from mdr_dask.cli.figures import figures, plot
+from mdr_dask.cli.fitting import fit
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
 from mdr_dask.cli.printing import printable
-from mdr_dask.cli.results import aggregate, fit, show, status
+from mdr_dask.cli.publishing import publish, report, serve
+from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
 from mdr_dask.cli.sensitivity import sensitivity
 from mdr_dask.cli.storage import verify
@@ -36,6 +38,7 @@ def cli() -> None:
     mdr-dask run campaigns/quickstart.yaml       run it, or what is missing of it
     mdr-dask show results/quickstart.zarr        look at results, while it runs too
     mdr-dask plot results/quickstart.zarr        draw the figures
+    mdr-dask report results/quickstart.zarr      one page with everything, for any browser
 
     Completion in bash: eval "$(_MDR_DASK_COMPLETE=bash_source mdr-dask)"; in zsh and fish likewise.
     Exit codes: 0 all done, 1 ran but some cases failed, 2 refused, 3 the program broke, 130 interrupted.
@@ -56,6 +59,9 @@ for command in (
     law,
     plot,
     figures,
+    report,
+    serve,
+    publish,
     master_curve,
     surface,
     schema,

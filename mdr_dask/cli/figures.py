@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mdr_dask.plots.page import Page
 
 #: Options of figures of outputs; those with a name have axes of their own.
-OF_OUTPUTS = ("over", "by", "panels", "effects", "log", "units")
+OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
 
@@ -78,7 +78,7 @@ def plot(
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --by normal_force --size 85mm -o f.pdf
     mdr-dask plot results/quickstart.zarr friction_coefficient --over velocity --over normal_force -o map.png
     """
-    from mdr_dask.plots import page
+    from mdr_dask.plots import page, table
     from mdr_dask.questions import selection
 
     urls, names = _apart(words)
@@ -91,12 +91,26 @@ def plot(
     asked, style_file = _page(look), look.get("style")
     with page.drawing_for(asked, style_file), _readable(urls):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
+        _require_quantities(asked.units, groups)
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = {key: selection.where(data, where) for key, data in groups.items()}
             figures = {name: _without(figure, where) for name, figure in figures.items()}
         for (name, figure), path in zip(figures.items(), places, strict=True):
-            _draw(figure, groups, path, provenance(name, urls, str(context.meta.get(COMMAND, ""))), everything)
+            origin = table.provenance(name, urls, str(context.meta.get(COMMAND, "")))
+            _draw(figure, groups, path, origin, everything)
+    if unused := asked.units.keys() - asked.used:
+        tell(f"--units {', '.join(sorted(unused))}: shown in no figure that was drawn")
+
+
+def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Dataset]) -> None:
+    """Refuse units of what is no parameter and no output."""
+    from mdr_dask.errors import DataError, did_you_mean
+
+    known = sorted({str(name) for data in groups.values() for name in data.variables})
+    for name in units:
+        if name not in known:
+            raise DataError(f"no quantity {name!r} to give a unit{did_you_mean(name, known)}")
 
 
 def _without(figure: Plot, where: str) -> Plot:
@@ -237,32 +251,17 @@ def _draw(figure: Plot, groups: Mapping[str, xr.Dataset], path: Path, origin: di
 
 
 def save(figure: Figure, path: Path, origin: Mapping[str, str]) -> None:
-    """Write a figure, and its data beside it."""
+    """Write a figure, and its data beside it; a table there that is of no figure is not written over."""
     from mdr_dask.plots import table
 
+    beside = path.with_suffix(".csv")
+    if isinstance(figure, table.Drawn) and beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
+        raise click.UsageError(f"{beside}: a table that is of no figure stands there; give the figure another name")
     with writing(path):
         table.save_picture(figure, path)
     if isinstance(figure, table.Drawn):
-        with writing(path.with_suffix(".csv")):
-            table.save_table(figure, path.with_suffix(".csv"), origin)
-
-
-def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
-    """Return what the table of a figure says of its origin."""
-    import hashlib
-
-    from mdr_dask import store as stores
-    from mdr_dask.version import __version__
-
-    told = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
-    for url in urls:
-        held = stores.attributes(url)
-        digest = hashlib.sha256(str(held["campaign"]).encode()).hexdigest()
-        told[f"store {url}"] = (
-            f"campaign {held['title']}, sha256 {digest}, model {held['model']} version {held['model_version']}, "
-            f"computed by mdr_dask {held['versions']['mdr_dask']}"
-        )
-    return told
+        with writing(beside):
+            table.save_table(figure, beside, origin)
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:

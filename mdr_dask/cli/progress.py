@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from mdr_dask.units import seconds
+
 if TYPE_CHECKING:
     from mdr_dask.execute import Progress
 
@@ -129,15 +131,3 @@ def _compiles() -> bool:
     from mdr_dask.compile_clock import compile_clock
 
     return "numba" in sys.modules and compile_clock().is_running
-
-
-def seconds(duration: float) -> str:
-    """Return a duration as a person says it."""
-    if duration < 60:
-        return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
-    minutes, rest = divmod(round(duration), 60)
-    if minutes < 10:
-        return f"{minutes} min {rest} s"
-    if minutes < 60:
-        return f"{minutes} min"
-    return f"{minutes // 60} h {minutes % 60} min"

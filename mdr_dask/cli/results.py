@@ -1,30 +1,22 @@
-"""Commands around a store: status, show, aggregate, fit."""
+"""Commands around a store: status, show, aggregate."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from mdr_dask.cli import watching
 from mdr_dask.cli.answers import check_target, print_answer, write_answer
 from mdr_dask.cli.options import (
-    csv_option,
     json_option,
-    limit_option,
     question_options,
-    series_option,
     tell,
 )
-from mdr_dask.cli.printing import print_json, print_rows, printable, table, with_intervals
+from mdr_dask.cli.printing import print_json, print_rows, printable
 from mdr_dask.cli.writing import writing
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from mdr_dask.store import Look
 
 
 class Reading(click.Command):
@@ -58,29 +50,29 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
     mdr-dask status results/quickstart.zarr --failures
     """
     from mdr_dask import store as room
+    from mdr_dask.questions import progress
 
     if watch:
         if failures or messages or form:
             raise click.UsageError("expected --watch alone, without --failures, --messages and --json")
-        watching.watch(store, lambda: [_count(look) for look in _looks(store)])
+        watching.watch(store, lambda: [progress.counts(look) for look in progress.looks(store)])
         return
     if not (failures or messages):
-        looks = _looks(store)
-        _print_counts([_count(look) for look in looks], watching.at_work(store), form)
+        looks = progress.looks(store)
+        _print_counts([progress.counts(look) for look in looks], watching.at_work(store), form)
         room.require_blocks(looks)
         return
-    groups = room.datasets(store)
-    found = [message for name, dataset in groups.items() for message in _told(store, name, dataset)]
+    found = [message for name, data in room.datasets(store).items() for message in progress.messages(store, name, data)]
     if not messages:
         found = [message for message in found if message["status"] != "done"]
     if form == "json":
         print_json(found)
         return
-    for series, reason in dict.fromkeys((message["series"], message["message"]) for message in found):
-        alike = [message for message in found if (message["series"], message["message"]) == (series, reason)]
-        kind = "warning" if alike[0]["status"] == "done" else alike[0]["status"]
-        click.echo(printable(f"{series + ': ' if series else ''}{len(alike)} x {kind}: {reason}"))
-        click.echo(printable(f"    {_shared(alike)}"))
+    for group in progress.grouped(found):
+        click.echo(
+            printable(f"{group.series + ': ' if group.series else ''}{group.results} x {group.kind}: {group.reason}")
+        )
+        click.echo(printable(f"    {group.cases}"))
     if not found:
         click.echo("no failures" if not messages else "no messages")
 
@@ -92,51 +84,6 @@ def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | No
     print_rows(rows, {}, "table")
     if at_work:
         click.echo(f"at work: {', '.join(at_work)}")
-
-
-def _looks(store: str) -> list[Look]:
-    from mdr_dask import store as room
-
-    names = room.series_names(store)
-    room.require_laid_out(store, names)
-    return [room.look(store, name) for name in names]
-
-
-def _count(look: Look) -> dict[str, Any]:
-    from mdr_dask.models.base import Status
-
-    counts = {state.name.lower(): int((look.status == state).sum()) for state in Status}
-    return {"series": look.chunks.series or "-", "results": look.status.size, **counts}
-
-
-def _told(store: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return what still holds of the messages of a group: the last attempt's, where the ledger says the same."""
-    from mdr_dask import store as room
-    from mdr_dask.models.base import Status
-
-    last: dict[tuple[int, ...], dict[str, Any]] = {}
-    telling = [record for record in room.records(store, series) if record["messages"]]
-    for record in sorted(telling, key=lambda record: record["attempt"]):
-        for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
-            last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
-    ledger = room.ledger(store, series, dataset["status"].shape)
-    return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
-
-
-def _shared(messages: list[dict[str, Any]]) -> str:
-    """Return the range that each varied parameter takes among the messages."""
-    parts = []
-    for path in messages[0]["case"]:
-        values = sorted({message["case"].get(path) for message in messages}, key=lambda v: (str(type(v)), v))
-        if len(values) == 1:
-            parts.append(f"{path} = {_brief(values[0])}")
-        else:
-            parts.append(f"{path} {_brief(values[0])} .. {_brief(values[-1])} ({len(values)} values)")
-    return ", ".join(parts) or "the only case"
-
-
-def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 @click.command(cls=Reading)
@@ -216,46 +163,6 @@ def _answer(
     answer = table(dataset, question, 0, tell)
     rows = write_answer(answer, output)
     click.echo(f"{output}: {rows} rows of {', '.join(answer.units)}")
-
-
-@click.command(cls=Reading)
-@store_argument
-@click.argument("names", nargs=-1)
-@series_option
-@limit_option
-@json_option
-@csv_option
-def fit(store: str, names: tuple[str, ...], series: str | None, limit: int, form: str | None) -> None:
-    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
-
-    \b
-    mdr-dask fit results/friction_force.zarr
-    mdr-dask fit results/friction_force.zarr zone_one --json
-    """
-    from mdr_dask import fits as room
-    from mdr_dask import store as stores
-    from mdr_dask.questions import selection
-
-    model = stores.attributes(store)["model"]
-    known = room.available(model)
-    if not names:
-        list_names(model, {name: law.summary for name, law in known.items()})
-        return
-    require_known(names, list(known), f"law for {model}")
-    groups = stores.datasets(store)
-    if series is not None:
-        groups = {series: selection.group(groups, series)}
-    for name in names:
-        found = known[name].results(groups)
-        for group, result in found.items():
-            if (len(names) > 1 or len(found) > 1) and not form:
-                click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
-            rows, units = table(result)
-            if not form:
-                rows, units = with_intervals(rows, units)
-            print_rows(
-                [{"series": group, **row} for row in rows] if group and form else rows, units, form or "table", limit
-            )
 
 
 def list_names(model: str, summaries: dict[str, str]) -> None:

@@ -11,8 +11,9 @@ import click
 from mdr_dask.cli.campaigns import CAMPAIGN, ask
 from mdr_dask.cli.log import telling
 from mdr_dask.cli.printing import print_json
-from mdr_dask.cli.progress import reporter, seconds
+from mdr_dask.cli.progress import reporter
 from mdr_dask.cli.understood import costs_row, study_lines
+from mdr_dask.units import seconds
 
 if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from mdr_dask.cli.figures import COMMAND, Drawing, provenance, save
+from mdr_dask.cli.figures import COMMAND, Drawing, save
 from mdr_dask.cli.options import csv_option, json_option, select_option, series_option, tell
 from mdr_dask.cli.printing import print_json, print_rows, table, with_intervals
 from mdr_dask.cli.results import Reading, store_argument
@@ -63,6 +63,7 @@ def sensitivity(
         tell(sentence)
     if figure is not None:
         from mdr_dask.plots.sensitivity import sensitivity as drawn
+        from mdr_dask.plots.table import provenance
 
         save(drawn(found), figure, provenance("sensitivity", [store], str(context.meta[COMMAND])))
         tell(str(figure))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -23,10 +24,16 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     \b
     mdr-dask verify results/quickstart.zarr
     mdr-dask verify results/quickstart.zarr --repair
+    mdr-dask verify study.zip
     """
     from mdr_dask import store as room
 
-    found, left = room.repair(store) if repair else (room.verify(store), None)
+    if _is_packed(store):
+        if repair:
+            raise click.UsageError("--repair is for a store, not for a published zip; unpack it first")
+        found, left = room.verify_packed(Path(store)), None
+    else:
+        found, left = room.repair(store) if repair else (room.verify(store), None)
     if form == "json":
         print_json(_document(found) | ({"left": _document(left)["findings"]} if left else {}))
     else:
@@ -36,6 +43,10 @@ def verify(store: str, repair: bool, limit: int, form: str | None) -> int:
     for finding in left.findings:
         click.echo(printable(f"left as it is: {finding.kind} {finding.name}: {finding.what}"), err=True)
     return 1 if left.findings else 0
+
+
+def _is_packed(store: str) -> bool:
+    return store.endswith(".zip") and Path(store).is_file()
 
 
 def _print(store: str, found: Inspection, limit: int) -> None:

@@ -9,6 +9,7 @@ from mdr_dask.fits.base import Fit
 
 #: Modules of this room that hold ``FITS``.
 SUBJECTS: tuple[str, ...] = (
+    "calibration",
     "ehl",
     "friction",
     "kinetic_courses",
@@ -27,4 +28,4 @@ def available(model: str) -> dict[str, Fit]:
     """Return the fits for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
     own = (import_module(f"mdr_dask.fits.{subject}").FITS for subject in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
-    return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models}
+    return {fit.name: fit for fits in (*own, *others) for fit in fits if model in fit.models or not fit.models}

@@ -33,7 +33,7 @@ class Fit:
     name : str
         As in ``mdr-dask fit STORE NAME``.
     models : tuple of str
-        Models whose stores it understands.
+        Models whose stores it understands; none stands for all models.
     summary : str
         One line with the law itself.
     compute : callable, mapping of str to Dataset -> Dataset

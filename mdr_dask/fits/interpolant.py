@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.aggregation import aggregate
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits.interpolation import FEWEST, Scale, bent, cubic, dense, linear, missed
+from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written
+from mdr_dask.refinement import departure
 
-#: Fewest values of an axis: every second one left out has to leave a curve.
-FEWEST = 4
 #: Numbers that a table holds at most, and pieces into which it cuts a cell of the study at most.
 LARGEST, PIECES = 2_000_000, 16
-#: What is left of the error of every second value when all are used: a quarter at second order, half at kinks.
-LEFT = 0.25
 
 
 def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
@@ -57,22 +55,22 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     if "case" in dataset.dims:
         raise FitError("expected a grid, this is a sampled study: its cases lie along no axes")
     mean, half = (array.squeeze() for array in _means(dataset, output))
+    scale = Scale.of(mean.to_numpy()[mean.notnull().to_numpy()], spread=True)
+    mean, half = _filled(mean, half, scale)
     axes = [str(dim) for dim in mean.dims if _is_numeric(mean, str(dim))]
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
     values = mean.transpose(..., *axes).to_numpy()
     half = half.transpose(*mean.transpose(..., *axes).dims)
-    scale = _Scale.of(values.ravel(), spread=True)
-    grids = [_dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes]
+    grids = [dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes]
     table, error = scale.of_values(values), half.to_numpy()
-    missed = sum(_missed(scale, table, mean[axis].to_numpy(), axis=k - len(axes)) for k, axis in enumerate(axes))
-    error = error + missed
+    error = error + sum(missed(scale, table, mean[axis].to_numpy(), k - len(axes)) for k, axis in enumerate(axes))
     for k, (axis, grid) in enumerate(zip(axes, grids, strict=True)):
         place = mean[axis].to_numpy()
-        table = _interpolated(place, table, grid, k - len(axes))
-        error = _linear(place, error, grid, k - len(axes))
+        table = cubic(place, table, grid, k - len(axes))
+        error = linear(place, error, grid, k - len(axes))
     table = scale.back(table)
-    error = error + sum(_bent(table, grid, k - len(axes)) for k, grid in enumerate(grids))
+    error = error + sum(bent(table, grid, k - len(axes)) for k, grid in enumerate(grids))
     found = mean.transpose(..., *axes)
     coords: dict[str, Any] = {
         str(dim): found[dim] for dim in found.dims if str(dim) not in axes and dim in found.coords
@@ -97,7 +95,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
     reduced = aggregate(dataset[kept], ("mean", "interval", "grid_error"))
     mean, ends = reduced[f"{output}_mean"].load(), reduced[f"{output}_interval"].load()
-    lost = int(mean.isnull().sum())
+    lost = int((mean.isnull() & ~_spared(dataset)).sum())
     if lost:
         raise FitError(
             f"{output}: {lost} of {mean.size} cases have no value; finish the run, or keep a part that is whole by "
@@ -105,7 +103,41 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
         )
     half = (ends.sel(bound="high", drop=True) - ends.sel(bound="low", drop=True)) / 2
     grid = reduced.get(f"{output}_grid_error")
-    return mean, half.fillna(0.0 if grid is None else grid.fillna(0.0))
+    return mean, half.fillna(0.0 if grid is None else grid.fillna(0.0)).where(mean.notnull())
+
+
+def _spared(dataset: xr.Dataset) -> xr.DataArray:
+    """Return which cases were not needed: those that adaptive axes left to interpolation."""
+    if "status" not in dataset:
+        return xr.DataArray(False)
+    return (dataset["status"] == Status.NOT_NEEDED).all("realisation")
+
+
+def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
+    """Interpolate cases that were not needed between those that were, with the error of that added to theirs."""
+    axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
+    table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
+    for axis in axes * 2:  # what one axis leaves, the other one fills
+        places = mean[mean.dims[axis]].to_numpy()
+        lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
+        for case in np.ndindex(lines.shape[:-1]):
+            known = np.isfinite(lines[case])
+            if not known.all() and known.sum() >= FEWEST:
+                lines[case], errors[case] = _between(scale, places, lines[case], errors[case])
+    return mean.copy(data=scale.back(table)), half.copy(data=error)
+
+
+def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a line with what lies between its known values, and its errors."""
+    known = np.isfinite(line)
+    filled = cubic(places[known], line[known], places, 0, Scale.of(places))
+    places = Scale.of(places).of_values(places)
+    apart = departure(places[known], line[None, None, known], np.zeros((1, int(known.sum()))))[0]
+    space = np.clip(np.searchsorted(places[known], places) - 1, 0, apart.size - 1)
+    beside = np.where(known, 0.0, apart[space]) * (scale.back(filled) if scale.logarithmic else 1.0)
+    inside = (places >= places[known][0]) & (places <= places[known][-1])
+    around = np.interp(places, places[known], error[known]) + beside
+    return np.where(inside, filled, np.nan), np.where(known, error, around)
 
 
 def _is_numeric(mean: xr.DataArray, dim: str) -> bool:
@@ -116,81 +148,6 @@ def _pieces(mean: xr.DataArray, axes: list[str]) -> int:
     """Return into how many pieces the cells of each axis are cut."""
     room = (LARGEST / mean.size) ** (1 / len(axes))
     return int(np.clip(room, 1, PIECES))
-
-
-class _Scale:
-    """A scale on which numbers are interpolated: as they are, or their logarithms."""
-
-    def __init__(self, logarithmic: bool) -> None:
-        self.logarithmic = logarithmic
-
-    @classmethod
-    def of(cls, numbers: FloatArray, spread: bool = False) -> _Scale:
-        """Return the scale on which sorted numbers are more even; of values that are spread, over a decade or more."""
-        if numbers.min() <= 0:
-            return cls(False)
-        if spread:
-            return cls(bool(numbers.max() > 10 * numbers.min()))
-        steps = (np.diff(numbers), np.diff(np.log(numbers)))
-        even = [np.std(step) / np.mean(step) for step in steps]
-        return cls(bool(even[1] < even[0]))
-
-    def of_values(self, values: FloatArray) -> FloatArray:
-        return np.log(values) if self.logarithmic else np.asarray(values, dtype=np.float64)
-
-    def back(self, values: FloatArray) -> FloatArray:
-        return np.exp(values) if self.logarithmic else values
-
-
-def _dense(places: FloatArray, pieces: int) -> FloatArray:
-    """Return places with each step cut into equal pieces on their natural scale; the places themselves stay."""
-    scale = _Scale.of(places)
-    cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
-    dense = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
-    dense[::pieces] = places
-    return dense
-
-
-def _interpolated(places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int) -> FloatArray:
-    from scipy.interpolate import PchipInterpolator
-
-    scale = _Scale.of(places)
-    curve = PchipInterpolator(scale.of_values(places), values, axis=axis)
-    return np.asarray(curve(scale.of_values(wanted)))
-
-
-def _linear(places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int) -> FloatArray:
-    from scipy.interpolate import make_interp_spline
-
-    scale = _Scale.of(places)
-    return np.asarray(make_interp_spline(scale.of_values(places), values, k=1, axis=axis)(scale.of_values(wanted)))
-
-
-def _missed(scale: _Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
-    """Return the error of interpolation along an axis at every place, from predicting the values left out."""
-    values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
-    missed = np.zeros_like(truth)
-    number = len(places)
-    for first in (0, 1):
-        kept = np.unique([0, *range(first, number, 2), number - 1])
-        predicted = scale.back(_interpolated(places[kept], values[..., kept], places, -1))
-        missed = np.maximum(missed, np.abs(predicted - truth))
-    around = np.pad(missed, [(0, 0)] * (missed.ndim - 1) + [(1, 1)], mode="edge")
-    return np.moveaxis(LEFT * _largest(around), -1, axis)
-
-
-def _bent(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
-    """Return by how much straight lines between the values of a table miss a curve: its second derivative h^2 / 8."""
-    values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
-    bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
-    inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4
-    around = np.pad(inside, [(0, 0)] * (inside.ndim - 1) + [(2, 2)], mode="edge")
-    return np.moveaxis(_largest(around), -1, axis)
-
-
-def _largest(padded: FloatArray) -> FloatArray:
-    """Return the largest of every three neighbours along the last axis."""
-    return np.asarray(np.max([padded[..., :-2], padded[..., 1:-1], padded[..., 2:]], axis=0))
 
 
 def _provenance(dataset: xr.Dataset) -> dict[str, str]:

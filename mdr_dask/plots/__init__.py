@@ -9,7 +9,7 @@ from mdr_dask.plots.base import Plot
 
 #: Modules of this room that hold ``PLOTS``.
 SUBJECTS: tuple[str, ...] = (
-    *("contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "scaling", "wear"),
+    *("calibration", "contact", "ehl", "friction", "kinetics", "master_curve", "mixed", "protocols", "scaling", "wear"),
 )
 
 #: Entry point group in which other packages offer tuples of `Plot`.
@@ -20,4 +20,4 @@ def available(model: str) -> dict[str, Plot]:
     """Return the figures for stores of a model, by name; other packages offer tuples of them in `GROUP`."""
     own = (import_module(f"mdr_dask.plots.{subject}").PLOTS for subject in SUBJECTS)
     others = (entry.load() for entry in entry_points(group=GROUP))
-    return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models}
+    return {plot.name: plot for plots in (*own, *others) for plot in plots if model in plot.models or not plot.models}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
 from mdr_dask.store import is_damage
@@ -25,7 +26,7 @@ class Plot:
     name : str
         As in ``mdr-dask plot STORE NAME``.
     models : tuple of str
-        Models whose stores it understands.
+        Models whose stores it understands; none stands for all models.
     summary : str
         One line: what against what, and the figure of the thesis it redraws.
     draw : callable, mapping of str to Dataset -> Figure
@@ -41,17 +42,20 @@ class Plot:
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Figure:
         """Draw it from the groups of a store; results that failed or are missing are counted under it.
 
-        Axes of one value are parameters at a fixed value.
+        Axes of one value are parameters at a fixed value. Parameters have the units in which their campaigns are
+        written, where these agree.
 
         Raises
         ------
         DataError, FitError
             If the store has not the data for it.
         """
+        from mdr_dask.plots import page
         from mdr_dask.plots.style import leave_out
 
         try:
-            figure = self.draw({name: _prepared(data) for name, data in groups.items()})
+            with page.with_units(_written_units(groups)):
+                figure = self.draw({name: _prepared(data) for name, data in groups.items()})
         except MdrDaskError:
             raise
         except Exception as error:
@@ -64,9 +68,14 @@ class Plot:
         return figure
 
 
+def _written_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the units of parameters on which the campaigns of all groups agree."""
+    first, *others = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
+    return {name: unit for name, unit in first.items() if all(other.get(name, unit) == unit for other in others)}
+
+
 def _prepared(data: xr.Dataset) -> xr.Dataset:
-    """Return a series with its coordinates read once, and parameters of one value fixed."""
-    data = data.assign_coords({name: value.copy(data=value.to_numpy()) for name, value in data.coords.items()})
+    """Return a series with parameters of one value fixed."""
     if "status" not in data:
         return data
     return data.squeeze([dim for dim in data["status"].dims if dim != "realisation" and data.sizes[dim] == 1])

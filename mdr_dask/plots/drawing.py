@@ -12,6 +12,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.plots import page, style
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from mdr_dask.plots.table import Drawn
@@ -69,21 +70,24 @@ def panels(
     return figure, grid[:count]
 
 
-def _record(axes: Axes, what: str, label: str | None, of: Mapping[str, xr.DataArray], columns: dict[str, Any]) -> None:
-    """Write down what is drawn; a figure that was made elsewhere has no table."""
+def _record(
+    artist: Artist, what: str, label: str | None, of: Mapping[str, xr.DataArray], columns: dict[str, Any]
+) -> None:
+    """Write down what an artist of matplotlib draws; a figure that was made elsewhere has no table."""
     from mdr_dask.plots.table import Drawn
 
-    figure = axes.get_figure(root=True)
+    figure = artist.get_figure(root=True)
     if isinstance(figure, Drawn):
-        figure.write_down(axes, what, label or "", of, columns)
+        figure.write_down(artist, what, label or "", of, columns)
 
 
 def _coordinates(values: Any) -> dict[str, xr.DataArray]:
     """Return the parameters of every point of an array, each in its shape."""
     if not isinstance(values, xr.DataArray):
         return {}
+    shape = dict(values.sizes)
     return {
-        str(name): coord.broadcast_like(values).transpose(*values.dims).assign_attrs(coord.attrs)
+        str(name): xr.DataArray(coord.variable.set_dims(shape).transpose(*shape), attrs=coord.attrs)
         for name, coord in values.coords.items()
     }
 
@@ -99,13 +103,13 @@ def _ends(name: str, y: Mean) -> dict[str, FloatArray]:
 
 def curve(axes: Axes, one: Curve, x: Any, y: Mean, bars: bool = False) -> None:
     """Draw a curve with its band, or with bars; points that belong on no line have bars."""
-    _record(axes, DATA, one.label, _coordinates(y.value), {"x": flat(x), **_ends("y", y)})
     across, value, low, high = (flat(each) for each in (x, y.value, y.low, y.high))
     order = np.argsort(across, kind="stable")
     across, value, low, high = across[order], value[order], low[order], high[order]
     marker = one.marker if value.size < MANY_POINTS or not one.line else ""
     look: dict[str, Any] = {"ms": 3, "lw": 1.2, "color": one.colour, "label": one.label or None}
-    axes.plot(across, value, linestyle=one.line or "none", marker=marker, gid=style.DATA, **look)
+    (line,) = axes.plot(across, value, linestyle=one.line or "none", marker=marker, gid=style.DATA, **look)
+    _record(line, DATA, one.label, _coordinates(y.value), {"x": flat(x), **_ends("y", y)})
     if not np.isfinite(low).any():
         return
     if bars or not one.line:
@@ -117,9 +121,9 @@ def curve(axes: Axes, one: Curve, x: Any, y: Mean, bars: bool = False) -> None:
 def points(axes: Axes, x: Any, y: Mean, colour: Any, marker: str, label: str | None, along: Mean | None = None) -> None:
     """Draw points with their bars, upwards and perhaps sideways."""
     sideways = {} if along is None else _ends("x", along)
-    _record(axes, DATA, label, _coordinates(y.value), {"x": flat(x), **sideways, **_ends("y", y)})
     across, value = flat(x), flat(y.value)
-    axes.plot(across, value, marker, ms=4, color=colour, label=label, gid=style.DATA)
+    (line,) = axes.plot(across, value, marker, ms=4, color=colour, label=label, gid=style.DATA)
+    _record(line, DATA, label, _coordinates(y.value), {"x": flat(x), **sideways, **_ends("y", y)})
     _bars(axes, across, value, _lengths(value, flat(y.low), flat(y.high)), colour)
     if along is not None:
         bars = axes.errorbar(
@@ -130,30 +134,31 @@ def points(axes: Axes, x: Any, y: Mean, colour: Any, marker: str, label: str | N
 
 def shaded(axes: Axes, x: Any, y: Mean, value: Any, **look: Any) -> Any:
     """Draw points with their bars, in colours that a colour bar names; returns what it is made of."""
-    _record(axes, DATA, None, _coordinates(y.value), {"x": flat(x), **_ends("y", y), "value": flat(value)})
     _bars(axes, flat(x), flat(y.value), _lengths(flat(y.value), flat(y.low), flat(y.high)), "0.7")
     known = np.isfinite(flat(y.value))
     at = flat(x)[known], flat(y.value)[known]
-    return axes.scatter(*at, c=flat(value)[known], s=14, zorder=3, gid=style.DATA, **look)
+    drawn = axes.scatter(*at, c=flat(value)[known], s=14, zorder=3, gid=style.DATA, **look)
+    _record(drawn, DATA, None, _coordinates(y.value), {"x": flat(x), **_ends("y", y), "value": flat(value)})
+    return drawn
 
 
 def absent(axes: Axes, x: xr.DataArray, why: str, **look: Any) -> None:
     """Mark at the foot of a panel where points have no value."""
     across = flat(x)
     known = np.isfinite(across)
-    _record(axes, why, None, {name: value[known] for name, value in _coordinates(x).items()}, {"x": across[known]})
     place = np.full(int(known.sum()), FOOT)
-    axes.plot(
+    (marks,) = axes.plot(
         across[known], place, ls="", ms=5, transform=axes.get_xaxis_transform(), zorder=4, gid=style.GUIDE, **look
     )
+    _record(marks, why, None, {name: value[known] for name, value in _coordinates(x).items()}, {"x": across[known]})
 
 
 def plain(
     axes: Axes, x: Any, y: Any, *form: str, label: str | None = None, of: xr.Dataset | None = None, **look: Any
 ) -> None:
-    """Draw data without errors of their own as `Axes.plot` does; `of` has the parameters of their case."""
-    _record(axes, DATA, label, _fixed(of), {"x": flat(x), "y": flat(y)})
-    axes.plot(flat(x), flat(y), *form, label=label, gid=style.DATA, **look)
+    """Draw data without errors of their own as `Axes.plot` does; parameters are those of y, or of the case `of`."""
+    (line,) = axes.plot(flat(x), flat(y), *form, label=label, gid=style.DATA, **look)
+    _record(line, DATA, label, _fixed(of) | _coordinates(y), {"x": flat(x), "y": flat(y)})
 
 
 def law(
@@ -167,22 +172,23 @@ def law(
     **look: Any,
 ) -> None:
     """Draw a law as `Axes.plot` does; the table calls it by `name`, or else by its label."""
-    _record(axes, name or label or "law", label, _fixed(of), {"x": flat(x), "y": flat(y)})
-    axes.plot(flat(x), flat(y), *form, label=label, gid=style.LAW, **look)
+    (line,) = axes.plot(flat(x), flat(y), *form, label=label, gid=style.LAW, **look)
+    _record(line, name or label or "law", label, _fixed(of), {"x": flat(x), "y": flat(y)})
 
 
 def band(axes: Axes, x: Any, low: Any, high: Any, name: str, **look: Any) -> None:
     """Draw the band that a law is known within."""
-    _record(axes, name, None, {}, {"x": flat(x), "y_low": flat(low), "y_high": flat(high)})
-    axes.fill_between(flat(x), flat(low), flat(high), alpha=0.25, linewidth=0, gid=style.LAW, **look)
+    drawn = axes.fill_between(flat(x), flat(low), flat(high), alpha=0.25, linewidth=0, gid=style.LAW, **look)
+    _record(drawn, name, None, {}, {"x": flat(x), "y_low": flat(low), "y_high": flat(high)})
 
 
 def dots(axes: Axes, x: Any, y: Any, value: Any, ends: Mean | None = None, **look: Any) -> Any:
     """Draw points whose colour is a value; returns what a colour bar is made of."""
     columns = {"x": flat(x), "y": flat(y), **({"value": flat(value)} if ends is None else _ends("value", ends))}
-    _record(axes, DATA, None, _coordinates(value), columns)
     known = np.isfinite(flat(value))
-    return axes.scatter(flat(x)[known], flat(y)[known], c=flat(value)[known], gid=style.DATA, **look)
+    drawn = axes.scatter(flat(x)[known], flat(y)[known], c=flat(value)[known], gid=style.DATA, **look)
+    _record(drawn, DATA, None, _coordinates(value), columns)
+    return drawn
 
 
 def field(axes: Axes, x: xr.DataArray, y: xr.DataArray, values: Mean, **look: Any) -> Any:
@@ -193,25 +199,26 @@ def field(axes: Axes, x: xr.DataArray, y: xr.DataArray, values: Mean, **look: An
     value, low, high = (each.transpose(y.dims[0], x.dims[0]) for each in values)
     across, up = (each.broadcast_like(value).transpose(*value.dims) for each in (x, y))
     columns = {"x": flat(across), "y": flat(up), **_ends("value", Mean(value, low, high))}
-    _record(axes, DATA, None, _coordinates(value), columns)
-    return axes.pcolormesh(_edges(flat(x)), _edges(flat(y)), value.values, gid=style.DATA, rasterized=True, **look)
+    drawn = axes.pcolormesh(edges(flat(x)), edges(flat(y)), value.values, gid=style.DATA, rasterized=True, **look)
+    _record(drawn, DATA, None, _coordinates(value), columns)
+    return drawn
 
 
-def _edges(centres: FloatArray) -> FloatArray:
+def edges(centres: FloatArray) -> FloatArray:
     """Return the ends of the cells around the values of an axis."""
     if centres.size == 1:
         half = 0.5 * (abs(float(centres[0])) or 1.0)
         return np.array([centres[0] - half, centres[0] + half])
     if style.is_geometric(centres):
-        edges: FloatArray = np.exp(_edges_between(np.log(centres)))
-        return edges
+        geometric: FloatArray = np.exp(_edges_between(np.log(centres)))
+        return geometric
     return _edges_between(centres)
 
 
 def _edges_between(centres: FloatArray) -> FloatArray:
     between = 0.5 * (centres[1:] + centres[:-1])
-    edges: FloatArray = np.concatenate([[2 * centres[0] - between[0]], between, [2 * centres[-1] - between[-1]]])
-    return edges
+    ends: FloatArray = np.concatenate([[2 * centres[0] - between[0]], between, [2 * centres[-1] - between[-1]]])
+    return ends
 
 
 def _lengths(value: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 import pandas as pd
@@ -12,10 +13,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from mdr_dask import store as stores
 from mdr_dask.plots import page, style
+from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
 
 #: Points to an inch of a picture, and of one whose printed size was asked for.
 DPI, PRINTED_DPI = 150, 300
@@ -25,11 +30,34 @@ LAST = tuple(f"{name}{end}" for name in ("x", "y", "value") for end in ("", "_lo
 
 
 class Rows(NamedTuple):
-    """What one curve, law or map adds to a table: columns of equal length, and the units of parameters."""
+    """What one curve, law or map adds to a table.
+
+    Attributes
+    ----------
+    axes : Axes
+        The panel.
+    columns : dict
+        Of equal length; words that all points share stand alone.
+    units : dict of str to str
+        Of the parameters.
+    label : str
+        Entry in the legend, as matplotlib writes it.
+    artist : Artist
+        What draws it.
+    """
 
     axes: Axes
     columns: dict[str, Any]
     units: dict[str, str]
+    label: str
+    artist: Artist
+
+
+class Bar(NamedTuple):
+    """A colour bar, and the panels that it stands beside."""
+
+    drawn: Colorbar
+    panels: list[Axes]
 
 
 class Drawn(Figure):
@@ -38,9 +66,17 @@ class Drawn(Figure):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.rows: list[Rows] = []
+        self.bars: list[Bar] = []
+
+    def colorbar(self, mappable: Any, *arguments: Any, **options: Any) -> Colorbar:
+        """Draw a colour bar, as any figure does."""
+        beside: Any = options.get("ax", getattr(mappable, "axes", None))
+        bar = super().colorbar(mappable, *arguments, **options)
+        self.bars.append(Bar(bar, list(beside) if isinstance(beside, Iterable) else [beside]))
+        return bar
 
     def write_down(
-        self, axes: Axes, what: str, label: str, parameters: Mapping[str, xr.DataArray], columns: Mapping[str, Any]
+        self, artist: Artist, what: str, label: str, parameters: Mapping[str, xr.DataArray], columns: Mapping[str, Any]
     ) -> None:
         """Add points to the table; those without a value are none, but for the marks of cases that have none."""
         drawn = next((columns[name] for name in ("value", "y", "y_low") if name in columns), columns["x"])
@@ -52,7 +88,8 @@ class Drawn(Figure):
         shown = {name: np.broadcast_to(column, known.shape)[known] for name, column in columns.items()}
         units = {name: str(each.attrs.get("units", "1")) for name, each in named.items()}
         words = {"curve": style.plain(label), "what": style.plain(what)}
-        self.rows.append(Rows(axes, {**words, **along, **shown}, units))
+        axes = cast("Axes", artist.axes)
+        self.rows.append(Rows(axes, {**words, **along, **shown}, units, label, artist))
 
     def panels(self) -> list[Axes]:
         """Return the panels in which anything is drawn, as the table counts them."""
@@ -79,6 +116,19 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
     return values if values.dtype.kind in "fiub" else np.array([style.plain(str(value)) for value in values])
 
 
+def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
+    """Return what the table of a figure says of its origin."""
+    told = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
+    for url in urls:
+        held = stores.attributes(url)
+        digest = hashlib.sha256(str(held["campaign"]).encode()).hexdigest()
+        told[f"store {url}"] = (
+            f"campaign {held['title']}, sha256 {digest}, model {held['model']} version {held['model_version']}, "
+            f"computed by mdr_dask {held['versions']['mdr_dask']}"
+        )
+    return told
+
+
 def save_picture(figure: Figure, path: Path) -> None:
     """Write a figure: finer where its printed size was asked for."""
     figure.savefig(path, dpi=DPI if page.asked().width is None else PRINTED_DPI)
@@ -88,7 +138,7 @@ def save_table(figure: Drawn, path: Path, provenance: Mapping[str, str]) -> None
     """Write the table of a figure, for ``pandas.read_csv(comment="#")``."""
     table = figure.table()
     with path.open("w", encoding="utf-8", newline="") as stream:
-        stream.writelines(f"# {line}\n" for line in _head(figure, table, provenance))
+        stream.writelines(f"# {line}\n" for line in head(figure, table, provenance))
         table.to_csv(stream, index=False, lineterminator="\n")
 
 
@@ -96,7 +146,7 @@ def _number(value: Any) -> str:
     return str(value) if isinstance(value, str) else f"{value:.12g}"
 
 
-def _head(figure: Drawn, table: pd.DataFrame, provenance: Mapping[str, str]) -> list[str]:
+def head(figure: Drawn, table: pd.DataFrame, provenance: Mapping[str, str]) -> list[str]:
     """Return what a table says of itself: its origin, what is held fixed, and what stands on the axes of each panel."""
     units = table.attrs["units"]
     held = {name: f"{_number(value)} {units[name]}".removesuffix(" 1") for name, value in table.attrs["held"].items()}

@@ -11,15 +11,19 @@ from mdr_dask.store.identity import Stored, reconcile
 from mdr_dask.store.layout import lay_out
 from mdr_dask.store.ledgers import ledger
 from mdr_dask.store.locks import Hold, holding, lock
+from mdr_dask.store.packing import contents, verify_packed
 from mdr_dask.store.reading import datasets, is_damage, readable, save
 from mdr_dask.store.records import attempts, kinds, put_together, record, records
 from mdr_dask.store.repairing import repair
 from mdr_dask.store.runners import Part, alone, at_work, beside, entrance
 from mdr_dask.store.sound import Look, look, require_blocks, require_laid_out, require_sound, seal
 from mdr_dask.store.study import attributes, exists, is_study, series_names
-from mdr_dask.store.verifying import Finding, Inspection, verify
+from mdr_dask.store.verifying import CHECKSUMS, CRATE, PUBLISHED, Finding, Inspection, verify
 
 __all__ = [
+    "CHECKSUMS",
+    "CRATE",
+    "PUBLISHED",
     "Finding",
     "Hold",
     "Inspection",
@@ -33,6 +37,7 @@ __all__ = [
     "attempts",
     "attributes",
     "beside",
+    "contents",
     "datasets",
     "entrance",
     "exists",
@@ -61,5 +66,6 @@ __all__ = [
     "series_names",
     "values",
     "verify",
+    "verify_packed",
     "write_block",
 ]

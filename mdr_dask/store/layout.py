@@ -18,7 +18,8 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from mdr_dask import models
 from mdr_dask.campaign import Campaign
-from mdr_dask.models.base import DataFile, Status, unit_of
+from mdr_dask.models.base import Status
+from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
 from mdr_dask.store.copies import Copy
 from mdr_dask.store.files import LAYOUT, clear, group_name, read_many, write_bytes, write_stages
@@ -88,6 +89,8 @@ def _is_laid_out(url: str, template: Template) -> bool:
     if held is None or root is None or "axes" not in held["attributes"]:
         return False
     if root["attributes"]["mdr_dask_layout"] < LAYOUT:
+        return False
+    if root["attributes"].get("measured") != _measured(template.campaign).get("measured"):
         return False
     wanted = json.loads(json.dumps(_series_attributes(template)))
     status = group_name(template.series.name, "status")
@@ -169,7 +172,7 @@ def _coordinates(template: Template) -> dict[str, _Coordinate]:
     found["realisation"] = (("realisation",), count, _attrs("1", "index of the independent realisation"))
     for dim, coordinate in template.extra.items():
         found[dim] = ((dim,), coordinate.values, _attrs(coordinate.unit, coordinate.long_name))
-    for name, (value, unit, meaning) in _numbers(template.series.parameters, "").items():
+    for name, (value, unit, meaning) in numbers_of(template.series.parameters).items():
         if name not in found and name not in template.sizes:
             found[name] = ((), np.array(value), _attrs(unit, meaning))
     for name, unit in models.load(template.campaign.model).units(template.series.parameters).items():
@@ -180,18 +183,6 @@ def _coordinates(template: Template) -> dict[str, _Coordinate]:
 
 def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
     return {"units": unit, "long_name": long_name} if unit else {"long_name": long_name}
-
-
-def _numbers(parameters: BaseModel, prefix: str) -> dict[str, tuple[float, str, str]]:
-    """Return value, unit and meaning of every number in a parameter set, nested names joined by ``_``."""
-    found: dict[str, tuple[float, str, str]] = {}
-    for name, field in type(parameters).model_fields.items():
-        value = getattr(parameters, name)
-        if isinstance(value, BaseModel) and not isinstance(value, DataFile):
-            found |= _numbers(value, f"{prefix}{name}_")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            found[prefix + name] = (value, unit_of(type(parameters), name) or "1", field.description or "")
-    return found
 
 
 def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[str, Any]:
@@ -208,6 +199,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "seed": campaign.seed,
         "accuracy": campaign.accuracy,
         "campaign": campaign.text,
+        **_measured(campaign),
         "source": Path(campaign.source).name,
         "host": platform.node(),
         "python": platform.python_version(),
@@ -215,6 +207,12 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "created": earlier.get("created", now),
         "history": history,
     }
+
+
+def _measured(campaign: Campaign) -> dict[str, Any]:
+    """Return the table of a campaign as a store holds it: whole, so that it stays with the results."""
+    table = campaign.measured
+    return {"measured": {"name": table.name, "text": table.read_text()}} if table else {}
 
 
 def _series_attributes(template: Template) -> dict[str, Any]:

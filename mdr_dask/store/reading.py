@@ -74,6 +74,8 @@ def _open_sorted(url: str, series: str) -> xr.Dataset:
     if dataset.nbytes > LAZY_BYTES:
         dataset = opened(chunks={})
     _check_axes(url, dataset)
+    # a coordinate that stays lazy is read anew by every step of a reduction
+    dataset = dataset.assign_coords({name: each.copy(data=each.to_numpy()) for name, each in dataset.coords.items()})
     for dim in dataset.dims:
         if (
             dim in dataset.indexes

@@ -6,7 +6,7 @@ import itertools
 import json
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +27,11 @@ from mdr_dask.store.study import attributes, document
 
 #: How the names of files end that were set aside.
 ASIDE = ".aside"
-_IGNORED = (".partial", ASIDE)
+IGNORED = (".partial", ASIDE)
+#: What lies beside the files of a store that was published: page, campaign and data, and what is said of all.
+PUBLISHED = "published/"
+CHECKSUMS = f"{PUBLISHED}checksums.sha256"
+CRATE = "ro-crate-metadata.json"
 
 
 @dataclass(frozen=True)
@@ -146,10 +150,17 @@ def verify(url: str) -> Inspection:
     return inspect(url)
 
 
+def of_store(names: Iterable[str]) -> Iterator[str]:
+    """Yield the names of files that belong to a store, not to a run, a repair, or what was published with it."""
+    for name in names:
+        if not name.endswith(IGNORED) and not name.startswith((CLAIMS, PUBLISHED)) and name != CRATE:
+            yield name
+
+
 def inspect(url: str) -> Inspection:
     """Read every file of a store at which nobody is at work."""
     found = Inspection()
-    present = {name for name in listed(url) if not name.endswith(_IGNORED) and not name.startswith(CLAIMS)}
+    present = set(of_store(listed(url)))
     found.files = len(present)
     root = _root(url, found, present)
     for series in sorted({_series_of_copy(name) for name in present if _is_copy(name)} | _series_of_root(root)):

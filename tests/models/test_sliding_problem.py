@@ -116,8 +116,9 @@ def test_the_message_names_the_outputs_that_miss_the_accuracy(solid):
 def test_no_sentence_holds_a_raw_placeholder():
     assert not any("{" in outcome.sentence for outcome in Outcome)
     steep = {"indenter": {"shape": "parabola", "radius": 1.0}, "normal_force": 1e4}
-    for parameters in (KELVIN | steep, SOLIDS["standard"] | steep, KELVIN | {"normal_force": 1e305}):
-        result = solved(GENERATED | parameters)
+    immense = {"normal_force": np.array([1e305])}
+    for parameters, columns in ((KELVIN | steep, {}), (SOLIDS["standard"] | steep, {}), (KELVIN, immense)):
+        result = solved(GENERATED | parameters, columns=columns)
         assert result.messages[0, 0]
         assert "{" not in result.messages[0, 0]
 

@@ -16,6 +16,9 @@ from mdr_dask.models.parts.indenter import Other
 if TYPE_CHECKING:
     from mdr_dask.physics.mdr.revolution import TableProfile
 
+LEAST = 1e-60  # units of length, height and force from here to its reciprocal have cubes
+MOST_CYCLES = 1e12  # N beyond which nothing is left to wear off
+
 
 @dataclass(frozen=True)
 class Numbers:
@@ -88,6 +91,21 @@ def _factor(block: Block[FrettingWear], name: str, normal: FloatArray) -> FloatA
 
 def reduce_block(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
     """Turn every case into n, g_c and N, and keep its units a0, d0 and E* d0 a0; sliding has g_c = 0, and s for N."""
+    with np.errstate(all="ignore"):
+        numbers, messages = _reduced(block)
+    for case, position in np.argwhere(numbers.level >= 1):
+        told = "nothing slips: the amplitude is below the rounding of mu E* d0 / G*"
+        messages.setdefault((int(case), int(position)), told)
+    known = np.isfinite(numbers.level) & np.isfinite(numbers.cycles) & (numbers.cycles <= MOST_CYCLES)
+    for unit in (numbers.length, numbers.height, numbers.force):
+        known &= (unit > LEAST) & (unit < 1 / LEAST)
+    for case, position in np.argwhere(~known):
+        told = "a number of the case is so large or so small that a computer cannot hold what follows from it"
+        messages.setdefault((int(case), int(position)), f"{told}; look at the units")
+    return numbers, messages
+
+
+def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str]]:
     coefficient, n = _power_laws(block)
     normal = _scatter(block)
     sliding = block.parameters.path is not None

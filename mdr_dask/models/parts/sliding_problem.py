@@ -34,6 +34,7 @@ STATUS = np.array(
     dtype=np.int8,
 )
 """What a store calls each outcome of a solver."""
+LEAST = 1e-100  # dimensionless numbers from here to its reciprocal have squares and products
 
 
 @dataclass(frozen=True)
@@ -101,8 +102,19 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     for name, numbers in given.items():
         for j in np.flatnonzero(~(np.isfinite(numbers) & (numbers > 0))):
             faults.setdefault(int(j), f"the {name} must be positive and finite, got {numbers[j]:g}")
+    with np.errstate(all="ignore"):
+        slope = height / length
+    refuse_immense({"h / L": slope, "F_N / (4 G L h)": loads, "v tau / L": np.where(deborah == 0, 1, deborah)}, faults)
     settings = _settings(block, roughness, arms, length, height, velocity, faults)
     return SlidingProblems(settings, loads, deborah, length, height, faults)
+
+
+def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
+    """Note every case whose dimensionless numbers, or their squares, are no numbers of a computer."""
+    for name, column in numbers.items():
+        for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
+            told = f"expected {name} between {LEAST:g} and {1 / LEAST:g}, got {column[j]:g}; look at the units"
+            faults.setdefault(int(j), told)
 
 
 def each(block: Block[Any], name: str) -> list[Any]:

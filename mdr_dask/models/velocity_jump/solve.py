@@ -14,7 +14,14 @@ from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
-from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
+from mdr_dask.models.parts.sliding_problem import (
+    STATUS,
+    Setting,
+    SlidingProblems,
+    each,
+    refuse_immense,
+    sliding_problems,
+)
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -58,6 +65,11 @@ def compute(block: Block[VelocityJump]) -> Result:
     values = {name: np.full(shape + (times if name in vectors else ()), np.nan) for name in block.outputs}
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
     problems, solves = sliding_problems(block), 0
+    with np.errstate(all="ignore"):
+        after = np.abs(1 + np.asarray(block.column("velocity_change"), dtype=np.float64))
+    refuse_immense({"v_2 / v_1": np.where(after == 0, 1, after)}, problems.faults)
+    for j in np.flatnonzero(after == 1):
+        problems.faults.setdefault(int(j), "expected a velocity_change above rounding, the velocity stays the same")
     groups = list(_groups(block, problems))
     for r, realisation in enumerate(block.realisations):  # outside: every line of one has the same phases
         for group in groups:

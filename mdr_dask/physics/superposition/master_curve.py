@@ -81,6 +81,11 @@ class Superposition:
     undetermined: tuple[tuple[float, float], ...] = ()
     usual: tuple[float, float] = (0.0, 0.0)
 
+    def moved(self, by: float) -> Superposition:
+        """Return the same with the abscissa of everything moved."""
+        low, high = self.measured
+        return replace(self, x=self.x + by, curve_x=self.curve_x + by, measured=(low + by, high + by))
+
     @property
     def horizontal_error(self) -> FloatArray:
         """Standard errors of the horizontal factors, decades."""
@@ -134,9 +139,9 @@ def superpose(
     [0. 1. 2.]
     """
     values, sorted_curves = _sorted(groups, curves)
-    problem = Problem.of(sorted_curves)
+    problem, origin = Problem.of(sorted_curves).from_own_origin()
     found = find_both(problem) if vertical else find_horizontal(problem)
-    result = _result(problem, found, values)
+    result = _result(problem, found, values).moved(origin)
     _require_overlap(result)
     if draws:
         result = replace(result, draws=_bootstrap(problem, found, draws, seed))

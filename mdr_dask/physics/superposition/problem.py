@@ -57,6 +57,14 @@ class Problem:
         windows = np.array([[one[0] - other[-1], one[-1] - other[0]] for (one, _), (other, _) in pairwise(curves)])
         return cls(points, len(curves), width, height, grid, windows)
 
+    def from_own_origin(self) -> tuple[Problem, float]:
+        """Return the problem with its first point where cells begin, and by how much it was moved.
+
+        The cells of the spline stand where they are, so that a unit of the abscissa would be seen in the shifts.
+        """
+        origin = float(self.points.x[0])
+        return replace(self, points=self.points._replace(x=self.points.x - origin)), origin
+
     def lifted(self, along: FloatArray) -> Problem:
         """Return the same problem with curves moved along the ordinate."""
         return replace(self, points=self.points._replace(y=self.points.y + along[self.points.member]))

@@ -16,6 +16,7 @@ from mdr_dask.physics.transients.elements.follow import (
     steady_start,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
+from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
@@ -219,3 +220,21 @@ def test_rest_is_static() -> None:
 def test_elastic_solid_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a solid with an arm or a dashpot"):
         foundation([], [], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "force", "swing", "time"),
+    [
+        ((1.0, 1.0), (2.0, 2.0), (0.0, 0.0, 0.0), np.inf),
+        ((1.0, 1.5), (2.0, 2.0), (0.0, 0.0, 0.0), 3.0),
+        ((1.0, 1.0), (2.0, 1.0), (0.0, 0.0, 0.0), 3.0),
+        ((1.0, 1.0), (2.0, 2.0), (0.1, 0.0, 4.0), np.pi / 2),
+    ],
+)
+def test_steps_resolve_what_changes(velocity, force, swing, time):
+    """A ramp of either takes many steps however slow the sliding; a constant piece takes those of its cells alone."""
+    piece = Piece(5.0, 8.0, velocity, force, swing)
+    assert piece.changes_in == pytest.approx(time)
+    longest = np.max(np.diff(piece.moments(5.0, 8.0, 1, STEPS_PER_DECADE)))
+    assert longest <= max(SETTINGS.part * time, 0) + 1e-12
+    assert np.isinf(time) or longest > 0.2 * SETTINGS.part * time

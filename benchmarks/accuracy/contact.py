@@ -1,0 +1,200 @@
+"""Wear, films, jumps, loading histories, breakthrough and transforms: what their own benchmarks measure, as points."""
+
+from __future__ import annotations
+
+import csv
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.special import j0
+
+from benchmarks.accuracy.points import Point
+from benchmarks.measures import timed
+from mdr_dask.physics.lubrication import line_contact
+from mdr_dask.physics.mdr import transforms
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.mdr.uniform_grid import uniform_grid
+from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.forced_rule import fast_forced
+from mdr_dask.physics.wear.rules import fast
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from references.literal_wear import literal
+
+FILMS = Path(__file__).parents[2] / "tests/references/heavy_line_contacts.csv"
+KNOWN = 5e-6  # relative error of those films
+#: Exponent, c / a0, N, and whether the force is held.
+WORN = {
+    "easy: parabola, N = 2": (2.0, 0.455, 2.0, False),
+    "typical: parabola, N = 8": (2.0, 0.455, 8.0, False),
+    "typical: cone, force held": (1.0, 0.3, 4.0, True),
+    "hard: flat, n = 8, c = 0.1": (8.0, 0.1, 4.0, False),
+}
+
+
+def wear(short: bool) -> Iterator[Point]:
+    """Yield the worn volume by every rule; cycles simulated one by one share nothing with them but the grid's matrices.
+
+    The truth is the exact evolution at 1e-5, which those cycles tend to.
+    """
+    for case, (exponent, stick, cycles, held) in list(WORN.items())[: 1 if short else None]:
+        profile = PowerProfile(exponent)
+
+        def evolved(accuracy, profile=profile, stick=stick, cycles=cycles, held=held):
+            return exact(profile, stick, [cycles], accuracy, constant_force=held)[0]
+
+        truth = evolved(1e-3 if short else 1e-5)
+        for accuracy in (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4):
+            evolved(accuracy)
+            found, seconds = timed(evolved, accuracy, calls=2)
+            error = abs(found.wear_volume / truth.wear_volume - 1)
+            stated = found.error("wear_volume", np.zeros(1)) / truth.wear_volume
+            yield Point("wear", case, "exact evolution", f"accuracy {accuracy:g}", seconds, error, float(stated))
+        rule = fast_forced if held else fast
+        found, seconds = timed(rule, profile, stick, cycles, 0.8, calls=2)
+        yield Point("wear", case, "fast rule, ξ = 0.8", "", seconds, abs(found.wear_volume / truth.wear_volume - 1))
+        for cells in (40,) if short else (50, 100, 200):
+            found, seconds = timed(lambda: literal(profile, stick, cycles, cells=cells, constant_force=held))  # noqa: B023
+            error = abs(found.wear_volume / truth.wear_volume - 1)
+            yield Point("wear", case, "cycle by cycle (thesis)", f"{cells} cells", seconds, error)
+
+
+def films(short: bool) -> Iterator[Point]:
+    """Yield central films against those of another solver, known to 5e-6, of the lightest to the heaviest of 70."""
+    from benchmarks.ehl.work_precision import uniform
+
+    with FILMS.open() as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    rows = [row for row in rows if row["viscosity_law"] == "barus"]
+    rows.sort(key=lambda row: float(row["W"]) / float(row["U"]) ** 0.5)
+    chosen = {"easy: M of 200": rows[0], "typical": rows[len(rows) // 2], "hard: heaviest of 70": rows[-1]}
+    for name, row in list(chosen.items())[: 1 if short else None]:
+        groups = (float(row[key]) for key in ("W", "U", "G"))
+        case = line_contact.line_contact(*groups, 115.385e9, compressible=row["compressible"] == "true")
+        truth = float(row["central_film"])
+        for accuracy in (1e-2, 1e-3) if short else (1e-2, 3e-3, 1e-3, 3e-4, 1e-4):
+            found, seconds = timed(line_contact.solve, case, accuracy, calls=2)
+            film = found.central_film
+            error = max(abs(float(film.value) / truth - 1), KNOWN)
+            stated = float(film.error / film.value)
+            stated = stated if stated > 3 * KNOWN else np.nan
+            yield Point(
+                "line contact (EHL)",
+                name,
+                "graded grids, extrapolated",
+                f"accuracy {accuracy:g}",
+                seconds,
+                error,
+                stated,
+            )
+        for nodes in (101,) if short else (201, 401, 801):
+            (central, _, _), seconds = timed(uniform, case, nodes)
+            yield Point("line contact (EHL)", name, "uniform grid", f"{nodes} nodes", seconds, abs(central / truth - 1))
+
+
+def jumps(short: bool) -> Iterator[Point]:
+    """Yield the course of friction after a jump against every element followed on two fine grids, extrapolated."""
+    from benchmarks.kinetics import work_precision as own
+
+    finest = 2 if short else 8
+    own.march(2, 8), own.papers(1), own.followed(1)
+    ladder = {grid: timed(own.followed, grid) for grid in ((1, 2) if short else (2, 4, 8))}
+    truth = (4 * ladder[finest][0] - ladder[finest // 2][0]) / 3
+    for arguments in ((2, 8),) if short else ((2, 8), (4, 8), (4, 12), (8, 24), (16, 48)):
+        trace, seconds = timed(own.march, *arguments, calls=1 if short else 3)
+        setting = f"oversampling {arguments[0]}, {arguments[1]} steps a decade"
+        yield Point("velocity jump", "one line", "graded march", setting, seconds, float(np.max(np.abs(trace - truth))))
+    for grid, (trace, seconds) in ladder.items():
+        error = float(np.max(np.abs(trace - truth)))
+        yield Point("velocity jump", "one line", "every element followed", f"oversampling {grid}", seconds, error)
+    for grid in (1,) if short else (1, 4, 16):
+        trace, seconds = timed(own.papers, grid)
+        error = float(np.max(np.abs(trace - truth)))
+        yield Point("velocity jump", "one line", "backward Euler (thesis)", f"oversampling {grid}", seconds, error)
+
+
+def histories(short: bool) -> Iterator[Point]:
+    """Yield the drag of two speeds from rest; backward Euler tends to the same, to its first order."""
+    from benchmarks.protocols import work_precision as own
+
+    for name, solid in list(own.SOLIDS.items())[: 1 if short else None]:
+        own.followed(own.line(2), solid, 1.0), own.backward_euler(own.line(2), solid)
+        truth = own.followed(own.line(8 if short else 40), solid, 0.5 if short else 0.25)
+        for grid, cells in ((2, 1.0),) if short else ((2, 1.0), (4, 1.0), (4, 0.5), (8, 0.5), (16, 0.5)):
+            drag, seconds = timed(own.followed, own.line(grid), solid, cells)
+            error = float(np.max(np.abs(drag - truth)) / truth.max())
+            yield Point("loading histories", name, "events on patches", f"grid {grid}, {cells:g} cells", seconds, error)
+        for grid in (4,) if short else (4, 16, 64):
+            drag, seconds = timed(own.backward_euler, own.line(grid), solid)
+            error = float(np.max(np.abs(drag - truth)) / truth.max())
+            yield Point("loading histories", name, "backward Euler", f"grid {grid}", seconds, error)
+
+
+def rollers(short: bool) -> Iterator[Point]:
+    """Yield the probability of breakthrough on coarser grids of one turn; window by window shares no sum."""
+    from benchmarks.mixed import work_precision as own
+
+    million = 10**5 if short else 10**6
+    finest = own.lines(4 * million) if not short else own.lines(4 * 10**5)
+    for case, (window, level) in list(own.CASES.items())[-1 if short else 0 :]:
+        exact_one = own.sliding(finest, round(window * finest[0].size / 10**6), level)
+        for coarser in (8, 4, 2) if not short else (2,):
+            pair = [line[::coarser].copy() for line in finest]
+            here = round(window * pair[0].size / 10**6)
+            for method in (own.sliding, own.every_window) if pair[0].size <= 10**6 else (own.sliding,):
+                method(pair, here, level)
+                probability, seconds = timed(method, pair, here, level)
+                name = {"sliding": "sliding sums", "every_window": "window by window"}[method.__name__]
+                error = max(abs(probability - exact_one), 1e-6)
+                yield Point("mixed lubrication", case, name, f"{pair[0].size} points", seconds, error)
+
+
+def revolution(short: bool) -> Iterator[Point]:
+    """Yield f(r) of g = cos 5x, J0(5r) in closed form, by Gauss sums and by the matrices of a uniform grid."""
+    radii = np.linspace(0.05, 2.0, 40)
+    truth = j0(5 * radii)
+    whole = transforms.MOST_NODES
+    try:
+        for most in (16, 32) if short else (8, 16, 32, 64):
+            transforms.MOST_NODES = most
+            found, seconds = timed(transforms.inverse_transform, lambda x: np.cos(5 * x), radii, calls=5)
+            error = float(np.max(np.abs(found.value - truth)))
+            yield Point(
+                "transforms",
+                "smooth image",
+                "Gauss sums",
+                f"{most} nodes",
+                seconds,
+                max(error, 1e-16),
+                float(found.error.max()),
+            )
+    finally:
+        transforms.MOST_NODES = whole
+    for cells in (50,) if short else (50, 100, 200, 400, 800):
+        grid, seconds = timed(
+            uniform_grid.__wrapped__ if hasattr(uniform_grid, "__wrapped__") else uniform_grid, cells, 2.0
+        )
+        f = grid.inverse @ (np.cos(5 * grid.nodes) - 1.0) + 1.0
+        error = float(np.max(np.abs(f - j0(5 * grid.nodes))))
+        yield Point("transforms", "smooth image", "matrices of a uniform grid", f"{cells} cells", seconds, error)
+
+
+def master_curves(short: bool) -> Iterator[Point]:
+    """Yield factors of planted families: the median over families of the largest error, and of its half width."""
+    from benchmarks.superposition.accuracy import SHAPES, family
+    from mdr_dask.physics.superposition.master_curve import superpose
+
+    for shape in list(SHAPES)[: 1 if short else None]:
+        superpose(*family(0, 0.01, shape, False)[:2], reference=5.0)
+        for scatter in (0.01,) if short else (0.003, 0.01, 0.03):
+            errors, stated, times = [], [], []
+            for seed in range(400_000, 400_000 + (2 if short else 20)):
+                groups, pieces, shifts, _ = family(seed, scatter, shape, False)
+                found, seconds = timed(superpose, groups, pieces, False, 5.0)
+                errors.append(np.max(np.abs(found.horizontal - shifts)))
+                stated.append(2 * np.max(found.horizontal_error))
+                times.append(seconds)
+            middle = (float(np.median(column)) for column in (times, errors, stated))
+            yield Point("master curves", shape, "least squares with a smooth curve", f"scatter {scatter:g}", *middle)

@@ -1,0 +1,39 @@
+"""Measure every solver, or some: ``python -m benchmarks accuracy measure [SOLVER...]``, into a table of the evidence.
+
+Times are least processor times of this process. Names are those of `SOLVERS`; what is not measured keeps its rows.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+
+from benchmarks.accuracy import contact, sliding
+from benchmarks.accuracy.points import Point, write
+
+SOLVERS: dict[str, Callable[[bool], Iterator[Point]]] = {
+    "friction": sliding.kelvin,
+    "indenters": sliding.indenters,
+    "solids": sliding.solids,
+    "jumps": contact.jumps,
+    "histories": contact.histories,
+    "transforms": contact.revolution,
+    "wear": contact.wear,
+    "films": contact.films,
+    "rollers": contact.rollers,
+    "master_curves": contact.master_curves,
+}
+
+
+def main(*names: str) -> None:
+    unknown = set(names) - set(SOLVERS)
+    if unknown:
+        sys.exit(f"no solver {', '.join(sorted(unknown))}; known: {', '.join(SOLVERS)}")
+    for name in names or SOLVERS:
+        points = list(SOLVERS[name](False))
+        write(points)
+        print(f"{name}: {len(points)} points", flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,141 @@
+"""Write docs/accuracy-and-speed.md and its figures from what was measured: ``python -m benchmarks accuracy page``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable
+from itertools import groupby
+
+import numpy as np
+
+from benchmarks.accuracy.points import FILE, Point, cheapest, read
+from benchmarks.measures import draw_errors
+
+PAGE = FILE.parents[1] / "accuracy-and-speed.md"
+PICTURES = FILE.parents[1] / "pictures/accuracy"
+GOALS = (1e-1, 1e-2, 1e-3, 1e-4)
+#: What is compared and with what; a solver in its own words stands in the page named.
+ABOUT = {
+    "steady friction": (
+        "Error of the friction of a Kelvin solid on a line of 128 Nyquist points. Reference: one element "
+        "followed along a fine line step by step, its losses summed, until three grids agree to 2e-7 "
+        "([friction](evidence/friction.md))."
+    ),
+    "indenters": (
+        "Error of the friction under a smooth body. Reference: the same element, on a line that is not periodic."
+    ),
+    "general solids": (
+        "Error of the friction of solids with relaxing arms, at the transition. Reference: the same element "
+        "([materials](evidence/materials.md))."
+    ),
+    "velocity jump": (
+        "Largest error of the course of friction over its last value. Reference: every element followed from "
+        "rest on two fine grids, extrapolated ([kinetics](evidence/kinetics.md))."
+    ),
+    "loading histories": (
+        "Largest error of the drag over the largest drag. Reference: the solver itself on 40 nodes for every "
+        "Nyquist point; backward Euler, which shares nothing with it, tends to the same ([loading "
+        "histories](evidence/loading-histories.md))."
+    ),
+    "transforms": ("Largest error of the profile of the image cos 5x. Reference: the Bessel function J0(5r)."),
+    "wear": (
+        "Error of the worn volume. Reference: the exact evolution itself at 1e-5; every cycle simulated, as "
+        "the thesis did, tends to the same ([wear](evidence/wear.md))."
+    ),
+    "line contact (EHL)": (
+        "Error of the central film. Reference: films of another solver on up to 10241 nodes, known to 5e-6 "
+        "([films](evidence/ehl.md))."
+    ),
+    "mixed lubrication": (
+        "Error of the probability of breakthrough in one turn. Reference: the same turn on four million "
+        "points; window by window shares no sum with the sliding sums ([mixed lubrication](evidence/mixed- "
+        "lubrication.md))."
+    ),
+    "master curves": (
+        "Largest error of ten shift factors in decades, and twice the largest bar: medians of twenty planted "
+        "families ([master curves](evidence/master-curves.md))."
+    ),
+}
+
+
+def text(points: Iterable[Point]) -> str:
+    """Return the page."""
+    parts = [HEAD]
+    for solver, group in groupby(points, lambda point: point.solver):
+        parts.append(
+            f"## {solver[0].upper()}{solver[1:]}\n\n{ABOUT[solver]}\n\n![{solver}](pictures/accuracy/{_file(solver)})\n"
+        )
+        parts.append(_table(list(group)))
+    return "\n".join(parts)
+
+
+def _file(solver: str) -> str:
+    return f"{solver.split(' (')[0].replace(' ', '-')}.png"
+
+
+def _table(points: list[Point]) -> str:
+    """Return what each method takes for errors of a tenth to a ten-thousandth, and what it states."""
+    rows = [
+        "| case | method | " + " | ".join(f"{goal:.2g}" for goal in GOALS) + " | smallest error | stated over error |",
+        "|---|---|" + "---|" * (len(GOALS) + 2),
+    ]
+    for (case, method), group in groupby(points, lambda point: (point.case, point.method)):
+        chosen = list(group)
+        times = [cheapest(chosen, goal) for goal in GOALS]
+        said = [point.stated / point.error for point in chosen if np.isfinite(point.stated) and point.error > 0]
+        cells = [_time(seconds) for seconds in times]
+        errors = [point.error for point in chosen if np.isfinite(point.error)]
+        smallest = f"{min(errors):.1e}" if errors else "no solution"
+        honest = f"{min(said):.2g} to {max(said):.2g}" if said else ""
+        rows.append(f"| {case} | {method} | {' | '.join(cells)} | {smallest} | {honest} |")
+    return "\n".join(rows) + "\n"
+
+
+def _time(seconds: float) -> str:
+    """Return a time for a reader."""
+    if np.isnan(seconds):
+        return "-"
+    factor, unit = (1, "s") if seconds >= 1 else (1e3, "ms") if seconds >= 1e-3 else (1e6, "µs")
+    return f"{float(f'{seconds * factor:.2g}'):g} {unit}"
+
+
+def draw(points: Iterable[Point]) -> None:
+    """Write a figure for every solver: a panel for every case, a curve for every method."""
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    for solver, group in groupby(points, lambda point: point.solver):
+        panels: dict[str, dict[str, tuple[list[float], list[float]]]] = {}
+        for point in group:
+            seconds, errors = panels.setdefault(point.case, {}).setdefault(point.method, ([], []))
+            seconds.append(point.seconds)
+            errors.append(max(point.error, FLOOR))
+        draw_errors(panels, "error", str(PICTURES / _file(solver)))
+
+
+FLOOR = 1e-12
+HEAD = """# Accuracy and speed
+
+What an error costs, for every solver: processor time of one solution against its error, beside the methods of the
+papers and of the thesis. Each part says what it is compared with. Two commands make the page again:
+
+```console
+$ python -m benchmarks accuracy measure
+$ python -m benchmarks accuracy page
+```
+
+The points are [a table](evidence/accuracy-and-speed.csv). Times were measured on two cores that other programs used
+too: compare them within one table, as ratios. The tables give the least time of a setting whose error is at most that
+of the column; `-` is beyond what was tried. Where the doubt of a reference is known, no error below it is told.
+*Stated over error* is how much larger the error that a method states is than its true error, from the least to the
+most over its settings; below 1 the statement was too small. Whole campaigns are in [benchmarks](benchmarks.md#whole-
+campaigns).
+"""
+
+
+def main() -> None:
+    points = read()
+    draw(points)
+    PAGE.write_text(text(points))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,48 @@
+"""What is measured: one solution of one method at one setting, its time, its error, and the error that it stated."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+FILE = Path(__file__).parents[2] / "docs/evidence/accuracy-and-speed.csv"
+
+
+class Point(NamedTuple):
+    """One entry of a work-precision diagram; `stated` is NaN where a method states no error."""
+
+    solver: str
+    case: str
+    method: str
+    setting: str
+    seconds: float
+    error: float
+    stated: float = np.nan
+
+
+def read(path: Path = FILE) -> list[Point]:
+    """Return the points of a table."""
+    with path.open() as file:
+        rows = list(csv.reader(line for line in file if not line.startswith("#")))
+    return [Point(*row[:4], *map(float, row[4:])) for row in rows[1:]]
+
+
+def write(points: Iterable[Point], path: Path = FILE) -> None:
+    """Write points as a table, the solvers measured now in place of what stood there of them."""
+    points = list(points)
+    measured = {point.solver for point in points}
+    kept = [point for point in read(path) if point.solver not in measured] if path.exists() else []
+    with path.open("w") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(Point._fields)
+        for point in [*kept, *points]:
+            writer.writerow([*point[:4], *(f"{number:.3e}" for number in point[4:])])
+
+
+def cheapest(points: Iterable[Point], error: float) -> float:
+    """Return the least time of a setting whose error is at most so large; NaN if none is."""
+    return min((point.seconds for point in points if point.error <= error), default=np.nan)

@@ -1,0 +1,108 @@
+"""A table of what was measured: which columns are conditions of a study, and which one is an output of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from mdr_dask import models
+from mdr_dask.arrays import FloatArray
+from mdr_dask.campaign.definition import Series
+from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.models.numbers import numbers_of
+from mdr_dask.tables import Column, read_sheet, read_table
+
+ERROR = "standard_error"
+_ERRORS = ("error", "standard deviation", "uncertainty")
+#: Largest table that a study carries along, in bytes.
+LARGEST = 10**6
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured points.
+
+    Parameters
+    ----------
+    source : str
+        Name of the table, for messages.
+    output : str
+        The output that was measured.
+    values : array, shape (points,)
+        In SI.
+    errors : array, shape (points,), or None
+        Their standard errors, where the table has them.
+    conditions : dict of str to array, shape (points,)
+        Parameters at which they were measured, by the name of their coordinate, SI.
+    lines : tuple of int
+        Where they stand in the table, counted from 1.
+    """
+
+    source: str
+    output: str
+    values: FloatArray
+    errors: FloatArray | None
+    conditions: Mapping[str, FloatArray]
+    lines: tuple[int, ...]
+
+
+def read_measured(text: str, source: str, conditions: Mapping[str, str], outputs: Mapping[str, str]) -> Measured:
+    """Read a table of measured points.
+
+    Parameters
+    ----------
+    text, source : str
+        The table and the name of its file.
+    conditions, outputs : mapping of str to str
+        SI units of what the columns may be, by the names that they have in a store.
+
+    Raises
+    ------
+    DataError
+        If the table has no column, or several, of outputs, fewer than two points, or is no such table.
+    """
+    names = [cell.text for cell in read_sheet(text, source).names]
+    of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
+    found = [name for name, column in of_outputs.items() if any(column.holds(heading) for heading in names)]
+    if len(found) != 1:
+        hint = next(filter(None, (did_you_mean(name, [*outputs]) for name in names)), "")
+        got = ", ".join(found or names) or "no names"
+        wanted = f"a column with one output of the study ({', '.join(outputs)})"
+        raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
+    output = found[0]
+    columns = [Column(name, unit, needed=False) for name, unit in conditions.items()]
+    error = Column(ERROR, outputs[output], (*_ERRORS, f"{output}_error"), needed=False, above=0.0)
+    read = read_table(text, source, [*columns, of_outputs[output], error])
+    values, errors = read.pop(output), read.pop(ERROR, None)
+    if values.size < 2:
+        raise DataError(f"{source}: expected at least two measured points, got {values.size}")
+    lines = tuple(row[0].line for row in read_sheet(text, source).rows)
+    return Measured(source, output, values, errors, read, lines)
+
+
+def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
+    """Refuse a table that is of no series of a campaign; DataError with the reason of the first one."""
+    if len(text) > LARGEST:
+        raise DataError(f"{source}: expected a table of at most {LARGEST / 1e6:g} MB, got {len(text) / 1e6:.3g} MB")
+    reasons = []
+    for one in series:
+        try:
+            read_measured(text, source, *_of_series(model, outputs, one))
+        except DataError as error:
+            reasons.append(error)
+    if len(reasons) == len(series):
+        raise reasons[0]
+
+
+def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the units of conditions and outputs of a series."""
+    model = models.load(name)
+    special = model.units(series.parameters)
+    conditions = {key: unit for key, (_, unit, _) in numbers_of(series.parameters).items()}
+    conditions |= {key: each.unit for key, each in model.coordinates(series.parameters).items()}
+    conditions |= {axis.name: axis.unit for axis in series.axes if axis.unit is not None}
+    declared = {each.name: each.unit for each in model.outputs if each.name in outputs}
+    return (
+        {key: special.get(key, unit) for key, unit in conditions.items()},
+        {key: special.get(key, unit) for key, unit in declared.items()},
+    )

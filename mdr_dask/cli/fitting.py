@@ -1,0 +1,116 @@
+"""The command that fits laws to a store, and explains measured points by it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdr_dask.cli.figures import COMMAND, save
+from mdr_dask.cli.options import csv_option, json_option, limit_option, select_option, series_option, tell
+from mdr_dask.cli.printing import print_aligned, print_rows, printable, short, table, with_intervals
+from mdr_dask.cli.results import list_names, require_known, store_argument
+from mdr_dask.cli.sensitivity import Asking
+from mdr_dask.cli.writing import FIGURES, require_suffix
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@click.command(cls=Asking)
+@store_argument
+@click.argument("names", nargs=-1)
+@series_option
+@select_option
+@click.option(
+    "--measured",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Table of measured points for `calibration`, in place of the campaign's.",
+)
+@click.option(
+    "--figure", "-o", type=click.Path(path_type=Path), help="Draw `calibration`: FILE.png, FILE.pdf or FILE.svg."
+)
+@limit_option
+@json_option
+@csv_option
+@click.pass_context
+def fit(
+    context: click.Context,
+    store: str,
+    names: tuple[str, ...],
+    series: str | None,
+    selections: tuple[str, ...],
+    measured: Path | None,
+    figure: Path | None,
+    limit: int,
+    form: str | None,
+) -> None:
+    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
+
+    `calibration` finds the parameters of a study that nobody measured from a table of what was measured. In place of a
+    store it may be a table of a velocity-step test, for `rate_and_state`.
+
+    \b
+    mdr-dask fit results/friction_force.zarr
+    mdr-dask fit results/friction_force.zarr zone_one --json
+    mdr-dask fit results/rig.zarr calibration -o rig.png
+    mdr-dask fit results/rig.zarr calibration --measured tuesday.csv
+    mdr-dask fit steps.csv rate_and_state
+    """
+    from mdr_dask import fits as room
+    from mdr_dask import store as stores
+    from mdr_dask.fits.calibration import with_table
+    from mdr_dask.questions import selection
+
+    require_suffix(figure, FIGURES)
+    model = stores.attributes(store)["model"]
+    known = room.available(model)
+    if not names:
+        list_names(model, {name: law.summary for name, law in known.items()})
+        return
+    require_known(names, list(known), f"law for {model}")
+    if (measured or figure) and names != ("calibration",):
+        raise click.UsageError("--measured and --figure are for `calibration` alone")
+    groups = stores.datasets(store)
+    if series is not None:
+        groups = {series: selection.group(groups, series)}
+    groups = selection.select_all(groups, selections, tell)
+    if measured is not None:
+        groups = with_table(groups, measured)
+    for name in names:
+        found = known[name].results(groups)
+        for group, result in found.items():
+            if (len(names) > 1 or len(found) > 1) and not form:
+                click.echo(f"{group + ': ' if group else ''}{name}: {known[name].summary}")
+            _print(result, group, form, limit)
+    if figure is not None:
+        from mdr_dask.plots.calibration import calibration as drawn
+        from mdr_dask.plots.table import provenance
+
+        save(drawn(groups), figure, provenance("calibration", [store], str(context.meta[COMMAND])))
+        tell(str(figure))
+
+
+def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:
+    rows, units = table(result)
+    if form:
+        print_rows([{"series": group, **row} for row in rows] if group else rows, units, form, limit)
+    elif any(name.endswith("_low_68") for name in units):
+        _print_constants(rows[0], units)
+    else:
+        print_rows(*with_intervals(rows, units), "table", limit)
+
+
+def _print_constants(row: dict[str, Any], units: dict[str, str]) -> None:
+    """Print constants with both intervals below each other, and behind them what else there is to say."""
+    constants = [name for name in units if f"{name}_low_68" in units]
+    columns: list[list[Any]] = [constants, *([row[name + end] for name in constants] for end in _ENDS.values())]
+    print_aligned(["", *_ENDS, "unit"], [*columns, [units[name] for name in constants]])
+    ends = {name + end for name in constants for end in _ENDS.values()}
+    for name in (name for name in units if name not in ends):
+        unit = "" if units[name] == "1" else f" {units[name]}"
+        click.echo(f"{name}: {printable(short(row[name]))}{unit}")
+
+
+_ENDS = {"value": "", "95 % from": "_low", "to": "_high", "68 % from": "_low_68", "68 % to": "_high_68"}

@@ -1,0 +1,166 @@
+"""What data determine: which unknowns, and of those that they do not, which products."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.fits.posterior import Posterior
+
+#: An end of an axis is open where the logarithmic density there is lower than the highest by less.
+OPEN = 2.0
+#: Share of the variance of an unknown that comes from others that are open, above which it is not determined itself.
+LINKED = 0.25
+#: Spread of a product over what it would be without data, below which it is determined.
+NARROW = 0.25
+#: Exponents are written as halves and thirds where that makes the product no wider than by this factor.
+ROUNDED = 1.15
+#: Probabilities of the ends of intervals.
+LEVELS = {"": 0.95, "_68": 0.6827}
+
+
+class Ends(NamedTuple):
+    """At which ends of its axis an unknown is open."""
+
+    low: bool
+    high: bool
+
+
+def open_ends(found: Posterior) -> list[Ends]:
+    """Return for each unknown whether the data leave it free to go on beyond the ends of its axis."""
+    highest = found.density.max()
+    ends = []
+    for place in found.places.T:
+        borders = (place < found.width, place > 1 - found.width)
+        ends.append(Ends(*(bool(np.any(found.density[at] > highest - OPEN)) for at in borders)))
+    return ends
+
+
+def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
+    """Return the unknowns that the data do not determine: those with an open end, and those that hang on them."""
+    free = [k for k, end in enumerate(ends) if any(end)]
+    if not free:
+        return []
+    centred = found.places - found.weights @ found.places
+    others = [k for k in range(len(ends)) if k not in free]
+    return sorted([*free, *(k for k in others if _explained(centred, found.weights, k, free) > LINKED)])
+
+
+def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
+    """Return the share of the variance of an unknown that a quadratic of others explains."""
+    columns = centred[:, by]
+    terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
+    root = np.sqrt(weights)
+    left = root * centred[:, k]
+    fitted = root[:, None] * terms
+    rest = left - fitted @ np.linalg.lstsq(fitted, left)[0]
+    return float(1 - rest @ rest / max(left @ left, np.finfo(float).tiny))
+
+
+class Product(NamedTuple):
+    """A product of powers of unknowns that is determined though they are not.
+
+    Attributes
+    ----------
+    exponents : array, shape (unknowns,)
+        Zero for those that are no part of it.
+    values : array, shape (cells,)
+        Its value in each cell.
+    """
+
+    exponents: FloatArray
+    values: FloatArray
+
+
+def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
+    """Return the products that the data determine of unknowns that they do not determine.
+
+    Parameters
+    ----------
+    found : Posterior
+    values : array, shape (cells, unknowns)
+        The unknowns in SI.
+    free : sequence of int
+        The unknowns that are not determined.
+    """
+    if len(free) < 2 or np.any(values[:, free] <= 0):
+        return []
+    logarithms = np.log(values[:, free])
+    spans = np.ptp(logarithms, axis=0)
+    spans = np.where(spans > 0, spans, 1.0)
+    covariance = np.cov((logarithms / spans).T, aweights=found.weights, bias=True)
+    variances, directions = np.linalg.eigh(covariance)
+    narrow = directions[:, np.sqrt(12 * variances) < NARROW].T / spans
+    if not len(narrow):
+        return []
+    return [_product(found, logarithms, free, row, values.shape[1]) for row in _reduced(narrow)]
+
+
+def _reduced(rows: FloatArray) -> FloatArray:
+    """Return combinations that span the same, each with a leading 1 and as few other terms as can be."""
+    rows = rows.copy()
+    done: list[int] = []
+    for i in range(len(rows)):
+        size = np.abs(rows[i]) * (~np.isin(np.arange(rows.shape[1]), done))
+        lead = int(np.flatnonzero(size > 0.3 * size.max())[0])
+        rows[i] /= rows[i, lead]
+        for j in range(len(rows)):
+            if j != i:
+                rows[j] -= rows[j, lead] * rows[i]
+        done.append(lead)
+    return rows
+
+
+def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
+    """Return a product with plain exponents where they do as well."""
+    best = _spread(logarithms @ row, found.weights)
+    for denominator in (1, 2, 3):
+        plain = np.round(row * denominator) / denominator
+        if np.any(plain) and _spread(logarithms @ plain, found.weights) <= ROUNDED * best:
+            row = plain
+            break
+    exponents = np.zeros(unknowns)
+    exponents[list(free)] = np.round(row, 2)
+    return Product(exponents, np.exp(logarithms @ exponents[list(free)]))
+
+
+def _spread(values: FloatArray, weights: FloatArray) -> float:
+    mean = weights @ values
+    return float(np.sqrt(weights @ (values - mean) ** 2))
+
+
+def written(names: Sequence[str], exponents: FloatArray) -> str:
+    """Return a product in words: ``relaxation_time x rms_roughness^2``."""
+    parts = [name + _power(power) for name, power in zip(names, exponents, strict=True) if power]
+    return " x ".join(parts)
+
+
+def _power(power: float) -> str:
+    if power == 1:
+        return ""
+    simple = Fraction(power).limit_denominator(3)
+    if abs(simple - power) > 0.006:
+        return f"^{power:g}"
+    return f"^{simple}" if simple.denominator == 1 else f"^({simple})"
+
+
+def unit_of(units: Sequence[str], exponents: FloatArray) -> str:
+    """Return the unit of a product, ``s m^2``; 1 of pure numbers."""
+    parts = [
+        f"({unit}){_power(power)}" if " " in unit or "/" in unit else unit + _power(power)
+        for unit, power in zip(units, exponents, strict=True)
+        if power and unit != "1"
+    ]
+    return " ".join(parts) or "1"
+
+
+def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Return quantiles of weighted values; between two of them the distribution is a straight line."""
+    places, which = np.unique(values, return_inverse=True)
+    mass: FloatArray = np.bincount(which.ravel(), weights).astype(np.float64)
+    below = np.cumsum(mass) - mass / 2
+    return np.interp(shares, below, places)

@@ -1,0 +1,97 @@
+"""Interpolation on natural scales: monotone cubics, straight lines, and what both miss."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+
+#: Fewest values of an axis: every second one left out has to leave a curve.
+FEWEST = 4
+#: What is left of the error of every second value when all are used: a quarter at second order, half at kinks.
+LEFT = 0.25
+
+
+class Scale:
+    """A scale on which numbers are interpolated: as they are, or their logarithms."""
+
+    def __init__(self, logarithmic: bool) -> None:
+        self.logarithmic = logarithmic
+
+    @classmethod
+    def of(cls, numbers: FloatArray, spread: bool = False) -> Scale:
+        """Return the scale on which sorted numbers are more even; of values that are spread, over a decade or more."""
+        if numbers.min() <= 0:
+            return cls(False)
+        if spread:
+            return cls(bool(numbers.max() > 10 * numbers.min()))
+        steps = (np.diff(numbers), np.diff(np.log(numbers)))
+        even = [np.std(step) / np.mean(step) for step in steps]
+        return cls(bool(even[1] < even[0]))
+
+    def of_values(self, values: FloatArray) -> FloatArray:
+        """Return numbers as they are interpolated."""
+        return np.log(values) if self.logarithmic else np.asarray(values, dtype=np.float64)
+
+    def back(self, values: FloatArray) -> FloatArray:
+        """Return what was interpolated as numbers."""
+        return np.exp(values) if self.logarithmic else values
+
+
+def dense(places: FloatArray, pieces: int) -> FloatArray:
+    """Return places with each step cut into equal pieces on their natural scale; the places themselves stay."""
+    scale = Scale.of(places)
+    cut = [np.linspace(a, b, pieces, endpoint=False) for a, b in pairwise(scale.of_values(places))]
+    grid = scale.back(np.concatenate([*cut, scale.of_values(places[-1:])]))
+    grid[::pieces] = places
+    return grid
+
+
+def cubic(
+    places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
+) -> FloatArray:
+    """Return monotone cubics through values along an axis, at other places, on the scale of the axis or another."""
+    from scipy.interpolate import PchipInterpolator
+
+    scale = scale or Scale.of(places)
+    curve = PchipInterpolator(scale.of_values(places), values, axis=axis)
+    return np.asarray(curve(scale.of_values(wanted)))
+
+
+def linear(
+    places: FloatArray, values: FloatArray, wanted: FloatArray, axis: int, scale: Scale | None = None
+) -> FloatArray:
+    """Return straight lines through values along an axis, at other places; scale as in `cubic`."""
+    from scipy.interpolate import make_interp_spline
+
+    scale = scale or Scale.of(places)
+    return np.asarray(make_interp_spline(scale.of_values(places), values, k=1, axis=axis)(scale.of_values(wanted)))
+
+
+def missed(scale: Scale, table: FloatArray, places: FloatArray, axis: int) -> FloatArray:
+    """Return the error of interpolation along an axis at every place, from predicting the values left out."""
+    values, truth = np.moveaxis(table, axis, -1), np.moveaxis(scale.back(table), axis, -1)
+    most = np.zeros_like(truth)
+    number = len(places)
+    for first in (0, 1):
+        kept = np.unique([0, *range(first, number, 2), number - 1])
+        predicted = scale.back(cubic(places[kept], values[..., kept], places, -1))
+        most = np.maximum(most, np.abs(predicted - truth))
+    around = np.pad(most, [(0, 0)] * (most.ndim - 1) + [(1, 1)], mode="edge")
+    return np.moveaxis(LEFT * _largest(around), -1, axis)
+
+
+def bent(table: FloatArray, grid: FloatArray, axis: int) -> FloatArray:
+    """Return by how much straight lines between the values of a table miss a curve: its second derivative h^2 / 8."""
+    values, steps = np.moveaxis(table, axis, -1), np.diff(grid)
+    bend = np.abs(np.diff(np.diff(values) / steps)) / (steps[1:] + steps[:-1])
+    inside = bend * np.maximum(steps[1:], steps[:-1]) ** 2 / 4
+    around = np.pad(inside, [(0, 0)] * (inside.ndim - 1) + [(2, 2)], mode="edge")
+    return np.moveaxis(_largest(around), -1, axis)
+
+
+def _largest(padded: FloatArray) -> FloatArray:
+    """Return the largest of every three neighbours along the last axis."""
+    return np.asarray(np.max([padded[..., :-2], padded[..., 1:-1], padded[..., 2:]], axis=0))

@@ -1,0 +1,173 @@
+"""The posterior density of a few unknowns on cells that become smaller where it is high."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.fits.prediction import Predicted, Prediction
+
+#: Cells along each unknown to begin with, by the number of unknowns.
+START = {1: 64, 2: 24, 3: 12, 4: 8}
+#: Fewest cells that are cut again, by the number of unknowns, and most pieces that they are cut into.
+BEST, MOST = {1: 32, 2: 256, 3: 768, 4: 1536}, 160_000
+#: Cells whose logarithmic density is lower than the highest by more are left out.
+REACH = 14.0
+#: Cells are small enough where the logarithmic density differs by less among the pieces of one, on average.
+SMOOTH = 0.6
+#: Halvings of a cell at most.
+LEVELS = 16
+#: Standard deviations of the measurement that are tried where none is given.
+DEVIATIONS = 14
+#: Numbers that one step of the likelihood holds.
+_STEP = 2**21
+
+
+class Noise(NamedTuple):
+    """Errors of measurement: known, or in sizes that are all tried.
+
+    Attributes
+    ----------
+    sizes : array, shape (sizes,)
+        Factors of the pattern; 1 alone where the errors are known.
+    pattern : array, shape (points,), or None
+        Standard deviations of the points for the factor 1; None for shares of what is predicted.
+    """
+
+    sizes: FloatArray
+    pattern: FloatArray | None
+
+    def variances(self, mean: FloatArray) -> FloatArray:
+        """Return variances, shape (sizes, sets, points)."""
+        pattern = np.abs(mean) if self.pattern is None else np.broadcast_to(self.pattern, mean.shape)
+        square: FloatArray = self.sizes[:, None, None] ** 2 * pattern**2
+        return square
+
+
+class Likelihood:
+    """The likelihood of measured values for a prediction, with all its errors.
+
+    Parameters
+    ----------
+    prediction : Prediction
+    values : array, shape (points,)
+        What was measured.
+    noises : sequence of Noise
+        Held to be equally likely beforehand, and so are the sizes of each.
+    """
+
+    def __init__(self, prediction: Prediction, values: FloatArray, noises: list[Noise]) -> None:
+        self.prediction, self.values, self.noises = prediction, values, noises
+
+    def __call__(self, places: FloatArray) -> FloatArray:
+        """Return logarithms for places in the unit cube, shape (sets, sizes of all noises)."""
+        modes = 4 + self.prediction.realisations // 8
+        step = max(1, _STEP // (self.values.size * modes))
+        parts = [self._of(places[start : start + step]) for start in range(0, len(places), step)]
+        return np.concatenate(parts)
+
+    def _of(self, places: FloatArray) -> FloatArray:
+        predicted = self.prediction(places)
+        found = []
+        for noise in self.noises:
+            prior = -np.log(len(self.noises) * noise.sizes.size)
+            found += [prior + of_errors(self.values, predicted, each) for each in noise.variances(predicted.mean)]
+        return np.stack(found, axis=1)
+
+
+def of_errors(values: FloatArray, predicted: Predicted, noise: FloatArray) -> FloatArray:
+    """Return the logarithm of the normal density of values, up to a constant, shape (sets,)."""
+    square, determinant = distance(values, predicted, noise)
+    return -0.5 * (square + determinant)
+
+
+def distance(values: FloatArray, predicted: Predicted, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return chi squared, and the logarithm of the determinant of the covariance, shape (sets,).
+
+    The covariance is diagonal but for the few errors that points share, which are taken in by Woodbury's identity.
+    """
+    variance = np.maximum(predicted.alone + noise, np.finfo(float).tiny)
+    residual = values - predicted.mean
+    shared = predicted.together / np.sqrt(variance)[..., None]
+    scaled = residual / np.sqrt(variance)
+    moved = np.swapaxes(shared, -1, -2)
+    inner = moved @ shared + np.eye(shared.shape[-1])
+    along = moved @ scaled[..., None]
+    square = (scaled**2).sum(axis=-1) - (along * np.linalg.solve(inner, along)).sum(axis=(-1, -2))
+    return square, np.log(variance).sum(axis=-1) + np.linalg.slogdet(inner)[1]
+
+
+class Posterior(NamedTuple):
+    """Cells of the unit cube with their shares of the posterior.
+
+    Attributes
+    ----------
+    places : array, shape (cells, unknowns)
+        Centres; 0 and 1 are the ends of the axes on their natural scales.
+    weights : array, shape (cells,)
+        Their sum is 1.
+    density : array, shape (cells,)
+        Logarithm, up to a constant.
+    noise : array, shape (cells, sizes)
+        Share of each error of measurement in each cell.
+    width : float
+        Of a cell.
+    """
+
+    places: FloatArray
+    weights: FloatArray
+    density: FloatArray
+    noise: FloatArray
+    width: float
+
+    @property
+    def best(self) -> int:
+        """The cell of the highest density."""
+        return int(np.argmax(self.density))
+
+
+def posterior(likelihood: Callable[[FloatArray], FloatArray], unknowns: int) -> Posterior:
+    """Refine cells of the unit cube, over which the unknowns are evenly likely beforehand.
+
+    Parameters
+    ----------
+    likelihood : callable
+        From places, shape (sets, unknowns), to logarithms of the likelihood, shape (sets, sizes of errors).
+    unknowns : int
+        Dimensions of the cube.
+    """
+    width = 1.0 / START[unknowns]
+    axis = (np.arange(START[unknowns]) + 0.5) * width
+    places = np.stack([each.ravel() for each in np.meshgrid(*[axis] * unknowns, indexing="ij")], axis=1)
+    halves = np.stack(np.meshgrid(*[[-0.25, 0.25]] * unknowns, indexing="ij"), axis=-1).reshape(-1, unknowns)
+    each = likelihood(places)
+    for _ in range(LEVELS):
+        kept = _kept(np.logaddexp.reduce(each, axis=1), BEST[unknowns], MOST // len(halves))
+        places = (places[kept, None] + width * halves).reshape(-1, unknowns)
+        width /= 2
+        each = likelihood(places)
+        density = np.logaddexp.reduce(each, axis=1)
+        if _is_smooth(density.reshape(-1, len(halves))):
+            break
+    weights = np.exp(density - density.max())
+    noise = np.exp(each - density[:, None])
+    return Posterior(places, weights / weights.sum(), density, noise, width)
+
+
+def _kept(density: FloatArray, fewest: int, most: int) -> NDArray[np.intp]:
+    """Return which cells are cut: all that matter, and never few; of very many a fair part."""
+    order = np.argsort(density)[::-1]
+    number = max(int((density > density.max() - REACH).sum()), min(fewest, density.size))
+    if number <= most:
+        return order[:number]
+    generator = np.random.Generator(np.random.Philox(0))
+    return order[generator.permutation(number)[:most]]
+
+
+def _is_smooth(pieces: FloatArray) -> bool:
+    share = np.exp(pieces - pieces.max()).sum(axis=1)
+    return bool(np.sum(share * np.ptp(pieces, axis=1)) < SMOOTH * share.sum())

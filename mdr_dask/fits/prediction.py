@@ -1,0 +1,287 @@
+"""What a study predicts at measured points, as a function of the parameters that nobody measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from mdr_dask import aggregation, bootstrap
+from mdr_dask.arrays import FloatArray
+from mdr_dask.campaign.measured import Measured
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, linear, missed
+from mdr_dask.questions.selection import written
+
+#: Most unknowns, and most numbers of the dense table between whose values straight lines are drawn.
+MOST, LARGEST = 4, 4e6
+#: Pieces into which a cell of the study is cut at most.
+PIECES = 16
+#: Measured and computed values of a parameter that agree to this part are the same.
+SAME = 1e-6
+#: Directions in which the lines of a study scatter together that are told apart, and share of the scatter in them.
+MODES, SHARE = 6, 0.999
+
+
+class Predicted(NamedTuple):
+    """Prediction for several sets of unknowns.
+
+    Attributes
+    ----------
+    mean : array, shape (sets, points)
+    together : array, shape (sets, points, modes)
+        Standard deviations of errors that all points share: scatter of lines, grid and interpolation.
+    alone : array, shape (sets, points)
+        Variance of what errs at each point by itself.
+    """
+
+    mean: FloatArray
+    together: FloatArray
+    alone: FloatArray
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Means at the measured points and their errors, interpolated between the unknowns of a study.
+
+    Parameters
+    ----------
+    unknowns : dict of str to array
+        Values computed, ascending.
+    realisations : int
+        Number of lines.
+    logarithmic : bool
+        Whether the output is interpolated in logarithms.
+    """
+
+    unknowns: Mapping[str, FloatArray]
+    realisations: int
+    logarithmic: bool
+    _mean: RegularGridInterpolator
+    _errors: RegularGridInterpolator
+
+    @property
+    def scales(self) -> list[Scale]:
+        """The natural scale of each unknown."""
+        return [Scale.of(values) for values in self.unknowns.values()]
+
+    def values(self, places: FloatArray) -> FloatArray:
+        """Return the unknowns at places in the unit cube, 0 and 1 the ends of their axes on natural scales."""
+        return np.stack([self._of(k, places[:, k]) for k in range(places.shape[1])], axis=1)
+
+    def _of(self, k: int, place: FloatArray) -> FloatArray:
+        scale, axis = self.scales[k], [*self.unknowns.values()][k]
+        low, high = scale.of_values(axis[[0, -1]])
+        return scale.back(low + (high - low) * place)
+
+    def __call__(self, places: FloatArray) -> Predicted:
+        """Predict at places in the unit cube, shape (sets, unknowns)."""
+        mean = self._mean(places)
+        errors = self._errors(places)
+        alone, systematic, modes = errors[..., 0], errors[..., 1], errors[..., 2:]
+        half = systematic[..., None] / 2
+        together = np.concatenate([modes, half], axis=-1)
+        return Predicted(np.exp(mean) if self.logarithmic else mean, together, alone**2 + half[..., 0] ** 2)
+
+
+def prediction(dataset: xr.Dataset, measured: Measured) -> Prediction:
+    """Prepare what a study predicts at measured points.
+
+    Raises
+    ------
+    FitError
+        If the study is no grid, has no unknowns or too many, too few values of an axis, or cases without a value.
+    DataError
+        If a measured point lies outside the study.
+    """
+    output = dataset[measured.output]
+    if "case" in output.dims:
+        raise FitError("calibration needs a grid, this is a sampled study: its cases lie along no axes")
+    dataset = _at_fixed(dataset, measured)
+    unknowns = _unknowns(dataset, measured)
+    along = [str(dim) for dim in dataset[measured.output].dims if dim in measured.conditions]
+    between = {axis: not _is_computed(dataset[axis].to_numpy(), measured.conditions[axis]) for axis in along}
+    fields, logarithmic = _fields(dataset, measured.output, along, [*unknowns], between)
+    at_points = np.stack(
+        [
+            _at_point(fields, [dataset[axis].to_numpy() for axis in along], [measured.conditions[a][k] for a in along])
+            for k in range(measured.values.size)
+        ],
+        axis=-2,
+    )
+    _require_whole(at_points, measured, unknowns)
+    count = dataset.sizes.get("realisation", 1)
+    return _interpolators(at_points, unknowns, count, logarithmic)
+
+
+def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
+    """Return a study without the axes of one value; what is measured elsewhere is refused."""
+    array = dataset[measured.output]
+    single = [str(dim) for dim in array.dims if dim in array.coords and array.sizes[dim] == 1 and dim != "realisation"]
+    dataset = dataset.squeeze(single)
+    for name, wanted in measured.conditions.items():
+        held = dataset[name]
+        if held.ndim == 0:
+            off = ~np.isclose(wanted, float(held), rtol=SAME, atol=0)
+            problem = f"this study holds it at {_written(held, float(held))}"
+        else:
+            low, high = float(held.min()), float(held.max())
+            slack = SAME * max(abs(low), abs(high))
+            off = (wanted < low - slack) | (wanted > high + slack)
+            problem = f"this study has it from {_written(held, low)} to {_written(held, high)}"
+        if off.any():
+            worst = int(np.flatnonzero(off)[0])
+            place = f"{measured.source}:{measured.lines[worst]}"
+            raise DataError(f"{place}: {name} of {_written(held, wanted[worst])}: {problem}")
+    return dataset
+
+
+def _written(axis: xr.DataArray, value: float) -> str:
+    return written(float(value), str(axis.attrs.get("units", "1")))
+
+
+def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:
+    """Return the axes of a study that the table does not name."""
+    free = [str(d) for d in dataset[measured.output].dims if d != "realisation" and d not in measured.conditions]
+    for name in free:
+        if name not in dataset.coords or dataset[name].dtype.kind not in "fiu":
+            raise FitError(f"the axis {name} has words: choose one of them with --select")
+        if dataset.sizes[name] < FEWEST:
+            raise FitError(
+                f"expected at least {FEWEST} values of the unknown {name}, got {dataset.sizes[name]}; add values to "
+                "the campaign, or name it in the table if it was measured"
+            )
+    if not 1 <= len(free) <= MOST:
+        found = ", ".join(free) or "none: every axis is a column of the table"
+        raise FitError(f"expected one to {MOST} unknowns, which are axes that the table does not name, got {found}")
+    return {name: dataset[name].to_numpy().astype(np.float64) for name in free}
+
+
+def _is_computed(axis: FloatArray, wanted: FloatArray) -> bool:
+    """Return whether every measured value is a value of the axis."""
+    nearest = np.min(np.abs(wanted[:, None] - axis), axis=1)
+    return bool(np.all(nearest <= SAME * np.maximum(np.abs(wanted), np.abs(axis).max() * SAME)))
+
+
+def _fields(
+    dataset: xr.Dataset, output: str, along: Sequence[str], unknowns: Sequence[str], between: Mapping[str, bool]
+) -> tuple[FloatArray, bool]:
+    """Return what is interpolated, and whether the mean is in logarithms.
+
+    Shape (conditions ..., unknowns ..., fields): the mean, the rest of the scatter, errors of grid and interpolation,
+    and the directions in which the lines scatter together.
+    """
+    order = [*along, *unknowns]
+    array = dataset[output]
+    if "realisation" not in array.dims:
+        array = array.expand_dims("realisation")
+    values = array.transpose(*order, "realisation").to_numpy().astype(np.float64)
+    values = np.where(np.isfinite(values), values, np.nan)
+    number = np.isfinite(values).sum(axis=-1)
+    mean = np.nansum(values, axis=-1) / np.where(number, number, np.nan)
+    companion = aggregation.companion(dataset, output)
+    grid = np.zeros_like(mean)
+    if companion is not None:
+        spread = abs(companion).mean("realisation") if "realisation" in companion.dims else abs(companion)
+        grid = np.nan_to_num(spread.transpose(*order).to_numpy())
+    scale = Scale.of(mean[np.isfinite(mean)], spread=True) if np.isfinite(mean).any() else Scale(False)
+    table = scale.of_values(mean)
+    lost = np.zeros_like(mean)
+    for k, axis in enumerate(order):
+        if axis in unknowns or between[axis]:
+            lost += missed(scale, table, _long_enough(dataset, axis), k)
+    alone, modes = _scatter(values - mean[..., None], number, mean)
+    return np.concatenate([np.stack([table, alone, grid + lost], axis=-1), modes], axis=-1), scale.logarithmic
+
+
+def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
+    places: FloatArray = dataset[axis].to_numpy().astype(np.float64)
+    if places.size < FEWEST:
+        raise FitError(
+            f"measured points lie between the {places.size} values of {axis}: expected at least {FEWEST} values of it, "
+            "or those that were measured"
+        )
+    return places
+
+
+def _scatter(deviations: FloatArray, number: NDArray[np.intp], mean: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the standard error that stays alone, and the directions in which the lines scatter together.
+
+    All cases share their lines, so their means err together. Of few lines the scatter is known badly: it is widened as
+    intervals are.
+    """
+    count = deviations.shape[-1]
+    if count < 2:
+        return np.zeros_like(mean), np.zeros((*mean.shape, 0))
+    spare = np.maximum(number * (number - 1), 1)
+    each = np.nan_to_num(deviations) * (_widened(number) / np.sqrt(spare))[..., None]
+    size = np.where(np.abs(mean) > 0, np.abs(mean), 1.0)
+    relative = np.nan_to_num(each / size[..., None]).reshape(-1, count)
+    power, lines = np.linalg.eigh(relative.T @ relative)
+    part = np.cumsum(power[::-1]) / max(power.sum(), np.finfo(float).tiny)
+    kept = min(MODES, count - 1, 1 + int(np.searchsorted(part, SHARE)))
+    modes = each @ lines[:, ::-1][:, :kept]
+    rest = np.maximum((each**2).sum(axis=-1) - (modes**2).sum(axis=-1), 0.0)
+    return np.sqrt(rest), modes
+
+
+def _widened(number: NDArray[np.intp]) -> FloatArray:
+    """Return by how much a standard error of so many lines is too small: Student's t over z."""
+    few = np.maximum(number, 2)
+    widened: FloatArray = bootstrap.widening(few) * np.sqrt((few - 1) / few)
+    return widened
+
+
+def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[float]) -> FloatArray:
+    """Interpolate along the conditions, which come first, one after the other."""
+    for axis, wanted in zip(axes, place, strict=True):
+        nearest = int(np.argmin(np.abs(axis - wanted)))
+        if _is_computed(axis, np.array([wanted])):
+            fields = fields[nearest]
+            continue
+        cell = int(np.clip(np.searchsorted(axis, wanted) - 1, 0, axis.size - 2))
+        near = slice(max(cell - 1, 0), min(cell + 3, axis.size))  # a monotone cubic depends on no more
+        at = np.clip(np.array([wanted]), axis[0], axis[-1])
+        scale = Scale.of(axis)
+        mean = cubic(axis[near], fields[near, ..., :1], at, 0, scale)
+        rest = linear(axis[near], fields[near, ..., 1:], at, 0, scale)
+        fields = np.concatenate([mean, rest], axis=-1)[0]
+    return fields
+
+
+def _require_whole(at_points: FloatArray, measured: Measured, unknowns: Mapping[str, FloatArray]) -> None:
+    lost = ~np.isfinite(at_points[..., 0])
+    if lost.any():
+        raise FitError(
+            f"{measured.output}: of the {lost.size} values that {measured.source} is compared with, {int(lost.sum())} "
+            f"are not in the study; finish the run, or keep a part that is whole by --select {next(iter(unknowns))}=..."
+        )
+
+
+def _interpolators(
+    at_points: FloatArray, unknowns: Mapping[str, FloatArray], count: int, logarithmic: bool
+) -> Prediction:
+    """Return means on a table so dense that straight lines between its values will do, and their errors as they are."""
+    scales = [Scale.of(values) for values in unknowns.values()]
+    places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
+    unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]
+    table, errors = at_points[..., 0], at_points[..., 1:]
+    pieces = int(np.clip((LARGEST / table.size) ** (1 / len(unit)), 1, PIECES))
+    fine = []
+    for k, values in enumerate(unknowns.values()):
+        grid = dense(values, pieces)
+        table = cubic(values, table, grid, k)
+        fine.append((scales[k].of_values(grid) - places[k][0]) / (places[k][-1] - places[k][0]))
+        fine[-1][[0, -1]] = 0.0, 1.0
+    return Prediction(
+        unknowns,
+        count,
+        logarithmic,
+        RegularGridInterpolator(fine, table, bounds_error=False, fill_value=None),
+        RegularGridInterpolator(unit, errors, bounds_error=False, fill_value=None),
+    )

@@ -1,0 +1,19 @@
+"""Every number among the parameters of a case, by the name of its coordinate in a store."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel
+
+from mdr_dask.models.base import DataFile, unit_of
+
+
+def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
+    """Return value, unit and meaning of every number in a parameter set, nested names joined by ``_``."""
+    found: dict[str, tuple[float, str, str]] = {}
+    for name, field in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, BaseModel) and not isinstance(value, DataFile):
+            found |= numbers_of(value, f"{prefix}{name}_")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            found[prefix + name] = (value, unit_of(type(parameters), name) or "1", field.description or "")
+    return found

@@ -1,0 +1,108 @@
+"""The means of all cases of a study, with their errors: what the page lets its reader choose axes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import aggregation
+from mdr_dask.plots import curves, style
+from mdr_dask.report.figures import Json, numbers
+from mdr_dask.report.words import markup, plain
+
+#: Cases of one series on the page; of more, values of the longest axes are left out.
+MOST_CASES = 4000
+
+
+def cases_of(groups: Mapping[str, xr.Dataset]) -> list[Json]:
+    """Return the cases of every series of a study that has any output without further dimensions.
+
+    Returns
+    -------
+    list of dict
+        For each series ``axes`` and ``outputs`` with labels, and a row for every case: ``at`` the parameters that vary,
+        as figures show them, ``value``, ``low``, ``high``, ``lines`` and ``grid`` of each output. ``reduced`` says
+        which values of axes are not here.
+    """
+    found = [_series(name, data) for name, data in groups.items()]
+    return [series for series in found if series["outputs"] and series["axes"]]
+
+
+def _series(name: str, data: xr.Dataset) -> Json:
+    outputs = [output for output in main_outputs(data) if set(data[output].dims) <= set(data["status"].dims)]
+    dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
+    data, reduced = _thinned(data[[*outputs, *_companions(data, outputs), "status"]], dims)
+    varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
+    varied = [axis for axis in varied if data[axis].size > 1]
+    shape = xr.DataArray(np.zeros([data.sizes[dim] for dim in dims]), dims=dims)
+    return {
+        "name": name,
+        "reduced": reduced,
+        "axes": {axis: {**_named(axis, data[axis]), "dim": str(data[axis].dims[0])} for axis in varied},
+        "at": {axis: _column(style.shown(axis, data[axis]), data[axis].dims, shape) for axis in varied},
+        "outputs": {output: _named(output, data[output]) for output in outputs},
+        "values": {output: _measured(data, output, shape) for output in outputs},
+        "states": _states(data, shape),
+    }
+
+
+def main_outputs(data: xr.Dataset) -> list[str]:
+    """Return the outputs of a study that are no errors of others."""
+    names = [str(name) for name in data.data_vars if name != "status"]
+    errors = {str(data[name].attrs.get("ancillary_variables")) for name in names}
+    return [name for name in names if name not in errors]
+
+
+def _companions(data: xr.Dataset, outputs: list[str]) -> list[str]:
+    found = (aggregation.companion(data, output) for output in outputs)
+    return [str(error.name) for error in found if error is not None]
+
+
+def _thinned(data: xr.Dataset, dims: list[str]) -> tuple[xr.Dataset, list[str]]:
+    """Return at most `MOST_CASES` cases: of the longest axes evenly spread values, and what is left out."""
+    told: list[str] = []
+    while (total := math.prod(data.sizes[dim] for dim in dims)) > MOST_CASES:
+        longest = max(dims, key=lambda dim: data.sizes[dim])
+        most = max(
+            1, min(data.sizes[longest] - 1, data.sizes[longest] * MOST_CASES // total, 2 + data.sizes[longest] // 2)
+        )
+        data, sentences = curves.thin(data, longest, most)
+        told += sentences
+    return data, told
+
+
+def _named(name: str, values: xr.DataArray) -> Json:
+    label = style.label(name, values)
+    return {"label": markup(label), "spoken": plain(label), "unit": style.quantity(name, values).unit}
+
+
+def _column(values: Any, dims: tuple[Any, ...], shape: xr.DataArray) -> list[Any]:
+    """Return values along some dimensions for every case."""
+    along = xr.DataArray(np.asarray(values), dims=dims)
+    return numbers(along.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel())
+
+
+def _measured(data: xr.Dataset, output: str, shape: xr.DataArray) -> Json:
+    """Return mean, interval and both errors of an output, in the unit that figures show."""
+    factor = style.quantity(output, data[output]).factor
+    mean = curves.measured(data, output, factor) if "realisation" in data[output].dims else None
+    if mean is None:
+        return {"value": _column(data[output] * factor, data[output].dims, shape)}
+    columns: dict[str, xr.DataArray] = {"value": mean.value, "low": mean.low, "high": mean.high}
+    columns["lines"] = aggregation.standard_error(data[output] * factor)
+    error = aggregation.companion(data, output)
+    if error is not None:
+        columns["grid"] = aggregation.grid_error(error * factor)
+    found = {name: _column(column.to_numpy(), column.dims, shape) for name, column in columns.items()}
+    return {name: column for name, column in found.items() if any(value is not None for value in column)}
+
+
+def _states(data: xr.Dataset, shape: xr.DataArray) -> list[Any]:
+    from mdr_dask.questions.columns import states
+
+    found = states(data)
+    return [str(word) for word in found.broadcast_like(shape).transpose(*shape.dims).to_numpy().ravel()]

@@ -1,0 +1,102 @@
+"""The page: one HTML file with everything in it, and a policy that lets nothing else in.
+
+Text from a store is escaped by the template, data stand in a block of JSON that no browser runs, and the policy names
+the two scripts of this package by their digests: whatever a store holds, none of it can become a script.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Sequence
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any
+
+from mdr_dask.report.study import Study
+from mdr_dask.report.subjects import Equation
+from mdr_dask.version import __version__
+
+#: The scripts of the page, in the order in which they run.
+SCRIPTS = ("plotly-cartesian.min.js", "look.js", "figure.js", "choose.js", "page.js")
+
+
+def page(studies: Sequence[Study], follows: bool = False) -> str:
+    """Return the page of one study or more.
+
+    Parameters
+    ----------
+    studies : sequence of Study
+        As `mdr_dask.report.read_study` returns them.
+    follows : bool
+        Whether the page asks the place that it came from how far the study has come; otherwise it asks nobody.
+
+    Returns
+    -------
+    str
+        HTML that needs no other file and no network.
+    """
+    scripts = [asset(name) for name in SCRIPTS]
+    data = [
+        {"key": f"s{k}", "title": study.title, "url": study.url, "figures": study.figures, "cases": study.cases}
+        for k, study in enumerate(studies)
+    ]
+    written: str = _template().render(
+        studies=studies,
+        title=", ".join(dict.fromkeys(study.title for study in studies)),
+        data=harmless(data),
+        scripts=scripts,
+        style=asset("page.css"),
+        policy=policy(follows),
+        follows=follows,
+        version=__version__,
+        mathml=mathml,
+    )
+    return written
+
+
+def policy(follows: bool) -> str:
+    """Return the content security policy: the page's own scripts by their digests, and no place to send anything to."""
+    digests = [base64.b64encode(hashlib.sha256(asset(name).encode()).digest()).decode() for name in SCRIPTS]
+    scripts = " ".join(f"'sha256-{digest}'" for digest in digests)
+    asks = "'self'" if follows else "'none'"
+    return "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src {scripts}",
+            "style-src 'unsafe-inline'",  # the figures' library sets styles of its own
+            "img-src data: blob:",
+            f"connect-src {asks}",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+
+
+def harmless(data: Any) -> str:
+    """Return data as JSON in which nothing can end the block of a page that holds it."""
+    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026").replace("\u2028", "\\u2028")
+
+
+@lru_cache(maxsize=16)
+def asset(name: str) -> str:
+    """Return a file that comes with this room."""
+    return (files("mdr_dask.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+@lru_cache(maxsize=64)
+def mathml(equation: Equation) -> str:
+    """Return an equation as MathML, which browsers draw and screen readers read."""
+    from latex2mathml.converter import convert
+
+    return str(convert(equation.latex, display="block"))
+
+
+@lru_cache(maxsize=1)
+def _template() -> Any:
+    from jinja2 import Environment, StrictUndefined
+
+    room = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    return room.from_string(asset("page.html.jinja"))

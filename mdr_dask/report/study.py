@@ -1,0 +1,363 @@
+"""All that a page says of one study, read from its store."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import shlex
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import aggregation, fits, plots, store
+from mdr_dask.errors import DataError, FitError, StoreError
+from mdr_dask.plots import curves
+from mdr_dask.plots.table import provenance
+from mdr_dask.questions import progress
+from mdr_dask.questions.columns import fixed_words
+from mdr_dask.report.cases import cases_of, main_outputs
+from mdr_dask.report.figures import Json, drawn_of
+from mdr_dask.report.subjects import Subject, subject_of
+from mdr_dask.units import seconds, shown
+
+#: Rows of a table on the page; the command that prints all stands under it.
+MOST_ROWS = 60
+#: Values of an axis that are written out.
+LISTED = 6
+
+
+class Table(NamedTuple):
+    """A table of the page: a title, headings, rows of texts, and what stands under it."""
+
+    title: str
+    headings: list[str]
+    rows: list[list[str]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a page says of one study.
+
+    Parameters
+    ----------
+    url, title, model, summary : str
+        Where its store is, the campaign's name, its model, and the model's summary.
+    facts : dict of str to str
+        The study in a few lines.
+    campaign, source : str
+        The campaign as written, and the name of its file.
+    understood, counts, machines, laws, errors : lists of Table
+        The campaign as understood; results in each state; who computed it; fits; the share of each error.
+    failures : list of Group
+        Messages of failed results and warnings, those alike together.
+    not_fitted, not_drawn : list of (name, reason)
+        Laws and figures that the study has not the data for.
+    figures, cases : list of dict
+        As `mdr_dask.report.figures` and `mdr_dask.report.cases` return them.
+    subject : Subject or None
+        What is known of its method.
+    digests, rerun : dict of str to str, list of str
+        What the numbers can be recognised by; commands.
+    at_work : str
+        Who is at work on it; empty if nobody is.
+    """
+
+    url: str
+    title: str
+    model: str
+    summary: str
+    facts: dict[str, str]
+    campaign: str
+    source: str
+    understood: list[Table]
+    counts: list[Table]
+    machines: list[Table]
+    failures: list[progress.Group]
+    laws: list[Table]
+    not_fitted: list[tuple[str, str]]
+    errors: list[Table]
+    figures: list[Json]
+    not_drawn: list[tuple[str, str]]
+    cases: list[Json]
+    subject: Subject | None
+    digests: dict[str, str]
+    rerun: list[str]
+    at_work: str
+
+
+def read_study(url: str) -> Study:
+    """Read what a page says of a study, finished or not.
+
+    Raises
+    ------
+    StoreError
+        If there is no study at `url`, or it is damaged.
+    """
+    with store.readable(url):
+        return _read(url)
+
+
+def _read(url: str) -> Study:
+    held, groups = store.attributes(url), store.datasets(url)
+    model = str(held["model"])
+    counted = [progress.counts(look) for look in progress.looks(url)]
+    records = [record for name in groups for record in store.records(url, name)]
+    drawn = list(
+        drawn_of(
+            plots.available(model),
+            groups,
+            lambda name: provenance(name, [url], f"mdr-dask plot {shlex.quote(url)} {name}"),
+        )
+    )
+    laws, not_fitted = _laws(url, model, groups)
+    return Study(
+        url=url,
+        title=str(held["title"]),
+        model=model,
+        summary=_summary(model),
+        facts=_facts(held, counted, records),
+        campaign=str(held["campaign"]),
+        source=str(held.get("source", "")),
+        understood=[table for name, data in groups.items() for table in _understood(name, data)],
+        counts=[_count_table(counted)],
+        machines=_machines(records, held),
+        failures=progress.grouped([m for name, data in groups.items() for m in progress.messages(url, name, data)]),
+        laws=laws,
+        not_fitted=not_fitted,
+        errors=[table for name, data in groups.items() for table in _errors(name, data)],
+        figures=sorted((one for one in drawn if isinstance(one, dict)), key=_shows_no_errors),
+        not_drawn=[one for one in drawn if isinstance(one, tuple)],
+        cases=cases_of(groups),
+        subject=subject_of(model),
+        digests=_digests(url, held, records),
+        rerun=_rerun(url, held),
+        at_work=who_is_at_work(url),
+    )
+
+
+def _shows_no_errors(figure: Json) -> bool:
+    """Say whether a figure shows no means with errors: pictures of single cases come after those."""
+    return not any("y_low" in trace or "value_low" in trace for trace in figure["traces"])
+
+
+def who_is_at_work(url: str) -> str:
+    """Say who is at work on a study; nothing if nobody is."""
+    try:
+        runner, parts = store.at_work(url)
+    except StoreError as error:
+        return str(error)
+    return ", ".join([*([runner] if runner else []), *(f"part {part}" for part in parts)])
+
+
+def _summary(model: str) -> str:
+    from mdr_dask import models
+    from mdr_dask.errors import ModelError
+
+    try:
+        return models.load(model).summary
+    except ModelError:
+        return "a model that is not installed here"
+
+
+def _facts(held: Mapping[str, Any], counted: list[Json], records: list[Json]) -> dict[str, str]:
+    total = sum(row["results"] for row in counted)
+    states = {state: sum(row[state] for row in counted) for state in list(counted[0])[2:]} if counted else {}
+    settled = total - states.get("missing", 0)
+    spent = sum(float(record["compute_seconds"]) for record in records)
+    said = ", ".join(f"{number} {state.replace('_', ' ')}" for state, number in states.items() if number)
+    facts = {
+        "results": f"{settled} of {total} ({settled / max(total, 1):.0%}): {said}",
+        "laid out": str(held["created"]),
+        "time in the model": seconds(spent),
+        "computed by": f"mdr_dask {held['versions']['mdr_dask']}, model version {held['model_version']}",
+        "seed": str(held["seed"]),
+        "accuracy asked for": f"{held['accuracy']:g}, relative" if held.get("accuracy") else "that of the model",
+    }
+    if records:
+        last = datetime.fromtimestamp(max(float(record["finished"]) for record in records), UTC)
+        facts["last block"] = last.isoformat(timespec="seconds")
+    return facts
+
+
+def _count_table(counted: list[Json]) -> Table:
+    headings = [heading.replace("_", " ") for heading in counted[0]] if counted else []
+    return Table("Results in each state", headings, [[str(value) for value in row.values()] for row in counted])
+
+
+def _understood(name: str, data: xr.Dataset) -> Iterator[Table]:
+    """Yield the axes of a series and its fixed parameters, as the campaign was understood."""
+    of = f" of {name}" if name else ""
+    dims = [str(dim) for dim in data["status"].dims if dim != "realisation"]
+    varied = [axis for dim in dims for axis in curves.parameters_along(data, dim) if axis in data.coords]
+    rows = [
+        [axis, str(data[axis].attrs.get("long_name", "")), str(data[axis].size), _range(data[axis])] for axis in varied
+    ]
+    rows.append(["realisation", "independent realisations, at most", str(data.sizes["realisation"]), ""])
+    yield Table(f"Axes{of}", ["axis", "meaning", "values", "range"], rows)
+    fixed = [
+        [str(key), str(value.attrs.get("long_name", "")), shown(value.item(), str(value.attrs.get("units", "1")))]
+        for key, value in data.coords.items()
+        if value.ndim == 0 and value.dtype.kind in "fiu"
+    ]
+    words = [[key, "", word] for key, word in fixed_words(data).items()]
+    yield Table(f"Fixed parameters{of}", ["parameter", "meaning", "value"], fixed + words)
+    computed = [
+        [each, str(data[each].attrs.get("long_name", "")), str(data[each].attrs.get("units", "1"))]
+        for each in main_outputs(data)
+    ]
+    notes = "; ".join(map(str, data.attrs.get("notes", [])))
+    yield Table(f"Outputs{of}", ["output", "meaning", "unit"], computed, notes)
+
+
+def _range(values: xr.DataArray) -> str:
+    if values.dtype.kind not in "fiu":
+        words = [str(value) for value in values.to_numpy()]
+        return ", ".join(words[:LISTED]) + (", ..." if len(words) > LISTED else "")
+    unit = str(values.attrs.get("units", "1"))
+    if values.size <= LISTED:
+        return ", ".join(shown(value, unit) for value in values.to_numpy().tolist())
+    return f"{shown(float(values.min()), unit)} to {shown(float(values.max()), unit)}"
+
+
+def _machines(records: list[Json], held: Mapping[str, Any]) -> list[Table]:
+    hosts = Counter(str(record["host"]) for record in records)
+    spent = dict.fromkeys(hosts, 0.0)
+    for record in records:
+        spent[str(record["host"])] += float(record["compute_seconds"])
+    workers = {host: len({record.get("process") for record in records if record["host"] == host}) for host in hosts}
+    rows = [[host, str(count), str(workers[host]), seconds(spent[host])] for host, count in hosts.items()]
+    kinds = Counter(str(record.get("kind", "not told")) for record in records)
+    versions = [[name, str(number)] for name, number in {"Python": held.get("python", ""), **held["versions"]}.items()]
+    return [
+        Table("Machines", ["machine", "blocks", "processes", "time in the model"], rows),
+        Table("Processors and programs", ["kind", "blocks"], [[kind, str(count)] for kind, count in kinds.items()]),
+        Table("Versions when it was laid out", ["program", "version"], versions),
+        Table("History", ["what happened"], [[str(line)] for line in held["history"]]),
+    ]
+
+
+def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[Table], list[tuple[str, str]]]:
+    """Return the fits that a study has the data for, each with its intervals and whether the law holds."""
+    found: list[Table] = []
+    missing: list[tuple[str, str]] = []
+    for name, law in fits.available(model).items():
+        try:
+            results = law.results(groups)
+        except (FitError, DataError) as error:
+            missing.append((name, str(error)))
+            continue
+        found += [_law(url, f"{name} {series}".strip(), law.summary, result) for series, result in results.items()]
+    return found, missing
+
+
+def _law(url: str, name: str, summary: str, result: xr.Dataset) -> Table:
+    plain = {str(each): result[each] for each in result.data_vars}
+    joined = [
+        each for each in plain if not any(each == f"{other}{end}" for other in plain for end in ("_low", "_high"))
+    ]
+    dims = [str(dim) for dim in result.sizes]
+    cells = int(np.prod([result.sizes[dim] for dim in dims], dtype=int)) if dims else 1
+    along = {
+        dim: result[dim] if dim in result.coords else xr.DataArray(np.arange(result.sizes[dim]), dims=dim)
+        for dim in dims
+    }
+    rows = [
+        [*(_cell(along[dim].isel({dim: at[dim]})) for dim in dims), *(_interval(plain, each, at) for each in joined)]
+        for at in _places(result, dims)
+    ]
+    units = {each: str(plain[each].attrs.get("units", "1")) for each in joined}
+    headings = [*dims, *(each if units[each] in ("1", "") else f"{each} [{units[each]}]" for each in joined)]
+    more = f"{cells - MOST_ROWS} more rows; " if cells > MOST_ROWS else ""
+    command = f"mdr-dask fit {shlex.quote(url)} {name.split(' ')[0]}"
+    return Table(f"{name}: {summary}", headings, rows, f"{more}{command}")
+
+
+def _places(result: xr.Dataset, dims: list[str]) -> Iterator[dict[str, int]]:
+    places = np.ndindex(*(result.sizes[dim] for dim in dims))
+    for _, place in zip(range(MOST_ROWS), places, strict=False):
+        yield dict(zip(dims, map(int, place), strict=True))
+
+
+def _interval(columns: Mapping[str, xr.DataArray], name: str, at: Mapping[str, int]) -> str:
+    """Return a constant with the ends of its interval, where they are known."""
+    parts = [columns[each] for each in (name, f"{name}_low", f"{name}_high") if each in columns]
+    cells = [part.isel({dim: place for dim, place in at.items() if dim in part.dims}) for part in parts]
+    if len(cells) < 3 or not all(np.isfinite(cell.item()) for cell in cells[1:]):
+        return _cell(cells[0])
+    return f"{_cell(cells[0])} ({_cell(cells[1])}, {_cell(cells[2])})"
+
+
+def _cell(value: xr.DataArray) -> str:
+    plain = value.item()
+    return f"{plain:.4g}" if isinstance(plain, float) else str(plain)
+
+
+def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
+    """Yield how much of the errors of the means comes from the scatter of realisations, and how much from the grid."""
+    rows = []
+    for output in main_outputs(data):
+        if "realisation" not in data[output].dims or set(data[output].dims) > set(data["status"].dims):
+            continue
+        size = abs(aggregation.mean(data[output]))
+        error = aggregation.companion(data, output)
+        lines = aggregation.standard_error(data[output])
+        grid = aggregation.grid_error(error) if error is not None else xr.full_like(lines, np.nan)
+        whole = lines.fillna(0) + grid.fillna(0)
+        share = (grid.fillna(0) / whole.where(whole > 0)) if error is not None else grid
+        relative = [(each / size.where(size > 0)).to_numpy() for each in (lines, grid)]
+        rows.append(
+            [output, *(_percent(each, at) for each in relative for at in (0.5, 1.0)), _percent(share.to_numpy(), 0.5)]
+        )
+    headings = [
+        "output",
+        "lines, median",
+        "lines, largest",
+        "grid, median",
+        "grid, largest",
+        "share of the grid, median",
+    ]
+    note = (
+        "Standard error of the mean over realisations (lines) and estimated discretisation error (grid), relative to "
+        "the mean of each case. A dash: not known."
+    )
+    if rows:
+        yield Table(f"Errors{' of ' + name if name else ''}", headings, rows, note)
+
+
+def _percent(values: Any, at: float) -> str:
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return "-"
+    percent = 100 * float(np.quantile(known, at))
+    return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
+
+
+def _digests(url: str, held: Mapping[str, Any], records: list[Json]) -> dict[str, str]:
+    """Return what the campaign and the numbers can be recognised by."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    written = sorted(json.dumps([r["block"], r["attempt"], r.get("chunks", {})], sort_keys=True) for r in records)
+    return {
+        "campaign, sha256": hashlib.sha256(str(held["campaign"]).encode()).hexdigest(),
+        "digests of all chunks, sha256": hashlib.sha256("\n".join(written).encode()).hexdigest(),
+        "model": f"{held['model']} version {held['model_version']}",
+        "this page": f"made {now} on {platform.node()} from {Path(url).name}",
+    }
+
+
+def _rerun(url: str, held: Mapping[str, Any]) -> list[str]:
+    file = shlex.quote(str(held.get("source") or "campaign.yaml"))
+    place = shlex.quote(url)
+    return [
+        f"pip install mdr_dask=={held['versions']['mdr_dask']}",
+        f"mdr-dask run {file} --store {place}",
+        f"mdr-dask verify {place}",
+        f"mdr-dask report {place} -o report.html",
+    ]

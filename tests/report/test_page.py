@@ -1,0 +1,164 @@
+"""The page of a study as a file: what it holds, what it lets in, and where its numbers come from."""
+
+import base64
+import hashlib
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_stores import HOSTILE, friction, hostile
+
+from mdr_dask import plots, store
+from mdr_dask.cli import main
+from mdr_dask.execute import Resources, run
+from mdr_dask.report import cases, figures, page, read_study, words
+
+#: Numbers of the page have nine digits.
+DIGITS = 6e-9
+SCRIPT = re.compile(r"<script(?P<type>[^>]*)>(?P<text>.*?)</script>", flags=re.S)
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory):
+    place = str(tmp_path_factory.mktemp("report") / "small.zarr")
+    friction(place)
+    return place
+
+
+@pytest.fixture(scope="module")
+def study(url):
+    return read_study(url)
+
+
+@pytest.fixture(scope="module")
+def html(study):
+    return page([study])
+
+
+def test_a_page_is_one_file_that_names_no_other(html):
+    without = SCRIPT.sub("", html)
+    assert not re.search(
+        r"(src|srcset|action|formaction|poster|data)=|<(link|iframe|object|embed|base)\b|@import|url\(", without
+    )
+    assert all(target.startswith("#") for target in re.findall(r'href="([^"]*)"', without))
+    assert len(html.encode()) < 3e6
+
+
+def test_the_policy_names_every_script_of_the_page_and_nothing_else(html):
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', html)[1].replace("&#39;", "'")
+    rules = dict(rule.split(" ", 1) for rule in policy.split("; "))
+    assert rules["default-src"] == rules["connect-src"] == "'none'"
+    run = [found["text"] for found in SCRIPT.finditer(html) if "application/json" not in found["type"]]
+    digests = {f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in run}
+    assert set(rules["script-src"].split()) == digests
+
+
+def test_figures_of_the_page_hold_what_their_tables_hold(url, study):
+    drawn = plots.available("sliding_friction")["velocity"].figure(store.datasets(url))
+    table = drawn.table()
+    shown = next(figure for figure in study.figures if figure["name"] == "velocity")
+    for name in ("x", "y", "y_low", "y_high"):
+        held = sorted(value for trace in shown["traces"] for value in trace.get(name, []) if value is not None)
+        np.testing.assert_allclose(held, np.sort(table[name].dropna()), rtol=DIGITS)
+    at = {name: unit for name, unit in table.attrs["units"].items() if name in shown["parameters"]}
+    assert at["normal_force"] == shown["parameters"]["normal_force"]["unit"] == "N"
+
+
+def test_cases_hold_the_means_and_both_errors_of_the_store(url):
+    (data,) = store.datasets(url).values()
+    (series,) = cases.cases_of(store.datasets(url))
+    mean = data["friction_coefficient"].mean("realisation")
+    scatter = data["friction_coefficient"].std("realisation", ddof=1) / 2
+    grid = data["friction_coefficient_error"].mean("realisation")
+    held = series["values"]["friction_coefficient"]
+    for name, expected in (("value", mean), ("lines", scatter), ("grid", grid)):
+        np.testing.assert_allclose(held[name], expected.to_numpy().ravel(), rtol=DIGITS)
+    assert np.all(np.array(held["low"]) <= held["value"])
+    np.testing.assert_allclose(series["at"]["velocity"], np.tile(data["velocity"], 3), rtol=DIGITS)
+
+
+def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
+    monkeypatch.setattr(cases, "MOST_CASES", 6)
+    monkeypatch.setattr(figures, "MOST_POINTS", 9)
+    (series,) = cases.cases_of(store.datasets(url))
+    assert len(series["states"]) <= 6
+    assert "values of velocity" in " ".join(series["reduced"])
+    drawn = plots.available("sliding_friction")["velocity"].figure(store.datasets(url))
+    shown = figures.figure_data("velocity", "", drawn, {})
+    count = sum(len(trace["x"]) for trace in shown["traces"])
+    assert f"{count} of {len(drawn.table())} points are on this page" in shown["left_out"]
+    for full, thin in zip(drawn.rows, shown["traces"], strict=True):
+        assert thin["x"][-1] == pytest.approx(np.max(full.columns["x"]), rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("label", "expected"),
+    [
+        ("normal force $F_N$ [N]", "normal force F<sub>N</sub> [N]"),
+        (r"$\Delta\mu_{12}$ & <i>", "Δμ<sub>12</sub> &amp; &lt;i&gt;"),
+        (r"$a^{1/(1+H)} \, b$", "a<sup>1/(1+H)</sup> b"),
+        ("a price: 5 $ <b>", "a price: 5 $ &lt;b&gt;"),
+        (r"$<script>_{<img>}$", "&lt;script&gt;<sub>&lt;img&gt;</sub>"),
+    ],
+)
+def test_labels_become_markup_of_two_tags_only(label, expected):
+    assert words.markup(label) == expected
+
+
+def test_texts_of_a_store_stay_texts(tmp_path, monkeypatch):
+    place = str(tmp_path / "hostile.zarr")
+    hostile(place, monkeypatch)
+    html = page([read_study(place)])
+    assert html.count("<script") == len(list(SCRIPT.finditer(html))) == 6
+    without = SCRIPT.sub("", html)
+    assert "<img" not in without
+    assert without.count("&lt;img src=x") >= 4  # title, campaign, summary, message
+    held = json.loads(SCRIPT.findall(html)[0][1])
+    assert HOSTILE in held[0]["title"]
+
+
+def test_the_sections_say_what_was_asked_and_how_it_went(html, study, url):
+    text = re.sub(r"<[^>]+>", " ", SCRIPT.sub("", html))
+    for said in (
+        "rubber &amp; glass: &lt;b&gt;bold&lt;/b&gt;",  # the campaign as written
+        "60 of 60 (100%): 60 done",
+        hashlib.sha256(store.attributes(url)["campaign"].encode()).hexdigest(),
+        "mdr-dask run small.yaml --store",
+        "111, 034301 (2013)",
+        "What it cannot say",
+        "largest mu / slope",
+    ):
+        assert said in text
+    assert html.count("<math") == len(study.subject.equations) == 4
+    (errors,) = study.errors
+    assert {row[0] for row in errors.rows} == {"friction_coefficient", "contact_fraction", "rms_slope"}
+
+
+def test_a_page_is_made_while_half_of_the_study_is_missing(tmp_path, toy):
+    place = str(tmp_path / "half.zarr")
+    made = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), outputs=("height", "width", "width_error"))
+    run(made, place, Resources(threads=1), lambda _: None)
+    next(file for file in Path(place, "status/c").rglob("0") if file.is_file()).unlink()
+    study = read_study(place)
+    assert "missing" in study.facts["results"]
+    assert "toy" in page([study])
+
+
+def test_the_command_writes_a_page_of_several_studies(url, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", url, url, "-o", "both.html"]) == 0
+    assert capsys.readouterr().out == "both.html\n"
+    assert Path("both.html").read_text().count("<article") == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [(["nothing.zarr"], "nothing.zarr: no store here"), (["{url}", "-o", "page.pdf"], "ends in .html or .htm")],
+)
+def test_what_cannot_be_reported_is_refused_and_nothing_is_written(url, arguments, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report", *(argument.format(url=url) for argument in arguments)]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

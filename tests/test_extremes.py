@@ -1,0 +1,286 @@
+"""One table of extremes: what must hold of every solver for whatever it is given, searched by hypothesis.
+
+A short search runs with the tests; ``python -m benchmarks stress MINUTES`` goes on for as long as it is told to, in all
+files of extremes.
+"""
+
+import contextlib
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from schemes import on_line
+
+from mdr_dask.errors import FitError
+from mdr_dask.models import load
+from mdr_dask.models.base import Block, Status
+from mdr_dask.physics.lubrication.line_contact import LineContact, solve
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
+from mdr_dask.physics.solids import complex_modulus, prony
+from mdr_dask.physics.superposition.master_curve import superpose
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.waves import waves_of
+
+SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
+NODES = (2, 3, 16, 17, 255, 1024)
+LINES = ("flat", "spike", "steps", "clipped", "noise", "waves")
+
+
+def line(kind, nodes, seed):
+    """Return heights of about one and slopes over the length of a line of some kind; the mean height is 0."""
+    random = np.random.default_rng(seed)
+    place = np.arange(nodes) / nodes
+    waves = np.sin(2 * np.pi * (place + random.uniform())) + 0.3 * np.sin(6 * np.pi * (place + random.uniform()))
+    height = {
+        "flat": np.zeros(nodes),
+        "spike": np.where(np.arange(nodes) == random.integers(nodes), 1.0, 0.0),
+        "steps": np.repeat(random.standard_normal(-(-nodes // 8)), 8)[:nodes],
+        "clipped": np.minimum(waves, 0.2),
+        "noise": random.standard_normal(nodes),
+        "waves": waves,
+    }[kind]
+    height = height - height.mean()
+    return height, waves_of(height).slopes(nodes) if nodes > 2 else np.zeros(nodes)
+
+
+ANY_LINE = {"kind": st.sampled_from(LINES), "nodes": st.sampled_from(NODES), "seed": st.integers(0, 10**6)}
+DECADES = st.floats(-7.5, 7.5)
+
+
+@settings(max_examples=100, deadline=None)
+@given(**ANY_LINE, deborah=DECADES, force=DECADES, scheme=st.sampled_from(SCHEMES), power=st.integers(-60, 60))
+def test_sliding_knows_no_unit_of_height(kind, nodes, seed, deborah, force, scheme, power):
+    """Heights and load by a power of two: every number by that power, bit by bit; time steps end with a secant."""
+    height, slope = line(kind, nodes, seed)
+    case, load, factor = np.array([10**deborah]), np.array([10**force]), 2.0**power
+    one = on_line(height, slope, case, load, scheme)
+    two = on_line(height * factor, slope * factor, case, load * factor, scheme)
+    assert one.status[0] == two.status[0]
+    if one.status[0] == Outcome.CONVERGED:
+        rounding = 1e-7 if scheme == "backward_euler" else 0.0
+        assert two.drag[0] == pytest.approx(one.drag[0] * factor**2, rel=rounding, abs=0)
+        assert two.depth[0] == pytest.approx(one.depth[0] * factor, rel=rounding, abs=0)
+        assert two.contact_fraction[0] == pytest.approx(one.contact_fraction[0], rel=rounding, abs=0)
+
+
+@settings(max_examples=60, deadline=None)
+@given(**ANY_LINE, deborah=st.floats(-5, 2), scheme=st.sampled_from(SCHEMES))
+def test_more_load_goes_deeper_and_touches_more(kind, nodes, seed, deborah, scheme):
+    """Depth and length in contact never fall with the load, over eight decades of it."""
+    height, slope = line(kind, nodes, seed)
+    loads = np.geomspace(1e-4, 1e4, 17)
+    found = on_line(height, slope, np.full(17, 10**deborah), loads, scheme)
+    good = found.status == Outcome.CONVERGED
+    assert np.all(np.diff(found.depth[good]) >= -1e-9 * (np.ptp(height) + loads[good][1:]))
+    assert np.all(np.diff(found.contact_fraction[good]) >= -1e-6)
+    assert np.all((found.drag[good] >= 0) & (found.contact_fraction[good] <= 1 + 1e-9))
+
+
+@settings(max_examples=40, deadline=None)
+@given(**ANY_LINE, deborah=st.floats(-5, 0), force=st.floats(-3, 3), turn=st.integers(1, 2000))
+def test_where_a_periodic_line_begins_does_not_matter(kind, nodes, seed, deborah, force, turn):
+    height, slope = line(kind, nodes, seed)
+    case, load = np.array([10**deborah]), np.array([10**force])
+    one = on_line(height, slope, case, load)
+    two = on_line(np.roll(height, turn), np.roll(slope, turn), case, load)
+    assert one.status[0] == two.status[0] == Outcome.CONVERGED
+    scale = np.ptp(height) + load[0]
+    assert two.depth[0] == pytest.approx(one.depth[0], rel=1e-9, abs=1e-9 * scale)
+    assert two.drag[0] == pytest.approx(one.drag[0], rel=1e-7, abs=1e-9 * np.ptp(height) * load[0])
+
+
+@settings(max_examples=40, deadline=None)
+@given(kind=st.sampled_from(LINES), seed=st.integers(0, 10**6), deborah=st.floats(-4, 0))
+def test_a_mirrored_line_has_the_same_friction_in_full_contact_and_at_rest(kind, seed, deborah):
+    """In full contact friction is a sum over waves; at v -> 0 it is that of statics, whichever way it goes."""
+    height, slope = line(kind, 64, seed)
+    mirrored, mirrored_slope = height[::-1].copy(), -slope[::-1].copy()
+    for pace, force in ((10**deborah, 1e4), (1e-9, 0.3)):
+        one = on_line(height, slope, np.array([pace]), np.array([force]))
+        two = on_line(mirrored, mirrored_slope, np.array([pace]), np.array([force]))
+        assert two.depth[0] == pytest.approx(one.depth[0], rel=1e-6)
+        assert two.drag[0] == pytest.approx(one.drag[0], rel=1e-5, abs=1e-12)
+
+
+def arms(seed, count):
+    random = np.random.default_rng(seed)
+    return 10 ** random.uniform(-2, 2, count), 10 ** random.uniform(-6, 2, count)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.sampled_from([1, 2, 5, 50]),
+    force=st.floats(-3, 2),
+    dashpot=st.sampled_from([0.0, 1e-3]),
+)
+def test_arms_have_no_order_and_equal_ones_are_one(seed, count, force, dashpot):
+    """Arms turned round, an arm cut in two, and an arm of no modulus: the same solid."""
+    moduli, times = arms(seed, count)
+    height, _ = line("waves", 64, seed)
+    found = [
+        steady_viscoelastic_sliding(periodic_line(height, None), prony(1.0, some, at, dashpot), 10**force)
+        for some, at in (
+            (moduli, times),
+            (moduli[::-1], times[::-1]),
+            (np.append(moduli, 0.5 * moduli[0]) * np.append([0.5], np.ones(count)), np.append(times, times[0])),
+        )
+    ]
+    assert {one.status for one in found} == {found[0].status}
+    if found[0].status == Outcome.CONVERGED:
+        error = np.maximum(found[0].errors, 1e-7 * np.abs(found[0].values) + 1e-9)
+        for other in found[1:]:
+            assert np.all(np.abs(other.values - found[0].values) <= error)
+        assert found[0].values[0] >= -found[0].errors[0]
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6), count=st.sampled_from([1, 3, 50]), pace=st.floats(-3, 3))
+def test_full_contact_of_any_solid_is_a_sum_over_waves(seed, count, pace):
+    """F_x / (4 G_inf) = sum |c_k|^2 q_k G''(q_k v) over waves of 2 |c_k|, for any arms: to the stated error."""
+    moduli, times = arms(seed, count)
+    height, _ = line("waves", 256, seed)
+    solid = prony(1.0, moduli, times * 10**pace)
+    found = steady_viscoelastic_sliding(periodic_line(height, None), solid, 1e4 * (1 + moduli.sum()))
+    assert found.status == Outcome.CONVERGED
+    coefficients = waves_of(height).coefficients
+    q = 2 * np.pi * np.arange(1, coefficients.size + 1)
+    exact = 2 * np.sum(np.abs(coefficients) ** 2 * q * complex_modulus(solid, q).imag)
+    assert found.values[2] == 1
+    # on 64 and 256 straight cells; the longest waves carry all
+    assert abs(found.values[0] - exact) <= max(3 * found.errors[0], 2e-3 * exact)
+
+
+@settings(max_examples=25, deadline=None)
+@given(load=st.floats(-3, 3), liquid=st.floats(0, 25))
+def test_films_from_rigid_and_isoviscous_to_heavy_and_piezoviscous(load, liquid):
+    """The pressure carries the load and is nowhere negative, the film is open, and thinnest behind the middle."""
+    found = solve(LineContact(10**load, liquid))
+    if found.outcome != Outcome.CONVERGED:
+        assert found.reason
+        return
+    grid = found.finest
+    assert found.load_error < 1e-9
+    assert grid.pressure.min() >= 0
+    assert grid.film.min() > 0
+    assert found.minimum_film.value <= found.central_film.value * (1 + 1e-6)
+    assert 0 < found.central_film.error < 0.05 * found.central_film.value
+    thicker = solve(LineContact(10**load, liquid + 1.0))
+    if thicker.outcome == Outcome.CONVERGED:
+        slack = found.central_film.error + thicker.central_film.error
+        assert thicker.central_film.value >= found.central_film.value - slack
+
+
+def factors(groups, curves, vertical):
+    """Return a superposition, None if it is refused."""
+    with contextlib.suppress(FitError):
+        return superpose(groups, curves, vertical=vertical)
+    return None
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    points=st.sampled_from([4, 12]),
+    noise=st.sampled_from([1e-4, 1e-2, 0.1]),
+    along=st.floats(-9, 9),
+    up=st.floats(-12, 12),
+    vertical=st.booleans(),
+)
+def test_master_curves_know_no_unit_and_no_order(seed, points, noise, along, up, vertical):
+    """All curves moved along both axes, their points and the curves themselves in another order: the same factors."""
+    random = np.random.default_rng(seed)
+    shifts = np.cumsum(random.uniform(0.2, 0.6, 5))
+    x = np.linspace(-1, 1, points)
+    curves = [(x, np.tanh(x + shift - 1) + noise * random.standard_normal(points)) for shift in shifts]
+    groups = np.arange(5.0)
+    order, rows = random.permutation(5), random.permutation(points)
+    moved = [(curves[k][0][rows] + along, curves[k][1][rows] + up) for k in order]
+    one = factors(groups, curves, vertical)
+    two = factors(groups[order], moved, vertical)
+    if one is None or two is None:
+        assert one is two
+        return
+    assert np.array_equal(two.groups, one.groups)
+    close = 1e-3 * np.maximum(one.horizontal_error, 1e-6) + 1e-7
+    assert np.all(np.abs(two.horizontal - one.horizontal) <= close)
+    assert np.all(np.abs(two.vertical - one.vertical) <= close)
+
+
+#: What is no number or of the wrong sign, of which campaigns let little through, and the ends of what a number can be.
+POISON = np.array([np.nan, np.inf, -np.inf, -1.0, 0.0, 5e-324, 1e-300, 1.001e-30, 1e-15, 1e15, 0.999e30, 1e300])
+LINE = {"length": 0.02, "points": 64, "rms_roughness": 5e-7, "normal_force": 1.5, "velocity": 0.1}
+KELVIN = {"shear_modulus": 1e7, "relaxation_time": 1e-3}
+STEEL = {"contact_modulus": 115e9, "effective_shear_modulus": 90e9, "friction": 0.6, "hardness": 2e9}
+MODELS = {
+    "friction": ("sliding_friction", LINE | KELVIN | {"hurst": 0.7}),
+    "rolled off": ("sliding_friction", LINE | KELVIN | {"rolloff_wavelength": 0.01, "longest_wavelength": 0.015}),
+    "jump": (
+        "velocity_jump",
+        LINE | KELVIN | {"oversampling": 2, "velocity_change": 0.2, "relaxation_times": (0.0, 0.1, 1.0)},
+    ),
+    "wear": (
+        "fretting_wear",
+        STEEL
+        | {"indenter": {"shape": "parabola", "radius": 0.01}, "normal_force": 50.0, "amplitude": 5e-7, "xi": 0.8}
+        | {"wear_coefficient": 1e-4, "cycles": 2e4, "points": 5, "wear_rule": "fast"},
+    ),
+    "worn exactly": ("fretting_wear", {"stick_radius": 0.5, "cycles": 1.0, "accuracy": 0.1, "points": 5}),
+    "film": (
+        "ehl_line",
+        {"radius": 0.01, "line_load": 1e5, "mean_velocity": 1.0, "viscosity": 0.08, "pressure_viscosity": 2e-8}
+        | {"slide_roll_ratio": 0.1, "contact_modulus": 115e9, "profile_points": 5},
+    ),
+    "rollers": (
+        "mixed_lubrication",
+        {"rms_roughness": 2e-7, "points": 2000, "roller_radius": 1e-3, "roller_width": 0.01, "normal_force": 100.0}
+        | {"rotation_speed": 10.0, "temperature": 333.15, "slide_roll_ratio": 0.0, "layer_thickness": 5e-9}
+        | {"layer_shear_strength": 1e6, "contact_modulus": 115e9, "trace_points": 10, "eyring_stress": 5e6}
+        | {"boundary_friction": 0.1, "hurst": 0.7, "cutoff_force": 100.0, "longest_wavelength": 2e-4},
+    ),
+}
+POISONED = [
+    (row, name)
+    for row, (_, parameters) in MODELS.items()
+    for name, value in parameters.items()
+    if isinstance(value, float) and name != "accuracy"
+]
+
+
+def is_valid(model, parameters):
+    """Return whether a campaign lets parameters through."""
+    with contextlib.suppress(ValidationError):
+        model.parameters.model_validate(parameters)
+        return True
+    return False
+
+
+@pytest.mark.parametrize(("row", "name"), POISONED)
+def test_a_number_that_is_none_fails_alone_and_says_why(row, name):
+    """Among good cases of one block, for every number of every model; finite values where it is done after all."""
+    model_name, parameters = MODELS[row]
+    model = load(model_name)
+    outputs = model.with_companions([output.name for output in model.outputs if output.default])
+    good = float(parameters[name])
+    kept = model.parameters.model_validate(parameters)
+    let_through = [value for value in POISON.tolist() if is_valid(model, parameters | {name: value})]
+    assert np.all(np.isfinite(let_through))
+    assert max(np.abs(let_through), default=0) < 1e30
+    column = np.array([good, *let_through, good])
+    found = model.compute(Block(kept, {name: column}, column.size, (1,), 5, outputs))
+    alone = model.compute(Block(kept, {name: column[:1]}, 1, (1,), 5, outputs))
+    assert alone.status[0, 0] == Status.DONE
+    for k in (0, column.size - 1):
+        for output in outputs:
+            assert found.values[output][k].tobytes() == alone.values[output][0].tobytes(), output
+    for k, value in enumerate(column):
+        if found.status[k, 0] != Status.DONE:
+            assert found.messages.get((k, 0)), f"{name} = {value:g} is told as {found.status[k, 0]} without a reason"
+            assert all(np.all(np.isnan(found.values[output][k])) for output in outputs)
+            continue
+        for output in outputs:
+            if not output.endswith("_error"):
+                assert np.all(np.isfinite(found.values[output][k])), f"{output} at {name} = {value:g}"
