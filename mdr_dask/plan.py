@@ -204,7 +204,10 @@ def _as_array(axis: Axis) -> NDArray[Any]:
 
 @dataclass(frozen=True)
 class Estimate:
-    """What a campaign will cost, as ``run --dry-run`` prints it: its first round, all others apart."""
+    """What a campaign will cost, as ``run --dry-run`` prints it: its first round, all others apart.
+
+    `growth` is how many times as many cases there are at most, where axes are refined.
+    """
 
     cases: int
     realisations: int
@@ -217,11 +220,12 @@ class Estimate:
     files: int
     notes: tuple[str, ...]
     compiling: float = 0.0
+    growth: float = 1.0
 
     @property
     def rounds(self) -> float:
         """Work of every round there may be, in units of the first."""
-        return self.at_most / self.realisations
+        return self.growth * self.at_most / self.realisations
 
 
 def templates(
@@ -391,6 +395,14 @@ def estimate(campaign: Campaign) -> Estimate:
         files=1 + sum(part.files for part in parts),
         notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
         compiling=model.compiling,
+        growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
+    )
+
+
+def _growth(series: Series) -> float:
+    """Return how many times as many cases a series has when its adaptive axes are full."""
+    return math.prod(
+        max(axis.refinement.at_most / len(axis.values), 1.0) for axis in series.axes if axis.refinement is not None
     )
 
 
@@ -414,4 +426,5 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
         files=template.files,
         seconds=seconds * realisations / template.chunks["realisation"],
         notes=template.notes,
+        growth=_growth(template.series),
     )

@@ -8,6 +8,14 @@ hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("repeatable")
 
 
+@pytest.fixture(autouse=True, scope="session")
+def disk_is_not_waited_for():
+    """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mdr_dask.store.files.flush", lambda path: None)
+        yield
+
+
 @pytest.fixture
 def toy(monkeypatch):
     """The toy model, known to the runner for the length of a test."""

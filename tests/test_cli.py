@@ -177,18 +177,18 @@ def command(*arguments: str) -> list[str]:
 @pytest.mark.slow
 def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path):
     """SIGKILL at random moments, again and again, until a run gets through: no byte differs, no block is done twice."""
-    long = CAMPAIGN.replace("realisations: 8", "realisations: 96").replace("points: 500", "points: 20000")
+    long = CAMPAIGN.replace("realisations: 8", "realisations: 64").replace("points: 500", "points: 20000")
     campaign.write_text(long + "store: {path: killed.zarr, blocks: {realisation: 2}}\n")
     random = np.random.default_rng(1)
     kills = 0
     there = 0
-    while there < 48:
+    while there < 32:
         enough = there + random.integers(1, 16)
         with subprocess.Popen(command("run", str(campaign), "--quiet"), stdout=subprocess.DEVNULL) as process:
             while process.poll() is None and there < enough:
                 time.sleep(random.uniform(0.0, 0.05))
                 there = len(list(Path("killed.zarr").glob("status/c/*/*/*[0-9]")))
-            if process.poll() is None and there < 48:
+            if process.poll() is None and there < 32:
                 process.send_signal(signal.SIGKILL)
                 kills += 1
     assert process.returncode == 0
@@ -200,13 +200,13 @@ def test_killed_at_any_moment_a_run_ends_with_the_same_bytes(campaign, tmp_path)
 @pytest.mark.slow
 def test_threads_and_worker_processes_give_the_same_bytes(campaign, tmp_path):
     campaign.write_text(CAMPAIGN + "store: {path: x, blocks: {realisation: 2}}\n")
-    for name, options in {"threads": ["--threads", "2"], "one": ["--workers", "1"], "two": ["--workers", "2"]}.items():
+    for name, options in {"threads": ["--threads", "2"], "processes": ["--workers", "2"]}.items():
         subprocess.run(
             command("run", str(campaign), "--quiet", "--store", f"{name}.zarr", *options),
             check=True,
             capture_output=True,
         )
-    assert digests("threads.zarr") == digests("one.zarr") == digests("two.zarr")
+    assert digests("threads.zarr") == digests("processes.zarr")
 
 
 @pytest.mark.slow

@@ -137,3 +137,13 @@ def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_pa
         run(last, url, **options)
         assert digests(url) == expected
         shutil.rmtree(url)
+
+
+def test_all_contents_are_on_the_disk_before_a_name_is_given_and_all_names_when_a_write_returns(tmp_path, monkeypatch):
+    acts = []
+    monkeypatch.setattr(files, "flush", lambda path: acts.append(("flushed", path.is_dir())))
+    given = files.give_name
+    monkeypatch.setattr(files, "give_name", lambda old, new: acts.append(("named", given(old, new) or new.name)))
+    files.write_stages(str(tmp_path), [{"values/0": b"1", "values/1": b"2"}, {"ledger": b"3"}])
+    named = [("named", "0"), ("named", "1"), ("named", "ledger")]
+    assert acts == [("flushed", False)] * 3 + named + [("flushed", True)] * 2

@@ -6,7 +6,47 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import DataFile, Parameters
+
+_DIGITS = 14
+
+
+@dataclass(frozen=True)
+class Spread:
+    """An interval from which values are taken, evenly in the value or in its logarithm."""
+
+    low: float
+    high: float
+    geometric: bool
+    whole: bool
+
+    def at(self, shares: Any) -> list[float]:
+        """Return the values at shares of the interval between 0 and 1, with 14 digits, so that decades are decades."""
+        if self.geometric:
+            values = self.low * (self.high / self.low) ** shares
+        else:
+            values = self.low + (self.high - self.low) * shares
+        values = np.clip(values, min(self.low, self.high), max(self.low, self.high))
+        return [tidy(value, self.whole) for value in values]
+
+    def shares(self, values: Any) -> FloatArray:
+        """Return where values lie in the interval: the inverse of `at`."""
+        numbers = np.asarray(values, dtype=np.float64)
+        if self.geometric:
+            found: FloatArray = np.log(numbers / self.low) / np.log(self.high / self.low)
+        else:
+            found = (numbers - self.low) / (self.high - self.low)
+        return found
+
+
+def tidy(value: float, whole: bool, exact: bool = False) -> float:
+    """Return a number as a range holds it: whole, exactly as given, or with 14 digits."""
+    if whole:
+        return round(value)
+    return float(value) if exact else float(f"{value:.{_DIGITS}g}")
 
 
 @dataclass(frozen=True)
@@ -29,6 +69,8 @@ class Axis:
         SI unit, ``"1"`` for pure numbers, None for names.
     long_name : str
         The parameter's meaning.
+    refinement : Refinement or None
+        How more values are chosen, where the study does so itself.
     """
 
     path: str
@@ -38,6 +80,7 @@ class Axis:
     labels: tuple[str, ...] | None
     unit: str | None
     long_name: str
+    refinement: Refinement | None = None
 
 
 @dataclass(frozen=True)
@@ -66,10 +109,29 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How narrow a standard error has to be: both parts zero means nothing is enough."""
+    """How small an error has to be: both parts zero means nothing is enough."""
 
     relative: float = 0.0
     absolute: float = 0.0
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How a study chooses the values of an axis itself.
+
+    Parameters
+    ----------
+    spread : Spread
+        The interval, on the scale on which outputs are interpolated.
+    until : mapping of str to Tolerance
+        Error of interpolation allowed, by output; its relative part is one of the largest value along the axis.
+    at_most : int
+        Most values of the axis.
+    """
+
+    spread: Spread
+    until: Mapping[str, Tolerance]
+    at_most: int
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
@@ -16,13 +16,22 @@ from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
 from mdr_dask.campaign.remarks import remarks
 from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
+from mdr_dask.campaign.tolerances import refinement
 from mdr_dask.campaign.variation import Origin, Variation
 from mdr_dask.models.base import Model, Parameters
 from mdr_dask.units import to_si
 
+#: Axes that a study refines itself, at most.
+MOST_ADAPTIVE = 2
+
 
 def expand(
-    document: Document, model: Model[Any], spec: CampaignSpec, directory: str, problems: Problems
+    document: Document,
+    model: Model[Any],
+    spec: CampaignSpec,
+    directory: str,
+    outputs: Sequence[str],
+    problems: Problems,
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
     """Return the series of a campaign, and what is asked about their numbers.
 
@@ -36,6 +45,8 @@ def expand(
         Its keys, checked.
     directory : str
         Where the files it names are looked for.
+    outputs : sequence of str
+        What it asks for.
     problems : Problems
         Receives everything wrong with parameters, ranges and tables; series that cannot be built are left out.
     """
@@ -46,7 +57,7 @@ def expand(
         if spec.series:
             paths |= {key: ("series", name, key) for key in spec.series[name]}
         expansion = _Expansion(document, model.parameters, spec, directory, problems, paths)
-        series = expansion.series(name)
+        series = expansion.series(name, model, outputs)
         if series is not None:
             found.append(series)
             units = model.units(series.parameters)
@@ -68,7 +79,7 @@ class _Expansion:
         data = {name: value_at(self.document.data, path) for name, path in self.paths.items()}
         object.__setattr__(self, "data", data)
 
-    def series(self, name: str) -> Series | None:
+    def series(self, name: str, model: Model[Any], outputs: Sequence[str]) -> Series | None:
         """Return the series of that name, or None if something is wrong with it."""
         variations = self._variations()
         if variations is None:
@@ -86,7 +97,7 @@ class _Expansion:
             self._axis(one, [_get(point, one.path) for point in column])
             for one, column in zip(variations, columns, strict=True)
         ]
-        return Series(name, base, tuple(axes))
+        return Series(name, base, tuple(self._refined(axes, variations, model, outputs)))
 
     def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
@@ -105,7 +116,16 @@ class _Expansion:
             return sampling.drawn(design, self.spec.seed, found)
         if design == "zip":
             self._check_lengths(found)
+        self._check_adaptive(found)
         return found
+
+    def _check_adaptive(self, found: Sequence[Variation]) -> None:
+        adaptive = [one for one in found if one.written]
+        for one in adaptive:
+            if self.spec.sampling != "grid":
+                self._complain(one.origin, "expected sampling: grid with an adaptive axis")
+        for one in adaptive[MOST_ADAPTIVE:]:
+            self._complain(one.origin, f"expected at most {MOST_ADAPTIVE} adaptive axes, got {len(adaptive)}")
 
     def _check_lengths(self, found: Sequence[Variation]) -> None:
         sized = [one for one in found if one.items]
@@ -120,13 +140,14 @@ class _Expansion:
         """Return the parameters at each value of one axis, the others at their first value."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        last = self._validate(known, [one], len(one.items) - 1, broken)
+        elsewhere = broken | {other.path for other in variations if other is not one}  # told by their own columns
+        last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         column: list[Parameters | None] = []
         seen = set()
         for position, item in enumerate(one.items):
             if item.inner and None in (base, last):
                 continue
-            checked = base if position == 0 else self._validate(known, [one], position, broken)
+            checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
             column.append(checked)
             value = None if checked is None else _get(checked, one.path)
             key = value if isinstance(value, int | float) else item.label
@@ -196,6 +217,17 @@ class _Expansion:
             unit=(fields.unit_at(self.parameters, one.path, self.data) or "1") if numeric else None,
             long_name=description or name,
         )
+
+    def _refined(
+        self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
+    ) -> Iterator[Axis]:
+        """Yield the axes, adaptive ones with how they are refined."""
+        for axis, one in zip(axes, variations, strict=True):
+            if one.written and one.spread:
+                found = refinement(self.document, one.written, one.spread, model, outputs, self.problems)
+                yield replace(axis, refinement=found)
+            else:
+                yield axis
 
     def _complain(self, origin: Origin, what: str) -> None:
         self.problems.add(origin.place, origin.name, what)

@@ -8,13 +8,14 @@ from typing import Any
 from pydantic import ValidationError
 
 from mdr_dask import models
-from mdr_dask.campaign.definition import Campaign, Replication, Series, Tolerance
+from mdr_dask.campaign.definition import Campaign, Replication, Series
 from mdr_dask.campaign.document import Document, parse, read_text
 from mdr_dask.campaign.expand import expand
 from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, Problems, dotted, shown
-from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec, ToleranceSpec
+from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
+from mdr_dask.campaign.tolerances import tolerances
 from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import DataFile, Model
 from mdr_dask.units import to_si
@@ -68,9 +69,9 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     assert model is not None
     series: tuple[Series, ...] = ()
     remarks: tuple[str, ...] = ()
-    if not wrong & {"parameters", "series", "sampling"}:
-        series, remarks = expand(document, model, spec, directory, problems)
     outputs = _outputs(document, spec, model, problems)
+    if not wrong & {"parameters", "series", "sampling"}:
+        series, remarks = expand(document, model, spec, directory, outputs, problems)
     replication = _replication(document, spec, model, outputs, problems)
     _check_blocks(document, spec, series, problems)
     measured = spec.measured.table if spec.measured else None
@@ -151,29 +152,8 @@ def _replication(
         path: Path = ("realisations", "at_most")
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
         problems.add(document.place(path), dotted(path), what)
-    until = {}
-    outputs = tuple(name for name in outputs if name in {output.name for output in model.outputs})
-    for name, tolerance in wanted.until.items():
-        path = ("realisations", "until", name)
-        if name not in outputs:
-            problems.add(document.key_place(path), dotted(path), f"not among the outputs{did_you_mean(name, outputs)}")
-            continue
-        try:
-            until[name] = _tolerance(tolerance, model.output(name).unit)
-        except ValueError as error:
-            problems.add(document.place(path), dotted(path), str(error))
+    until = tolerances(document, ("realisations", "until"), wanted.until, model, outputs, problems)
     return Replication(wanted.at_least, wanted.at_most, until)
-
-
-def _tolerance(given: float | str | ToleranceSpec, unit: str) -> Tolerance:
-    if isinstance(given, ToleranceSpec):
-        absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
-        tolerance = Tolerance(given.relative, absolute)
-    else:
-        tolerance = Tolerance(relative=to_si(given, "1") if isinstance(given, str) else given)
-    if min(tolerance.relative, tolerance.absolute) < 0 or tolerance == Tolerance():
-        raise ValueError("expected a tolerance above 0")
-    return tolerance
 
 
 def _check_measured(

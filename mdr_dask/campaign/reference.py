@@ -52,6 +52,7 @@ _VARIATION = """\
 | `{values: [...]}` | the same |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
+| `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values itself](adaptive.md) |
 | `[{shape: cone, angle: 10 deg}, {shape: plane}]` | whole structured values, named in the store as they are written |
 | `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | one entry of a structure; its axis is `indenter_angle` |
 

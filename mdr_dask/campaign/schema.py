@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mdr_dask import models
-from mdr_dask.campaign.spec import CampaignSpec
+from mdr_dask.campaign.spec import CampaignSpec, RefinedSpec
 from mdr_dask.models.base import Model, Parameters
 
 Schema = dict[str, Any]
@@ -85,6 +85,7 @@ def _varied(value: Schema) -> Schema:
     is_list = "array" in (kind.get("type") for kind in (value, *value.get("anyOf", ())))
     outside: Schema = {key: value.pop(key) for key in ("description", "default") if key in value}
     branches = [value, {"$ref": "#/$defs/linear"}, {"$ref": "#/$defs/geometric"}, {"$ref": "#/$defs/values"}]
+    branches.append({"$ref": "#/$defs/adaptive"})
     if not is_list:
         branches.append({"type": "array", "items": value, "minItems": 1})
     return {**outside, "anyOf": branches}
@@ -97,6 +98,8 @@ def _ranges() -> Schema:
     for kind in ("linear", "geometric"):
         ends_and_count = {"type": "array", "prefixItems": [ends, ends, count], "minItems": 2, "maxItems": 3}
         found[kind] = _alone(kind, ends_and_count, f"{kind} range [first, last, count]")
+    found["adaptive"] = _readable(RefinedSpec.model_json_schema(ref_template="#/$defs/{model}"))
+    found["adaptive"].pop("$defs")
     found["values"] = _alone("values", {"type": "array", "minItems": 1}, "the values one after the other")
     return found
 

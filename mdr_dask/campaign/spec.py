@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import NamedFile, Parameters, quantity, unquoted
 
 _LONGEST_NAME = 100
 
@@ -25,7 +25,7 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 
 
 class ToleranceSpec(Parameters):
-    """How narrow the standard error of an output has to be; either part is enough."""
+    """How small the error of an output has to be; either part is enough."""
 
     relative: float = quantity("1", "part of the mean, such as 1 %", default=0.0, ge=0)
     absolute: float | str = Field(0.0, description="in the unit of the output, such as 2 um")
@@ -39,6 +39,17 @@ class AdaptiveSpec(Parameters):
     until: dict[str, float | str | ToleranceSpec] = Field(
         min_length=1, description="standard error wanted of each output named: 1 %, or {relative: 1 %, absolute: 2 um}"
     )
+
+
+class RefinedSpec(Parameters):
+    """An axis whose values the study chooses itself."""
+
+    adaptive: list[Any] = Field(description="first and last value")
+    until: float | str | dict[str, float | str | ToleranceSpec] = Field(
+        description="error of interpolation allowed, as a part of the largest value: 1 %, of the first output; or by "
+        "output, {friction_coefficient: 1 %, indentation_depth: {absolute: 2 um}}"
+    )
+    at_most: int = Field(60, ge=5, le=10**4, description="most values of the axis")
 
 
 class SobolSpec(Parameters):
@@ -108,7 +119,7 @@ class StoreSpec(Parameters):
     path: str | None = Field(
         None, min_length=1, description="path or URL of the Zarr store; results/<name>.zarr if not given"
     )
-    blocks: dict[str, Annotated[int, Field(ge=1)]] = Field(
+    blocks: dict[str, Annotated[int, BeforeValidator(unquoted), Field(ge=1)]] = Field(
         default_factory=dict, description="chunk length along an axis or along realisation; chosen if not given"
     )
 

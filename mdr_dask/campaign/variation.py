@@ -11,14 +11,18 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
+from mdr_dask.campaign.definition import Spread, tidy
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted, shown
 from mdr_dask.units import expected, to_si
 
 #: More values than this on one axis are a mistake in the file, not a study.
 MOST_VALUES = 10**6
-RANGES = ("linear", "geometric", "values")
-_DIGITS = 14
+RANGES = ("linear", "geometric", "values", "adaptive")
+#: Values with which an axis begins that the study refines itself: of twice as many spaces, every second one is known.
+FIRST = 5
+#: Ratio of the ends of an adaptive axis beyond which its natural scale is logarithmic.
+DECADE = 10.0
 
 
 @dataclass(frozen=True)
@@ -41,32 +45,17 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Spread:
-    """An interval from which values are drawn, evenly in the value or in its logarithm."""
-
-    low: float
-    high: float
-    geometric: bool
-    whole: bool
-
-    def at(self, shares: Any) -> list[float]:
-        """Return the values at shares of the interval between 0 and 1."""
-        if self.geometric:
-            values = self.low * (self.high / self.low) ** shares
-        else:
-            values = self.low + (self.high - self.low) * shares
-        values = np.clip(values, min(self.low, self.high), max(self.low, self.high))
-        return [_tidy(value, self.whole) for value in values]
-
-
-@dataclass(frozen=True)
 class Variation:
-    """A varied parameter: its path in the parameters, and its values or the interval that they are drawn from."""
+    """A varied parameter: its path in the parameters, and its values or the interval that they are taken from.
+
+    With both, the study chooses more values itself; `written` is where the document says how.
+    """
 
     path: tuple[str, ...]
     origin: Origin
     items: tuple[Item, ...] = ()
     spread: Spread | None = None
+    written: Path = ()
 
     def drawn(self, shares: Any) -> Variation:
         """Return this variation with values drawn at shares of its interval."""
@@ -126,7 +115,9 @@ class _Search:
             return
         structures = fields.structures(info)
         kinds = [key for key in value if key in RANGES and not any(key in kind.model_fields for kind in structures)]
-        if kinds and (len(value) == 1 or not structures):
+        if "adaptive" in kinds:
+            yield self._adaptive(path, value["adaptive"], at)
+        elif kinds and (len(value) == 1 or not structures):
             yield self._variation(path, at, lambda: self._range(path, value, at))
         else:
             for key, inner in value.items():
@@ -141,6 +132,21 @@ class _Search:
         if isinstance(content, Spread):
             return Variation(path, origin, spread=content)
         return Variation(path, origin, tuple(content))
+
+    def _adaptive(self, path: tuple[str, ...], ends: Any, name: Path) -> Variation:
+        """Return an axis of a few values on the natural scale of an interval, which the study refines itself."""
+        origin, at = self._origin(name, name), (*name, "adaptive")
+        try:
+            if self.drawn:
+                self._complain(name, "expected sampling: grid with an adaptive axis", name)
+            if not isinstance(ends, list) or len(ends) != 2:
+                self._complain(at, f"expected [first, last], got {shown(ends)}", name)
+            linear = self._spread(path, "linear", [*ends, FIRST], at)
+            low, high = sorted((linear.low, linear.high))
+            spread = replace(linear, geometric=low > 0 and high > DECADE * low)
+            return Variation(path, origin, tuple(self._items(spread, [*ends, FIRST], at)), spread, name)
+        except _MalformedError:
+            return Variation(path, origin)
 
     def _listed(self, values: Any, at: Path, name: Path) -> list[Item]:
         if not isinstance(values, list):
@@ -237,11 +243,5 @@ def spaced(spread: Spread, count: int) -> list[float]:
         Number of values, at least 2.
     """
     inner = spread.at(np.arange(1, count - 1) / (count - 1))
-    ends = [_tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
+    ends = [tidy(end, spread.whole, exact=True) for end in (spread.low, spread.high)]
     return list(dict.fromkeys([ends[0], *inner, ends[1]]))
-
-
-def _tidy(value: float, whole: bool, exact: bool = False) -> float:
-    if whole:
-        return round(value)
-    return float(value) if exact else float(f"{value:.{_DIGITS}g}")

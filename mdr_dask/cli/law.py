@@ -33,7 +33,7 @@ def law(store: str, output: str, series: str | None, selections: tuple[str, ...]
 
     require_suffix(path, (".nc", ".zarr"))
     dataset = selection.select(selection.group(room.datasets(store), series), selections, tell)
-    table = table_of(selection.outputs(dataset, (output,)), output)
+    table = table_of(selection.outputs(dataset, (output,)).assign(status=dataset["status"]), output)
     with writing(path):
         room.save(table, path)
     values, error = table[output], table[f"{output}_error"]

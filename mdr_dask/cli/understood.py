@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from mdr_dask.units import seconds, shown
 
 if TYPE_CHECKING:
-    from mdr_dask.campaign import Axis, Campaign
+    from mdr_dask.campaign import Axis, Campaign, Refinement
     from mdr_dask.plan import Estimate
 
 #: Longest list of values that is shown in full.
@@ -20,7 +20,9 @@ START = 2.0
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
     """Yield what a campaign was understood to be: the axes of each series, what its data hold, what it costs."""
     from mdr_dask import models
+    from mdr_dask.campaign.written import written_units
 
+    written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
         if series.name:
@@ -29,21 +31,35 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
         indent = "    " if series.name else "  "
         for axis in series.axes:
             unit = units.get(axis.path, axis.unit or "1")
-            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit)}"
+            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, written.get(axis.name, ''))}"
     yield from (f"  {note}" for note in costs.notes)
     yield from (f"  {line}" for line in cost_lines(costs))
 
 
-def axis_range(axis: Axis, unit: str) -> str:
+def axis_range(axis: Axis, unit: str, written: str = "") -> str:
     """Return the values of an axis, or their range and number: ``1 mN to 100 N, 20 values, geometric``."""
     count = len(axis.values)
+    if axis.refinement is not None:
+        return f"{shown(axis.values[0], unit)} to {shown(axis.values[-1], unit)}, {_adaptive(axis.refinement, count)}"
     if axis.labels is not None:
         more = f", ... ({count} values)" if count > LISTED else ""
         return ", ".join(axis.labels[:LISTED]) + more
     if count <= LISTED:
-        return ", ".join(shown(value, unit) for value in axis.values)
-    ends = f"{shown(min(axis.values), unit)} to {shown(max(axis.values), unit)}, {count} values"
+        return ", ".join(shown(value, unit, written=written) for value in axis.values)
+    first, last = (shown(end, unit, written=written) for end in (min(axis.values), max(axis.values)))
+    ends = f"{first} to {last}, {count} values"
     return ends if axis.dim == "case" else ends + spacing(axis.values)
+
+
+def _adaptive(refinement: Refinement, first: int) -> str:
+    """Say how a study chooses the values of an axis."""
+    wanted = []
+    for name, tolerance in refinement.until.items():
+        parts = [f"{100 * tolerance.relative:.3g} % of its largest value"] * bool(tolerance.relative)
+        parts += [f"{tolerance.absolute:.3g} in SI"] * bool(tolerance.absolute)
+        wanted.append(f"{name} is interpolated within {' or '.join(parts)}")
+    scale = "geometric" if refinement.spread.geometric else "linear"
+    return f"{first} to {refinement.at_most} values, {scale}, until {' and '.join(wanted)}"
 
 
 def spacing(values: tuple[float, ...]) -> str:
@@ -62,9 +78,8 @@ def spacing(values: tuple[float, ...]) -> str:
 def cost_lines(costs: Estimate) -> Iterator[str]:
     """Yield counts, size and time of a study, from the first round to the last one that there may be."""
     more = costs.rounds
-    yield (
-        f"{costs.cases} cases x {_range(costs.realisations, more)} realisations = {_range(costs.results, more)} results"
-    )
+    each = _range(costs.realisations, costs.at_most / costs.realisations)
+    yield f"{_range(costs.cases, costs.growth)} cases x {each} realisations = {_range(costs.results, more)} results"
     yield f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks"
     yield f"about {_range(costs.files, more)} files in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
@@ -88,6 +103,7 @@ def costs_row(costs: Estimate) -> dict[str, Any]:
     """Return counts, bytes and seconds of a study under stable keys."""
     return {
         "cases": costs.cases,
+        "cases_at_most": round(costs.cases * costs.growth),
         "realisations": costs.realisations,
         "at_most": costs.at_most,
         "results": costs.results,

@@ -1,4 +1,4 @@
-"""A run: round after round, until nothing of a campaign is missing in its store."""
+"""A run: stage after stage, round after round, until nothing of a campaign is missing in its store."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ from mdr_dask.execute.events import Event, Tell, ended
 from mdr_dask.execute.executors import Execute, check, executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
-from mdr_dask.plan import Template, templates
+from mdr_dask.execute.stages import cases_of, following, stored_layout
+from mdr_dask.plan import Template
+from mdr_dask.refinement import Stage
 from mdr_dask.replication import needs_more, rounds
 from mdr_dask.store import Hold, Part
 from mdr_dask.task import Outcome, Work
@@ -33,7 +35,7 @@ PAUSE = 4.0
 class _Job:
     """What is to be run, and who is told."""
 
-    campaign: Campaign
+    stage: Stage
     url: str
     hold: Hold
     resources: Resources
@@ -98,12 +100,12 @@ def run(
         If a cluster cannot be started, goes away, or has no worker for too long.
     """
     check(resources)  # what is refused leaves no lock behind
-    _plan(campaign, url)
+    stored_layout(Stage.first(campaign), url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
-        job = _Job(campaign, url, hold, resources, part, retry_failed, report, tell)
+        job = _Job(Stage.first(campaign), url, hold, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
-            progress = _run_rounds(job, execute)
+            progress = _run_stages(job, execute)
         _settle(job, progress, sealed)
         return progress
 
@@ -124,7 +126,9 @@ def _settle(job: _Job, progress: Progress, sealed: bool) -> None:
 
 
 def outlook(campaign: Campaign, url: str) -> Progress:
-    """Return what a store holds of the first round of a campaign, without touching it; results kept and to do.
+    """Return what a store holds of a campaign, without touching it; results kept and to do.
+
+    Of realisations in rounds the first round counts, of adaptive axes all values that are known to be needed.
 
     Raises
     ------
@@ -133,28 +137,27 @@ def outlook(campaign: Campaign, url: str) -> Progress:
     CampaignError
         If the campaign is too large to be run.
     """
-    layout, asked = _plan(campaign, url)
-    first = (0, next(rounds(campaign.replication)))
-    groups = [find_cells(url, t, mask, mask, first, retry_failed=False) for t, mask in zip(layout, asked, strict=True)]
-    return _begin_round(Progress(), groups)
+    stage: Stage | None = Stage.first(campaign)
+    count = next(rounds(campaign.replication))
+    progress = Progress()
+    while stage is not None:
+        layout, places = stored_layout(stage, url)
+        asked = cases_of(stage, layout, places, stage.new)
+        groups = [
+            find_cells(url, t, mask, mask, (0, count), retry_failed=False)
+            for t, mask in zip(layout, asked, strict=True)
+        ]
+        progress = _begin_round(progress, groups)
+        if progress.to_do or campaign.replication.until or not stage.is_adaptive:
+            break
+        stage, _ = following(url, stage, layout, places, count)
+    return progress
 
 
-def _plan(campaign: Campaign, url: str) -> tuple[tuple[Template, ...], list[NDArray[np.bool_]]]:
-    """Lay out a campaign together with what is stored of it; say which cases it asks for."""
-    if not store.exists(url):
-        layout = templates(campaign, campaign.replication.at_least)
-        return layout, [np.ones(template.shape[:-1], dtype=bool) for template in layout]
-    stored = store.reconcile(url, campaign)
-    layout = templates(stored.campaign, max(campaign.replication.at_least, stored.realisations), stored.chunks)
-    asked = [stored.asked.get(t.series.name, np.ones(t.shape[:-1], dtype=bool)) for t in layout]
-    return layout, asked
-
-
-def _run_rounds(job: _Job, execute: Execute) -> Progress:
-    """Run round after round, each over the cases that the one before left too uncertain."""
+def _run_stages(job: _Job, execute: Execute) -> Progress:
+    """Run a campaign, and again with what its adaptive axes still want, until they want nothing more."""
     start = time.monotonic()
     progress = Progress()
-    current: _Round | None = None
 
     def settle(work: Work, outcome: Outcome) -> None:
         nonlocal progress
@@ -162,26 +165,63 @@ def _run_rounds(job: _Job, execute: Execute) -> Progress:
         job.tell(ended(work, outcome))
         job.report(progress)
 
-    for count in rounds(job.campaign.replication):
-        current = _lay_out(job, current, count)
-        if not any(mask.any() for mask in current.needed):
-            break
-        groups = _find(job, current)
+    def run_round(current: _Round, groups: list[Cells]) -> None:
+        nonlocal progress
         progress = _begin_round(progress, groups)
         job.report(progress)
         execute(tasks(job.url, groups, job.hold), settle)
         if job.resources.remote:
             _verify(job, current)
-        job.tell(Event("round ended", {"realisations": count, "done": progress.done, "failed": progress.failed}))
-        if job.part and count < job.campaign.replication.at_most and not _others_are_done(job, job.part, current):
+        facts = {"realisations": current.realisations[1], "done": progress.done, "failed": progress.failed}
+        job.tell(Event("round ended", facts))
+
+    reached, stage = 0, job.stage
+    while last := _run_rounds(job, run_round):
+        reached = max(reached, last.realisations[1])
+        if not stage.is_adaptive:
             break
+        after, event = following(job.url, stage, *stored_layout(stage, job.url), reached)
+        job.tell(event)
+        if after is None:
+            _spare_the_rest(job, run_round, reached)
+            break
+        stage = after
+        job = replace(job, stage=stage)
     return replace(progress, wall_seconds=time.monotonic() - start)
+
+
+def _run_rounds(job: _Job, run_round: Callable[[_Round, list[Cells]], None]) -> _Round | None:
+    """Run round after round, each over the cases that the one before left too uncertain.
+
+    Returns the last round; None if this part leaves while others are not done with it.
+    """
+    current: _Round | None = None
+    replication = job.stage.campaign.replication
+    for count in rounds(replication):
+        further = _lay_out(job, current, count)
+        if not any(mask.any() for mask in further.needed):
+            break
+        current = further
+        run_round(current, _find(job, current))
+        is_last = count == replication.at_most and not job.stage.is_adaptive
+        if job.part and not is_last and not _others_are_done(job, job.part, current):
+            return None
+    return current
+
+
+def _spare_the_rest(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
+    """Write down as not needed what no stage has asked for."""
+    layout, places = stored_layout(job.stage, job.url)
+    asked = cases_of(job.stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in job.stage.meshes])
+    rest = _Round(layout, asked, [np.zeros_like(mask) for mask in asked], (0, realisations))
+    run_round(rest, [replace(cells, kept=0) for cells in _find(job, rest)])
 
 
 def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
     """Lay the next round out, if any case takes part in it, while no other part does."""
     with store.entrance(job.url):
-        layout, asked = _plan(job.campaign, job.url)
+        layout, places = stored_layout(job.stage, job.url)
+        asked = cases_of(job.stage, layout, places, job.stage.new)
         before = last.realisations[1] if last else 0
         needed = asked
         if last:

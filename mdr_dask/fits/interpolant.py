@@ -14,7 +14,9 @@ from mdr_dask.aggregation import aggregate
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, bent, cubic, dense, linear, missed
+from mdr_dask.models.base import Status
 from mdr_dask.questions.selection import written
+from mdr_dask.refinement import departure
 
 #: Numbers that a table holds at most, and pieces into which it cuts a cell of the study at most.
 LARGEST, PIECES = 2_000_000, 16
@@ -53,12 +55,13 @@ def law(dataset: xr.Dataset, output: str) -> xr.Dataset:
     if "case" in dataset.dims:
         raise FitError("expected a grid, this is a sampled study: its cases lie along no axes")
     mean, half = (array.squeeze() for array in _means(dataset, output))
+    scale = Scale.of(mean.to_numpy()[mean.notnull().to_numpy()], spread=True)
+    mean, half = _filled(mean, half, scale)
     axes = [str(dim) for dim in mean.dims if _is_numeric(mean, str(dim))]
     if not axes:
         raise FitError(f"expected an axis of at least {FEWEST} numbers, got none")
     values = mean.transpose(..., *axes).to_numpy()
     half = half.transpose(*mean.transpose(..., *axes).dims)
-    scale = Scale.of(values.ravel(), spread=True)
     grids = [dense(mean[axis].to_numpy(), _pieces(mean, axes)) for axis in axes]
     table, error = scale.of_values(values), half.to_numpy()
     error = error + sum(missed(scale, table, mean[axis].to_numpy(), k - len(axes)) for k, axis in enumerate(axes))
@@ -92,7 +95,7 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
     kept = [name for name in (output, dataset[output].attrs.get("ancillary_variables")) if name in dataset]
     reduced = aggregate(dataset[kept], ("mean", "interval", "grid_error"))
     mean, ends = reduced[f"{output}_mean"].load(), reduced[f"{output}_interval"].load()
-    lost = int(mean.isnull().sum())
+    lost = int((mean.isnull() & ~_spared(dataset)).sum())
     if lost:
         raise FitError(
             f"{output}: {lost} of {mean.size} cases have no value; finish the run, or keep a part that is whole by "
@@ -100,7 +103,41 @@ def _means(dataset: xr.Dataset, output: str) -> tuple[xr.DataArray, xr.DataArray
         )
     half = (ends.sel(bound="high", drop=True) - ends.sel(bound="low", drop=True)) / 2
     grid = reduced.get(f"{output}_grid_error")
-    return mean, half.fillna(0.0 if grid is None else grid.fillna(0.0))
+    return mean, half.fillna(0.0 if grid is None else grid.fillna(0.0)).where(mean.notnull())
+
+
+def _spared(dataset: xr.Dataset) -> xr.DataArray:
+    """Return which cases were not needed: those that adaptive axes left to interpolation."""
+    if "status" not in dataset:
+        return xr.DataArray(False)
+    return (dataset["status"] == Status.NOT_NEEDED).all("realisation")
+
+
+def _filled(mean: xr.DataArray, half: xr.DataArray, scale: Scale) -> tuple[xr.DataArray, xr.DataArray]:
+    """Interpolate cases that were not needed between those that were, with the error of that added to theirs."""
+    axes = [k for k, dim in enumerate(mean.dims) if _is_numeric(mean, str(dim))]
+    table, error = scale.of_values(mean.to_numpy()).copy(), half.to_numpy().copy()
+    for axis in axes * 2:  # what one axis leaves, the other one fills
+        places = mean[mean.dims[axis]].to_numpy()
+        lines, errors = (np.moveaxis(array, axis, -1) for array in (table, error))
+        for case in np.ndindex(lines.shape[:-1]):
+            known = np.isfinite(lines[case])
+            if not known.all() and known.sum() >= FEWEST:
+                lines[case], errors[case] = _between(scale, places, lines[case], errors[case])
+    return mean.copy(data=scale.back(table)), half.copy(data=error)
+
+
+def _between(scale: Scale, places: FloatArray, line: FloatArray, error: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a line with what lies between its known values, and its errors."""
+    known = np.isfinite(line)
+    filled = cubic(places[known], line[known], places, 0, Scale.of(places))
+    places = Scale.of(places).of_values(places)
+    apart = departure(places[known], line[None, None, known], np.zeros((1, int(known.sum()))))[0]
+    space = np.clip(np.searchsorted(places[known], places) - 1, 0, apart.size - 1)
+    beside = np.where(known, 0.0, apart[space]) * (scale.back(filled) if scale.logarithmic else 1.0)
+    inside = (places >= places[known][0]) & (places <= places[known][-1])
+    around = np.interp(places, places[known], error[known]) + beside
+    return np.where(inside, filled, np.nan), np.where(known, error, around)
 
 
 def _is_numeric(mean: xr.DataArray, dim: str) -> bool:

@@ -14,6 +14,7 @@ import xarray as xr
 
 from mdr_dask import aggregation
 from mdr_dask.errors import DataError, FitError
+from mdr_dask.models.base import Status
 from mdr_dask.plots import style
 from mdr_dask.plots.drawing import Curve, Mean
 
@@ -251,7 +252,7 @@ def _split(
         colours = style.scale(len(cells))
         curves = [
             Curve(part, ", ".join(_names(part, varied)), colours[k], line, "o")
-            for k, part in enumerate(data.isel(dict(zip(others, cell, strict=True))) for cell in cells)
+            for k, part in enumerate(_needed(data.isel(dict(zip(others, cell, strict=True)))) for cell in cells)
         ]
         return curves, "", None
     colour, second = others[0], others[1] if len(others) > 1 else None
@@ -263,13 +264,21 @@ def _split(
     how, norm = style.shades(style.shown(name, values))
     curves = []
     for cell in cells:
-        part = data.isel(dict(zip(others, cell, strict=True)))
+        part = _needed(data.isel(dict(zip(others, cell, strict=True))))
         k = cell[1] if second else 0
         told = [second] if many else [colour, second]
         label = ", ".join(_names(part, [dim for dim in told if dim])) if cell[0] == 0 or not many else ""
         shade = how(norm(float(style.shown(name, values)[cell[0]]))) if many else style.COLOURS[cell[0]]
         curves.append(Curve(part, label, shade, style.LINES[k] if joined else "", style.MARKERS[k]))
     return curves, "", (name, values) if many else None
+
+
+def _needed(curve: xr.Dataset) -> xr.Dataset:
+    """Leave out the values of an adaptive axis that a curve did not need."""
+    if "status" not in curve:
+        return curve
+    spared = (curve["status"] == Status.NOT_NEEDED).all("realisation")
+    return curve.isel({spared.dims[0]: np.flatnonzero(~spared)}) if spared.ndim == 1 and spared.any() else curve
 
 
 def _names(part: xr.Dataset, dims: Sequence[str | None]) -> Iterator[str]:

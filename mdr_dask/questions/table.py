@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.aggregation import QUANTILES, aggregate
 from mdr_dask.errors import DataError
+from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import COUNTS, REALISATIONS, STATUS, Columns, needed
 from mdr_dask.questions.expression import parse
 from mdr_dask.questions.groups import CASES, averaged
@@ -108,7 +109,8 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     total = prod(maker.sizes.values())
     if question.where and not question.group_by:
         return Table(maker.frames(ROWS), units, None)
-    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, total)
+    known = None if maker.has_spared else total
+    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, known)
 
 
 class _Maker:
@@ -180,10 +182,20 @@ class _Maker:
         part = data.isel(dict(box))
         return (part.stack(row=self._dims, create_index=False) if self._dims else part.expand_dims("row")).load()
 
+    @property
+    def has_spared(self) -> bool:
+        """Whether there are cases that no realisation was needed of, as on adaptive axes; they have no row."""
+        if self._raw or self._question.group_by:
+            return False
+        return bool((self._data[STATUS].isel(realisation=0) == Status.NOT_NEEDED).any())
+
     def _kept(self, rows: xr.Dataset) -> Any:
+        needed = np.ones(rows.sizes["row"], dtype=bool)
+        if STATUS in rows and "realisation" in rows[STATUS].dims:
+            needed = ~(rows[STATUS] == Status.NOT_NEEDED).all("realisation").to_numpy()
         if not self._question.where or self._question.group_by:
-            return np.ones(rows.sizes["row"], dtype=bool)
-        return np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])
+            return needed
+        return needed & np.broadcast_to(Columns(rows).truth(self._question.where).to_numpy(), rows.sizes["row"])
 
     def _keys(self, rows: xr.Dataset) -> list[Any]:
         columns = Columns(rows)

@@ -230,10 +230,11 @@ def _make(folder: Path) -> list[Path]:
 
 def _flush(paths: Iterable[Path]) -> None:
     """Wait until files, and the names in folders, are on the disk; together, since a disk writes them together."""
-    list(_flushers().map(_flush_one, paths))
+    list(_flushers().map(flush, paths))
 
 
-def _flush_one(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import operator
+from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mdr_dask import models
+from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import DataFile
@@ -33,14 +34,14 @@ class Stored:
         Layout of the stored groups.
     realisations : int
         Number of stored realisations.
-    asked : mapping of series name to bool array
-        For the stored groups, which of the extended cases the campaign itself names.
+    places : mapping of series name to (mapping of dimension to int array)
+        For the stored groups, where the campaign's own entries of each dimension lie among the extended ones.
     """
 
     campaign: Campaign
     chunks: Mapping[str, Mapping[str, int]]
     realisations: int
-    asked: Mapping[str, NDArray[np.bool_]]
+    places: Mapping[str, Mapping[str, IntArray]]
 
 
 def reconcile(url: str, campaign: Campaign) -> Stored:
@@ -72,17 +73,17 @@ def reconcile(url: str, campaign: Campaign) -> Stored:
     if differences:
         lines = "\n  ".join(dict.fromkeys(differences))
         raise StoreError(f"{url}: made from another campaign; name another store, or remove this one:\n  {lines}")
-    extended, asked = [], {}
+    extended, places = [], {}
     for series in campaign.series:
         if series.name in held:
-            series, asked[series.name] = _extend(series, held[series.name])
+            series, places[series.name] = _extend(series, held[series.name])
         extended.append(series)
     outputs = tuple(next(iter(held.values()))["outputs"]) if held else campaign.outputs
     return Stored(
         campaign=replace(campaign, series=tuple(extended), outputs=outputs),
         chunks={name: found["blocks"] for name, found in held.items()},
         realisations=max((found["realisations"] for found in held.values()), default=0),
-        asked=asked,
+        places=places,
     )
 
 
@@ -183,9 +184,9 @@ def _by_digest(value: Any) -> Any:
     return value["sha256"] if _is_file(value) else value
 
 
-def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, NDArray[np.bool_]]:
-    """Put the stored entries of every dimension first and the new ones behind them; say which are asked for."""
-    asked = np.ones((), dtype=bool)
+def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:
+    """Put the stored entries of every dimension first and the new ones behind them; say where the wanted ones are."""
+    places = {}
     axes = []
     for dim in dict.fromkeys(axis["dim"] for axis in held["axes"]):
         stored = [axis for axis in held["axes"] if axis["dim"] == dim]
@@ -193,18 +194,28 @@ def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, NDArray[np
         old = _entries([axis["values"] for axis in stored])
         wanted = _entries([plain_values(axis.values) for axis in now])
         new = [position for entry, position in wanted.items() if entry not in old]
-        asked = np.multiply.outer(asked, [entry in wanted for entry in old] + [True] * len(new))
+        behind = iter(range(len(old), len(old) + len(new)))
+        places[dim] = np.array([old[entry] if entry in old else next(behind) for entry in wanted], dtype=np.int64)
         axes += [_longer(series, axis, before, new) for axis, before in zip(now, stored, strict=True)]
-    return replace(series, axes=tuple(axes)), asked
+    return replace(series, axes=tuple(axes)), places
 
 
 def _axis(series: Series, path: str) -> Axis:
     return next(axis for axis in series.axes if axis.path == path)
 
 
-def _entries(columns: list[list[Any]]) -> dict[str, int]:
-    """Return the position of every entry of a dimension, by the text of its values."""
-    return {json.dumps(entry, sort_keys=True): position for position, entry in enumerate(zip(*columns, strict=True))}
+def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
+    """Return the position of every entry of a dimension, by the text of its values and how often it was there before.
+
+    Designs of whole numbers may have the same case twice.
+    """
+    found: dict[tuple[str, int], int] = {}
+    seen: Counter[str] = Counter()
+    for position, entry in enumerate(zip(*columns, strict=True)):
+        text = json.dumps(entry, sort_keys=True)
+        found[text, seen[text]] = position
+        seen[text] += 1
+    return found
 
 
 def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int]) -> Axis:

@@ -8,12 +8,14 @@ from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit for fit in FITS}
-STUDIES = 300
+STUDIES = 200
 LEAST = 0.92
 G, RMS, LENGTH, TAU, SLOPE = 1e7, 5e-7, 0.02, 1e-3, 0.1
 LINES = pytest.mark.parametrize("lines", [5, 10, 30])
 # scatter that all cases of a line share, and scatter of every case for itself
 SCATTER = pytest.mark.parametrize("scatter", [(0.1, 0.02), (0.05, 0.1)])
+# what takes longer: with many lines and with few, scatter of the one kind and of the other
+BOTH = pytest.mark.parametrize(("lines", "scatter"), [(5, (0.05, 0.1)), (10, (0.1, 0.02)), (30, (0.05, 0.1))])
 
 
 def planted(law, axes, lines, scatter, studies=STUDIES, grid=0.0, **fixed):
@@ -100,8 +102,7 @@ def interpolated(force, velocity):
     return np.sqrt(2) * laws.interpolation(force, velocity, 0.35, 1.5)
 
 
-@LINES
-@SCATTER
+@BOTH
 def test_interpolation(lines, scatter):
     found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter, studies=200)})
     assert coverage(found, "alpha", 0.35) >= LEAST
@@ -122,8 +123,7 @@ def rough_cone(lines, scatter, law, grid=0.0):
     return planted(of_velocity, axes, lines, scatter, grid=grid, **fixed)
 
 
-@LINES
-@SCATTER
+@BOTH
 def test_indenter(lines, scatter):
     data = rough_cone(lines, scatter, lambda xi: laws.indenter(xi, 1.3))
     found = xr.concat([FIT["indenter"].compute({"": data.isel(study=k)}) for k in range(STUDIES)], "study")
@@ -132,8 +132,7 @@ def test_indenter(lines, scatter):
     assert judged(found, "yes") >= LEAST
 
 
-@pytest.mark.parametrize("lines", [5, 30])
-@pytest.mark.parametrize("grid", [0.02, 0.2])
+@pytest.mark.parametrize(("lines", "grid"), [(5, 0.2), (30, 0.02)])
 def test_an_error_of_the_grid_that_is_stated_is_held(lines, grid):
     """All friction is too high by what its companion says: wide of the truth, if intervals knew the lines only."""
     few = {"studies": 60, "grid": grid}

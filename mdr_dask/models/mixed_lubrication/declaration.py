@@ -278,13 +278,22 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
+#: Parameters on which lines depend: cases that differ in others share theirs.
+OF_LINES = {
+    *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
+    *("roller_radius", "roller_width", "contact_modulus"),
+}
+
+
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from points, cases, creep, drawn places and the solutions of the film."""
+    """Estimate the time of a block from its lines, points, cases, creep, drawn places and solutions of the film."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
     case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
     films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
-    return films + len(block.realisations) * float(0.06 * millions.max() + np.sum(millions * case))
+    keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
+    lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
+    return films + len(block.realisations) * float(0.06 * sum(lines.values()) + np.sum(millions * case))
 
 
 MODEL = Model(

@@ -1,0 +1,108 @@
+"""How precise a campaign wants its outputs: tolerances by name, checked against the outputs it asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from mdr_dask.campaign.definition import Refinement, Spread, Tolerance
+from mdr_dask.campaign.document import Document
+from mdr_dask.campaign.messages import report_errors, value_at
+from mdr_dask.campaign.problems import Path, Problems, dotted
+from mdr_dask.campaign.spec import RefinedSpec, ToleranceSpec
+from mdr_dask.errors import did_you_mean
+from mdr_dask.models.base import Model
+from mdr_dask.units import to_si
+
+Written = float | str | ToleranceSpec
+
+
+def tolerances(
+    document: Document,
+    path: Path,
+    given: Mapping[str, Written],
+    model: Model[Any],
+    outputs: Sequence[str],
+    problems: Problems,
+) -> dict[str, Tolerance]:
+    """Return the tolerance of every output named at a path of a document; errors of outputs have none.
+
+    Parameters
+    ----------
+    document : Document
+        The file.
+    path : path
+        Where the mapping stands.
+    given : mapping
+        Tolerances as written, by output.
+    model : Model
+        The model, which knows units.
+    outputs : sequence of str
+        What the campaign asks for.
+    problems : Problems
+        Receives unknown names and malformed tolerances.
+    """
+    known = [output.name for output in model.outputs if output.name in outputs]
+    found = {}
+    for name, written in given.items():
+        at = (*path, name)
+        if name not in known:
+            problems.add(document.key_place(at), dotted(at), f"not among the outputs{did_you_mean(name, known)}")
+            continue
+        try:
+            found[name] = tolerance(written, model.output(name).unit)
+        except ValueError as error:
+            problems.add(document.place(at), dotted(at), str(error))
+    return found
+
+
+def tolerance(given: Written, unit: str) -> Tolerance:
+    """Return a tolerance in SI.
+
+    Raises
+    ------
+    ValueError
+        If it is none, or not in a unit of the output.
+    """
+    if isinstance(given, ToleranceSpec):
+        absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
+        found = Tolerance(given.relative, absolute)
+    else:
+        found = Tolerance(relative=to_si(given, "1") if isinstance(given, str) else given)
+    if min(found.relative, found.absolute) < 0 or found == Tolerance():
+        raise ValueError("expected a tolerance above 0")
+    return found
+
+
+def refinement(
+    document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str], problems: Problems
+) -> Refinement | None:
+    """Return how an adaptive axis at a path of a document is refined, None if something is wrong with that."""
+    data = value_at(document.data, path)
+
+    def report(inner: Path, key: bool, what: str) -> None:
+        at = (*path, *inner)
+        problems.add(document.key_place(at) if key else document.place(at), dotted(at), what)
+
+    try:
+        spec = RefinedSpec.model_validate(data, context={"to_si": to_si})
+    except ValidationError as error:
+        report_errors(error, RefinedSpec, data, report)
+        return None
+    if isinstance(spec.until, dict):
+        until = tolerances(document, (*path, "until"), spec.until, model, outputs, problems)
+        numbers = {name: kept for name, kept in until.items() if not model.output(name).dims}
+        for name in until.keys() - numbers.keys():
+            report(("until", name), True, "expected an output of one number a case, this one has more dimensions")
+        return Refinement(spread, numbers, spec.at_most)
+    single = [output.name for output in model.outputs if output.name in outputs and not output.dims]
+    if not single:
+        report(("until",), False, "expected an output of one number a case to refine by, this study has none")
+        return None
+    try:
+        return Refinement(spread, {single[0]: tolerance(spec.until, "1")}, spec.at_most)
+    except ValueError as error:
+        report(("until",), False, str(error))
+    return None

@@ -1,0 +1,101 @@
+"""Stages of a campaign whose axes are refined: what the store holds of one, and which values the next one adds.
+
+A stage follows from the results of the one before alone. So it can be found again at any time, whatever the store
+holds beyond it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mdr_dask import models, store
+from mdr_dask.arrays import BoolArray, IntArray
+from mdr_dask.execute.events import Event
+from mdr_dask.models.base import Status
+from mdr_dask.plan import Template, templates
+from mdr_dask.refinement import Mean, Mesh, Stage, refined
+
+#: For each group, where the entries of each dimension of a stage lie in the store.
+Places = tuple[Mapping[str, IntArray], ...]
+
+
+def stored_layout(stage: Stage, url: str) -> tuple[tuple[Template, ...], Places]:
+    """Lay out a stage together with what is stored of its study, and say where its own cases lie.
+
+    Raises
+    ------
+    StoreError
+        If the store was made from another campaign.
+    CampaignError
+        If the campaign is too large to be run.
+    """
+    campaign = stage.campaign
+    if not store.exists(url):
+        layout = templates(campaign, campaign.replication.at_least)
+        return layout, tuple(_all_of(template) for template in layout)
+    stored = store.reconcile(url, campaign)
+    layout = templates(stored.campaign, max(campaign.replication.at_least, stored.realisations), stored.chunks)
+    return layout, tuple(stored.places.get(t.series.name) or _all_of(t) for t in layout)
+
+
+def _all_of(template: Template) -> Mapping[str, IntArray]:
+    return {dim: np.arange(size) for dim, size in template.series.sizes.items()}
+
+
+def cases_of(stage: Stage, layout: Sequence[Template], places: Places, cases: Sequence[BoolArray]) -> list[BoolArray]:
+    """Return some cases of a stage, given over the dimensions of its series, over those of the store."""
+    found = []
+    for mesh, template, place, wanted in zip(stage.meshes, layout, places, cases, strict=True):
+        dims = template.dims[:-1]
+        own = list(mesh.series.sizes)
+        asked = np.zeros(template.shape[:-1], dtype=bool)
+        asked[np.ix_(*(place[dim] for dim in dims))] = wanted.transpose([own.index(dim) for dim in dims])
+        found.append(asked)
+    return found
+
+
+def following(
+    url: str, stage: Stage, layout: Sequence[Template], places: Places, realisations: int
+) -> tuple[Stage | None, Event]:
+    """Choose more values by so many realisations of a stage that is done; return the next stage, if there is one."""
+    meshes, short = [], []
+    facts: dict[str, int] = {}
+    for mesh, template, place in zip(stage.meshes, layout, places, strict=True):
+        more, left = refined(mesh, _means(url, mesh, template, place, realisations)) if mesh.used else (mesh, {})
+        meshes.append(more)
+        for number in more.used:
+            axis = more.series.axes[number]
+            facts[f"{template.series.name or '-'}.{axis.name}"] = len(axis.values)
+            if left[axis.name]:
+                short.append(_short(template.series.name, mesh, number, left[axis.name]))
+    after = stage.after(tuple(meshes))
+    return after, Event("refined", facts, "; ".join(short) if after is None else "")
+
+
+def _short(series: str, mesh: Mesh, number: int, count: int) -> str:
+    """Say why some cases of the other axes miss the tolerance along an adaptive one."""
+    axis, others = mesh.series.axes[number], mesh.used[number][..., 0].size
+    most = mesh.refinement(number).at_most
+    why = f"{most} values are allowed" if len(axis.values) >= most else "it jumps or bends within a 1000th of the axis"
+    where = f"{series}: " if series else ""
+    return f"{where}interpolation along {axis.name} misses its tolerance in {count} of {others} cases: {why}"
+
+
+def _means(
+    url: str, mesh: Mesh, template: Template, place: Mapping[str, IntArray], realisations: int
+) -> dict[str, Mean]:
+    """Return the means of the outputs that decide, over the cases of a series."""
+    dims, own, name = template.dims[:-1], list(mesh.series.sizes), template.series.name
+    cases = np.ix_(*(place[dim] for dim in dims), np.arange(realisations))
+    order = [*(dims.index(dim) for dim in own), len(dims)]
+    companions = models.load(template.campaign.model).companions
+    done = (store.ledger(url, name, template.shape)[cases] == Status.DONE).transpose(order)
+    found = {}
+    for output in sorted({output for number in mesh.used for output in mesh.refinement(number).until}):
+        values = store.values(url, name, output)[cases].transpose(order)
+        known = output in companions and companions[output].name in template.campaign.outputs
+        error = store.values(url, name, companions[output].name)[cases].transpose(order) if known else None
+        found[output] = Mean.of(values, done, error)
+    return found

@@ -1,0 +1,212 @@
+"""Axes whose values a study chooses: enough of them and not too many, and the same however the run went."""
+
+import threading
+
+import curves
+import numpy as np
+import pytest
+from scipy.interpolate import PchipInterpolator
+from test_execute import digests, run
+
+from mdr_dask import execute, store
+from mdr_dask.campaign import loads
+from mdr_dask.cli import main
+from mdr_dask.errors import CampaignError
+from mdr_dask.execute import Part, Resources
+from mdr_dask.models.base import Status
+
+AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
+
+
+@pytest.fixture
+def study(monkeypatch):
+    """Return a campaign of curves from its parameters, and perhaps more keys."""
+    curves.register(monkeypatch)
+
+    def campaign(parameters: str, x: str = AXIS, more: str = ""):
+        text = f"name: c\nmodel: curves\nparameters: {{x: {x}, {parameters}}}\n{more}"
+        return loads(text, "c.yaml", ".")
+
+    return campaign
+
+
+def means(url):
+    """Return the abscissae, and the mean of every curve over them; NaN where none was needed."""
+    found = store.datasets(url)[""].y.mean("realisation").transpose(..., "x")
+    return found.x.to_numpy(), found.to_numpy().reshape(-1, found.sizes["x"])
+
+
+def test_each_curve_has_what_its_interpolation_needs_and_the_rest_is_not_needed(study, url):
+    shifts = [-1.5, 0.3, 1.7]
+    progress = run(study(f"shift: {shifts}"), url)
+    x, y = means(url)
+    dense = np.geomspace(1e-3, 1e3, 500)
+    for shift, curve in zip(shifts, y, strict=True):
+        known = np.isfinite(curve)
+        found = PchipInterpolator(np.log(x[known]), curve[known])(np.log(dense))
+        assert np.max(np.abs(found - curves.FUNCTIONS["smooth"](dense, shift))) < 0.012
+        assert known.sum() <= 25
+    status = store.datasets(url)[""].status.to_numpy()
+    assert progress.done == (status == Status.DONE).sum() < status.size
+    assert set(status.ravel()) == {Status.DONE, Status.NOT_NEEDED}
+    assert progress.total == status.size
+    assert not store.verify(url).findings
+
+
+@pytest.mark.parametrize(
+    ("shape", "most"),
+    [("kink", 25), ("jump", 45), ("gap", 40), ("flat", 5)],
+)
+def test_what_jumps_or_bends_ends_and_starves_no_other_curve(study, url, shape, most):
+    told = []
+    run(study(f"shape: [{shape}, smooth], shift: [-0.7, 0.9]", AXIS.replace("60", "45")), url, tell=told.append)
+    data = store.datasets(url)[""].y.mean("realisation")
+    assert (data.sel(shape=shape).notnull().sum("x") <= most).all()
+    for shift in (-0.7, 0.9):
+        smooth = data.sel(shape="smooth", shift=shift).dropna("x")
+        dense = np.geomspace(1e-3, 1e3, 200)
+        found = PchipInterpolator(np.log(smooth.x), smooth)(np.log(dense))
+        assert np.max(np.abs(found - curves.FUNCTIONS["smooth"](dense, shift))) < 0.012
+    last = [event for event in told if event.name == "refined"][-1]
+    assert ("misses its tolerance" in last.sentence) == (shape == "jump")
+
+
+def test_scatter_is_not_chased(study, url):
+    run(study("shape: flat, noise: 0.05", more="realisations: 10"), url)
+    assert means(url)[0].size <= 12
+    run(study("shape: flat, noise: 1e-4", more="realisations: 10"), url + "2")
+    assert means(url + "2")[0].size == 5
+
+
+KILLED = "noise: 0.02, shift: [-1, 0.5], shape: [smooth, jump]"
+MORE = "realisations: {at_least: 4, at_most: 12, until: {y: 1 %}}\nstore: {blocks: {x: 2, shift: 1, realisation: 2}}"
+
+
+def test_the_same_bytes_however_often_it_is_stopped_and_whoever_runs_it(study, tmp_path):
+    campaign = study(KILLED, AXIS.replace("60", "14"), MORE)
+    whole, stopped, parts = (str(tmp_path / name) for name in ("whole.zarr", "stopped.zarr", "parts.zarr"))
+    expected = run(campaign, whole)
+
+    def stop_after(blocks):
+        def report(progress):
+            if progress.blocks >= blocks:
+                raise KeyboardInterrupt
+
+        return report
+
+    stops = 0
+    for blocks in (1, 9, 20, 40):
+        try:
+            execute.run(campaign, stopped, Resources(threads=1), stop_after(blocks))
+        except KeyboardInterrupt:
+            stops += 1
+    assert stops == 4
+    run(campaign, stopped)
+    assert digests(stopped) == digests(whole)
+    again = run(campaign, stopped)
+    assert (again.done, again.failed, again.not_needed) == (0, 0, 0)
+    assert again.kept >= expected.done
+    done = [0, 0]
+    gate = threading.Barrier(2)
+
+    def work(number):
+        gate.wait()
+        part = Part(number + 1, 2)
+        done[number] = execute.run(campaign, parts, Resources(threads=1), lambda _: None, part=part).done
+
+    threads = [threading.Thread(target=work, args=(number,)) for number in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    run(campaign, parts)
+    assert min(done) > 0
+    assert digests(parts) == digests(whole)
+
+
+def test_values_that_are_there_are_used_and_more_go_behind_them(study, url):
+    dense = study("shift: [0.2, 0.6]", "{geometric: [1 mm, 1 km, 65]}")
+    run(dense, url)
+    before = digests(url)
+    adaptive = study("shift: [0.2, 0.6]")
+    assert execute.outlook(adaptive, url).to_do == 0
+    assert run(adaptive, url).done == 0
+    assert digests(url) == before
+    wider = study("shift: [0.2, 0.6, 1.1]")
+    needed = run(wider, url + "2")
+    assert run(wider, url).done == needed.done - (store.datasets(url + "2")[""].y.notnull().sel(shift=[0.2, 0.6])).sum()
+
+
+def test_a_tighter_tolerance_goes_on(study, tmp_path):
+    wide, tight = study("shift: [0.2, 0.6]"), study("shift: [0.2, 0.6]", AXIS.replace("1 %", "0.1 %"))
+    once, twice = str(tmp_path / "once.zarr"), str(tmp_path / "twice.zarr")
+    first = run(wide, twice).done
+    second = run(tight, twice).done
+    assert run(tight, once).done == first + second
+    np.testing.assert_array_equal(means(once)[1], means(twice)[1])
+
+
+def test_two_axes_are_refined_together(study, url):
+    run(study("shift: {adaptive: [-1, 1], until: {half: 1 %}, at_most: 20}", more="outputs: [y, half]"), url)
+    data = store.datasets(url)[""].y.mean("realisation")
+    assert data.notnull().all()
+    assert 5 < data.sizes["shift"] <= 20
+    dense = np.geomspace(1e-3, 1e3, 100)
+    along_x = PchipInterpolator(np.log(data.x), data.transpose("x", "shift"))(np.log(dense))
+    found = PchipInterpolator(data["shift"], along_x, axis=1)(0.4321)
+    assert np.max(np.abs(found - np.tanh(np.log10(dense) - 0.4321))) < 0.03
+
+
+def test_whole_numbers_end_where_there_are_none_between(study, url):
+    campaign = study("count: {adaptive: [1, 9], until: 0.001 %}", "1 m")
+    run(campaign, url)
+    assert store.datasets(url)[""]["count"].to_numpy().tolist() == list(range(1, 10))
+
+
+def test_series_are_refined_each_for_itself(study, url):
+    campaign = study("shift: 0.1", more="series: {easy: {shape: flat}, hard: {shape: kink}}")
+    run(campaign, url)
+    found = store.datasets(url)
+    assert found["easy"].sizes["x"] == 5 < found["hard"].sizes["x"]
+
+
+def test_what_may_come_is_said_before(study, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    text = f"name: c\nmodel: curves\nparameters: {{x: {AXIS}, shift: [0.1, 0.2]}}\n"
+    (tmp_path / "c.yaml").write_text(text)
+    assert study  # registers the model
+    assert main(["check", "c.yaml"]) == 0
+    told = capsys.readouterr().out
+    assert "1 mm to 1 km, 5 to 60 values, geometric, until y is interpolated within 1 % of its largest value" in told
+    assert "10 to 120 cases x 1 realisations = 10 to 120 results" in told
+    assert main(["run", "c.yaml", "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["run", "c.yaml", "--dry-run"]) == 0
+    assert "results are there already; nothing to do" in capsys.readouterr().out
+
+
+WRONG = {
+    "three axes": (
+        "shift: {adaptive: [0, 1], until: 1 %}, noise: {adaptive: [0, 1], until: 1 %}",
+        AXIS,
+        "",
+        "at most 2",
+    ),
+    "zip": ("shift: 1", AXIS, "sampling: zip", "expected sampling: grid with an adaptive axis"),
+    "drawn": ("shift: 1", AXIS, "sampling: {sobol: 8}", "expected sampling: grid with an adaptive axis"),
+    "no tolerance": ("shift: 1", "{adaptive: [1 m, 2 m]}", "", r"x\.until: .*missing|until"),
+    "zero": ("shift: 1", "{adaptive: [1 m, 2 m], until: 0}", "", r"x\.until: expected a tolerance above 0"),
+    "few": ("shift: 1", "{adaptive: [1 m, 2 m], until: 1 %, at_most: 4}", "", r"at_most: .* at least 5, got 4"),
+    "one end": ("shift: 1", "{adaptive: [1 m], until: 1 %}", "", r"x: expected \[first, last\], got"),
+    "same ends": ("shift: 1", "{adaptive: [1 m, 1 m], until: 1 %}", "", "expected two different ends"),
+    "a length": ("shift: 1", "{adaptive: [1 N, 1 m], until: 1 %}", "", "expected a length"),
+    "output": ("shift: 1", "{adaptive: [1 m, 2 m], until: {yy: 1 %}}", "", r"until\.yy: not among the outputs"),
+    "key": ("shift: 1", "{adaptive: [1 m, 2 m], until: 1 %, most: 9}", "", r"x\.most: unknown"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_refined_is_refused(study, case):
+    parameters, x, more, sentence = WRONG[case]
+    with pytest.raises(CampaignError, match=sentence):
+        study(parameters, x, more)
