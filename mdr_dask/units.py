@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -260,13 +261,16 @@ def is_far(value: float, unit: str, usual: str) -> bool:
 def likely(value: float, unit: str, usual: str) -> str:
     """Return a bare number with the unit that was probably meant, empty if none brings it near the usual value."""
     center = to_si(usual, unit)
-    meant = {f"{value:g} {other}": to_si(f"{value!r} {other}", unit) for other in _FORGOTTEN.get(unit, ())}
+    meant = {}
+    for other in _FORGOTTEN.get(unit, ()):
+        with suppress(ValueError):  # beyond the largest number
+            meant[f"{value:g} {other}"] = to_si(f"{value!r} {other}", unit)
     near = {text: _decades(size, center) for text, size in meant.items() if not is_far(size, unit, usual)}
     return min(near, key=lambda text: near[text], default="")
 
 
 def _decades(value: float, usual: float) -> float:
-    return abs(math.log10(abs(value / usual))) if value else math.inf
+    return abs(math.log10(abs(value)) - math.log10(abs(usual))) if value else math.inf
 
 
 def example_unit(unit: str) -> str:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
@@ -126,15 +126,15 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
     if unit != "m^(1-n)":  # of a body r^50 any number may be meant
-        field.metadata.append(AfterValidator(_conceivable))
+        field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
 
-def _conceivable(value: Any) -> Any:
+def _conceivable(least: float, value: Any) -> Any:
     """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
     for number in value if isinstance(value, tuple) else (value,):
-        if isinstance(number, float) and number != 0 and not LEAST <= abs(number) <= 1 / LEAST:
-            raise ValueError(f"expected a size between {LEAST:g} and {1 / LEAST:g} in SI units, got {number:g}")
+        if isinstance(number, float) and number != 0 and not least <= abs(number) <= 1 / LEAST:
+            raise ValueError(f"expected a size between {least:g} and {1 / LEAST:g} in SI units, got {number:g}")
     return value
 
 

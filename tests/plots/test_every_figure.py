@@ -14,7 +14,7 @@ import re
 import numpy as np
 import planted
 import pytest
-from drawn import LAST, check_picture, expected, mismatches
+from drawn import LAST, check_laws, check_picture, expected, mismatches
 
 from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
@@ -249,6 +249,7 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         assert all(texts) or len(panels) > 1
         assert not any(re.search(r"\((m|m/s|N|Pa|s)\)", text) for text in texts), "units stand in [ ]"
     check_picture(figure)
+    check_laws(name, figure)
     table = figure.table()
     data = table[table["what"] == "data"]
     assert len(data), "nothing of the store is drawn"

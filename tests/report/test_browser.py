@@ -63,7 +63,7 @@ def test_all_figures_are_drawn_without_a_complaint_or_a_request(opened, place):
 
 def test_hover_shows_the_numbers_of_the_store(opened, place):
     opened.js("document.querySelector('[data-choose]').scrollIntoView()")
-    opened.until("document.querySelector('[data-choose] .points path')")
+    opened.until("!!document.querySelector('[data-choose] .points path')")
     at = opened.js(
         "(() => { const box = document.querySelector('[data-choose] .points path').getBoundingClientRect();"
         " return [box.x + box.width / 2, box.y + box.height / 2]; })()"
@@ -111,7 +111,7 @@ def test_the_keyboard_reaches_what_the_mouse_reaches(opened):
     opened.js(f"{VELOCITY}.host.querySelector('summary').focus()")
     opened.press("Enter", "\r")
     rows = opened.until(f"{VELOCITY}.host.querySelectorAll('tbody tr').length")
-    assert rows == opened.js(f"[...{VELOCITY}.rows()].length")
+    assert rows == min(500, opened.js(f"[...{VELOCITY}.rows()].length"))
 
 
 def test_everything_has_a_name_that_is_read_aloud(opened):

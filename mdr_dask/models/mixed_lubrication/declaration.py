@@ -13,7 +13,6 @@ from mdr_dask.models.base import (
     Block,
     Coordinate,
     Model,
-    NamedFile,
     Number,
     Output,
     Parameters,
@@ -60,6 +59,7 @@ class MixedLubrication(Parameters):
     gone: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
+        "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "load_share": "write asperity_load_share",
         "profile_1": "write surface_1: {profile: ...}",
         "profile_2": "write surface_2: {profile: ...}",
@@ -131,9 +131,6 @@ class MixedLubrication(Parameters):
         default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
     trace_points: int = quantity("1", "angles of contact_length_trace in a turn", default=3600, ge=2, le=10**6)
-    measured: NamedFile | None = Field(
-        default=None, description="table of measured contact probabilities, for the fit `breakthrough`"
-    )
 
     @model_validator(mode="before")
     @classmethod
