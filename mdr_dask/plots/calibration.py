@@ -165,7 +165,8 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     ends = determined.quantiles(across, weights, [1e-4, 1 - 1e-4])
     if known and is_free:
         ends = np.array([across.min(), across.max()])
-    edges = np.linspace(*(ends + np.array([-1, 1]) * 1e-9 * np.abs(ends).max()), PARTS + 1)
+    margin = 1e-9 * np.abs(ends).max()
+    edges = np.linspace(ends[0] - margin, ends[1] + margin, PARTS + 1)
     if known:
         place = found.posterior.places[:, found.unknowns.index(name)]
         edges = _of_whole_cells(ends, across, place, found.posterior.width)
