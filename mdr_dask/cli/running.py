@@ -82,7 +82,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
         progress = outlook(study, url)
         kept, to_do = progress.kept, progress.to_do
-        if not to_do and not study.replication.until and form != "json":
+        if not to_do and not study.replication.goes_on and form != "json":
             click.echo(f"{url}: all {kept} results are there already; nothing to do")
             return
     costs = estimate(study)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask import store
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
+from mdr_dask.execute.answers import cases_that_narrow, require_known
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
 from mdr_dask.execute.executors import Execute, check, executor
@@ -100,6 +101,7 @@ def run(
         If a cluster cannot be started, goes away, or has no worker for too long.
     """
     check(resources)  # what is refused leaves no lock behind
+    require_known(campaign)
     stored_layout(Stage.first(campaign), url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
@@ -148,7 +150,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
             for t, mask in zip(layout, asked, strict=True)
         ]
         progress = _begin_round(progress, groups)
-        if progress.to_do or campaign.replication.until or not stage.is_adaptive:
+        if progress.to_do or campaign.replication.goes_on or not stage.is_adaptive:
             break
         stage, _ = following(url, stage, layout, places, count)
     return progress
@@ -225,7 +227,11 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
         before = last.realisations[1] if last else 0
         needed = asked
         if last:
-            needed = [mask & _still_wide(job.url, t, before) for mask, t in zip(last.needed, layout, strict=True)]
+            narrow = cases_that_narrow(job.url, job.stage.campaign, layout, asked, before)
+            needed = [
+                mask & _still_wide(job.url, template, before) | cases
+                for mask, template, cases in zip(last.needed, layout, narrow, strict=True)
+            ]
         if any(mask.any() for mask in needed):
             job.tell(Event("laying out", {"realisations": count}))
             layout = _grow(layout, count)

@@ -187,6 +187,13 @@ def table_of(
     return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
 
 
+def _together(values: FloatArray) -> FloatArray:
+    """Return means over the realisations that all of some cases have: what differs between them is no scatter."""
+    known = np.isfinite(values).all(axis=0)
+    both: FloatArray = (values[:, known] if known.any() else values).mean(axis=1)
+    return both
+
+
 def _region_one(rate: FloatArray) -> int | None:
     """Return where friction begins to go with the velocity: the lowest one, but for the floor of the papers' method."""
     if rate.size == 1:
@@ -205,7 +212,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & (rate > 0)]):
         same = np.flatnonzero((force == load) & (rate > 0))
         same = same[np.argsort(velocity[same])]
-        at = _region_one(rate[same])
+        at = _region_one(_together(table.friction[same]) / velocity[same])
         if at is not None:
             used.append(same[at])
     if len(used) < 3:
