@@ -229,7 +229,7 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
-        A study, or the path of its store.
+        A study, or the path of its store. For ``rate_and_state`` also that of a table of a velocity-step test.
     law : str
         Its name; ``calibration`` explains measured points.
     measured : str, Path or DataFrame, optional
@@ -245,6 +245,8 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     FitError
         If the study has not what the law needs.
     """
+    if isinstance(study, str | Path) and Path(study).is_file():
+        return _of_table(study, law)
     groups = _groups(study)
     if measured is not None:
         from mdr_dask.fits.calibration import with_table
@@ -253,6 +255,15 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     model = _model(groups)
     found: dict[str, xr.Dataset] = _named(fits.available(model), law, f"law for {model}").results(groups)
     return next(iter(found.values())) if len(found) == 1 else _tree(found)
+
+
+def _of_table(path: str | Path, law: str) -> xr.Dataset:
+    from mdr_dask.fits.calibration import read_file
+    from mdr_dask.fits.velocity_steps import of_table
+
+    found = read_file(path)
+    constants: xr.Dataset = _named({"rate_and_state": of_table}, law, "law for a table")(found["text"], found["name"])
+    return constants
 
 
 def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:

@@ -21,6 +21,8 @@ from mdr_dask.units import example_unit, is_unit, to_si
 
 COMMENT = "#%"
 SEPARATORS = "\t;,"
+#: Letters and signs of units beyond ASCII in tables that are not UTF-8.
+WESTERN = "°µ²³·±äöüÄÖÜßéèàç"
 #: More columns than this are no table of measurements.
 MOST_COLUMNS = 1000
 #: Problems that are told of one table.
@@ -126,6 +128,24 @@ class Sheet:
     names: tuple[Cell, ...]
     units: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
+
+
+def decoded(content: bytes, source: str) -> str:
+    """Return the text of a table: in UTF-8, or as spreadsheets in Western Europe save it.
+
+    Raises
+    ------
+    DataError
+        If it is neither.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        text = content.decode("cp1252", errors="replace")
+        if not re.fullmatch(r"[\t\r\n -~" + WESTERN + "]*", text):
+            found = f"got byte {content[error.start]:#x} at {error.start}"
+            raise DataError(f"{source}: expected text in UTF-8, {found} (save it as 'CSV UTF-8')") from None
+        return text
 
 
 def read_table(text: str, source: str, columns: Sequence[Column], allow_missing: bool = False) -> dict[str, FloatArray]:

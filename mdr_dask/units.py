@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from contextlib import suppress
 from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -159,6 +160,12 @@ def to_si(value: str, unit: str) -> float:
     return si
 
 
+def unit_behind(value: str) -> str:
+    """Return the unit behind a number, empty if there is none."""
+    match = _QUANTITY.match(value)
+    return match[2] if match and match[2] and is_unit(match[2]) else ""
+
+
 def spelt(value: str) -> str:
     """Return how a number that is none is written: with a decimal point, or several as a list or a range."""
     if _THOUSANDS.fullmatch(value.strip()):
@@ -183,7 +190,7 @@ _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G",
 _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
-def shown(value: float, unit: str, digits: int = 4) -> str:
+def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     """Return a quantity as a reader writes it: ``0.5 mm/s`` of 5e-4 m/s, ``-20 degC`` of 253.15 K.
 
     Parameters
@@ -194,7 +201,12 @@ def shown(value: float, unit: str, digits: int = 4) -> str:
         The SI unit, ``"1"`` for a pure number.
     digits : int
         Most digits.
+    written : str
+        The unit to show it in, the usual one if empty.
     """
+    if written:
+        factor, zero = conversion(written, unit)
+        return f"{(value - zero) / factor:.{digits}g} {written}"
     if unit == "K":
         return f"{value - 273.15:.{digits}g} degC" if abs(value - 273.15) > 1e-9 else "0 degC"
     if unit in ("1", ""):
@@ -249,13 +261,16 @@ def is_far(value: float, unit: str, usual: str) -> bool:
 def likely(value: float, unit: str, usual: str) -> str:
     """Return a bare number with the unit that was probably meant, empty if none brings it near the usual value."""
     center = to_si(usual, unit)
-    meant = {f"{value:g} {other}": to_si(f"{value!r} {other}", unit) for other in _FORGOTTEN.get(unit, ())}
+    meant = {}
+    for other in _FORGOTTEN.get(unit, ()):
+        with suppress(ValueError):  # beyond the largest number
+            meant[f"{value:g} {other}"] = to_si(f"{value!r} {other}", unit)
     near = {text: _decades(size, center) for text, size in meant.items() if not is_far(size, unit, usual)}
     return min(near, key=lambda text: near[text], default="")
 
 
 def _decades(value: float, usual: float) -> float:
-    return abs(math.log10(abs(value / usual))) if value else math.inf
+    return abs(math.log10(abs(value)) - math.log10(abs(usual))) if value else math.inf
 
 
 def example_unit(unit: str) -> str:

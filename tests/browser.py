@@ -150,3 +150,5 @@ class Browser:
         await self.socket.write_message(json.dumps({"id": self.number, "method": "Browser.close"}))
         while await self.socket.read_message() is not None:
             pass
+        self.socket.close()
+        await asyncio.sleep(0)  # for the connection to be let go of

@@ -16,7 +16,7 @@ from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.physics.lubrication import film_formulas
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import style
-from mdr_dask.plots.table import LAST
+from mdr_dask.plots.table import FIRST, LAST
 
 #: Values agree to this part: rounding of sums in another order.
 SAME = 1e-7
@@ -92,6 +92,51 @@ def check_picture(figure) -> None:
         for artist in [*axes.lines, *axes.collections]:
             if axes.get_label() != "<colorbar>" and _shows_data(artist, axes):
                 assert artist.get_gid(), f"{artist} is in no table"
+
+
+#: Laws as figures name them, in closed form once more; each has to be drawn wherever its figure is.
+CLOSED_LAWS = {
+    "plateau": {"√2 (eq. 3.15)": lambda x: 2**0.5 + 0 * x},
+    "zone_one": {"H / (1 + H) (eq. 3.13)": lambda x: x / (1 + x), "1.6 of the docs": lambda x: 1.6 + 0 * x},
+    "collapse": {"law (eq. 3.18)": lambda x: x / (1 + x**2) ** 0.5},
+    "indenter": {
+        "law (eq. 3.40), alpha = 1.5": lambda x: x / (1 + x**1.5) ** (2 / 3),
+        "limits (eq. 3.34, 3.36)": lambda x: np.minimum(x, 1),
+    },
+    "jump_law": {"eq. 4.11, 0.4": lambda x: x / (1 + (x / 0.4) ** 2) ** 0.5, "eq. 4.9": lambda x: x},
+    "relaxation_power": {"1 - H": lambda x: 1 - x, "1": lambda x: 1 + 0 * x},
+    "film_regimes": {
+        "rigid isoviscous": lambda x: 4.895 / (2 * x),
+        "elastic isoviscous": lambda x: 2.05 * x**-0.2,
+    },
+}
+#: Bands that a law is known within.
+BANDS = {"jump_law": "fitted", "jump_fit": "one exponential"}
+
+
+def check_laws(name: str, figure) -> None:
+    """Laws are where their names say, all of them, and bands are about what they belong to."""
+    table = figure.table()
+    for curve, law in CLOSED_LAWS.get(name, {}).items():
+        drawn = table[(table["curve"] == curve) | table["curve"].str.startswith(f"{curve}:")]
+        assert len(drawn), f"{curve} is not drawn"
+        np.testing.assert_allclose(drawn["y"], law(drawn["x"]), rtol=2e-4, atol=1e-9, err_msg=curve)
+    if name == "jump_fit":
+        _check_exponentials(table)
+    table = table.reindex(columns=[*FIRST, *LAST])
+    bands = table[table["y_low"].notna() & table["y"].isna()]
+    assert (bands["y_low"] <= bands["y_high"]).all()
+    if name in BANDS:
+        assert bands["what"].str.startswith(BANDS[name]).any()
+
+
+def _check_exponentials(table: pd.DataFrame) -> None:
+    """A relaxation falls with the rate that its label tells to three digits."""
+    told = table["curve"].str.extract(r"^b = ([\d.]+)", expand=False).astype(float)
+    assert told.notna().any()
+    for (panel, curve), rows in table[told.notna()].groupby(["panel", "curve"]):
+        rate = -np.polyfit(rows["x"], np.log(np.abs(rows["y"])), 1)[0]
+        assert abs(rate / told[rows.index[0]] - 1) < 0.01, (panel, curve, rate)
 
 
 def _is(artist, kind: str) -> bool:

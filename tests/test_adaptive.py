@@ -13,7 +13,9 @@ from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
+from mdr_dask.questions.table import Question, table
 
 AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
 
@@ -210,3 +212,17 @@ def test_what_cannot_be_refined_is_refused(study, case):
     parameters, x, more, sentence = WRONG[case]
     with pytest.raises(CampaignError, match=sentence):
         study(parameters, x, more)
+
+
+def test_laws_and_tables_know_what_was_not_needed(study, url):
+    shifts = [-1.2, 0.4]
+    run(study(f"shift: {shifts}"), url)
+    data = store.datasets(url)[""]
+    needed = int((data.status == Status.DONE).sum())
+    assert len(table(data, Question(("y",))).frames.__next__()) == needed < data.status.size
+    found = law(data, "y")
+    for shift in shifts:
+        truth = curves.FUNCTIONS["smooth"](found.x.to_numpy(), shift)
+        away = np.abs(found.y.sel(shift=shift).to_numpy() - truth)
+        assert away.max() < 0.015
+        assert np.mean(away <= found.y_error.sel(shift=shift).to_numpy() + 1e-9) > 0.8

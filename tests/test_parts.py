@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 from killed_parts import run_with_kills, study
 from test_execute import digests, run
@@ -175,3 +176,20 @@ def test_a_log_tells_what_happened_and_a_watch_until_nobody_is_at_work(toy, camp
     assert told[0] == "8 of 8 results (100%): 4 done, 4 failed"
     assert re.fullmatch(r"at work: process \d+ on .*", told[1])
     assert told[2:] == ["at work: nobody"]
+
+
+@pytest.mark.parametrize("alone", [False, True])
+def test_a_part_opens_no_port_as_a_cluster_does(toy, url, alone):
+    campaign = replace(toy.campaign(toy.axis("position", [1.0, 2.0, 4.0])), blocks={"position": 1})
+    cluster = {"class": "distributed.LocalCluster", "arguments": {"n_workers": 1, "preload": [toy.PRELOAD]}}
+    resources, part = (Resources(cluster=cluster), None) if alone else (Resources(threads=2), Part(1, 2))
+    looks = [listening()]
+    execute.run(campaign, url, resources, lambda _: looks.append(listening()), part=part)
+    assert len(looks) > 1
+    assert bool(set().union(*looks[1:]) - looks[0]) == alone
+
+
+def listening():
+    """Return the ports at which this process listens."""
+    found = psutil.Process().net_connections("inet")
+    return {connection.laddr.port for connection in found if connection.status == psutil.CONN_LISTEN}

@@ -83,6 +83,7 @@ WRONG = [
         "plot STORE friction_coefficient --over velocity --log q",
         "expected --log with letters of xyz, or 'none', got 'q'",
     ),
+    ("plot STORE velocity --units velocty=km/h", "no quantity 'velocty' to give a unit (did you mean 'velocity'?)"),
     ("plot STORE friction_coefficient --over velocity --units velocity=kg", "velocity: expected a velocity"),
     (
         "plot STORE friction_coefficient --over velocity --size 85",

@@ -17,7 +17,8 @@ from numba import njit
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.follow import follow
+from mdr_dask.physics.transients.elements.follow import follow_kelvin
+from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS, REACH, CHANGE, LOAD, RUN_IN = 500, 0.05, 0.2, 0.3, 10.0
@@ -54,7 +55,9 @@ def followed(oversampling: int) -> np.ndarray:
     travels = np.minimum(moments, jump) * REACH + np.maximum(moments - jump, 0) * reach
     depth = rest_depth(height)
     pressed = np.maximum(height + depth, 0)
-    state = follow(height, slope, moments, travels, reaches, np.full(moments.size, LOAD), pressed, depth)
+    state = follow_kelvin(
+        height, slope, Schedule(moments, travels, reaches, np.full(moments.size, LOAD)), pressed, depth
+    )
     return at_times(moments - jump, state.drag)
 
 

@@ -17,8 +17,9 @@ from numba import njit
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.transients.elements.edges import depth_for
-from mdr_dask.physics.transients.elements.follow import closed_line, follow_line, steady_start
+from mdr_dask.physics.transients.elements.follow import closed_nodes, follow_line, steady_start
 from mdr_dask.physics.transients.elements.foundation import KELVIN, foundation
+from mdr_dask.physics.transients.elements.steps import Schedule
 
 POINTS, REACH, CHANGE, LOAD = 100, 0.1, 0.2, 0.3
 TIMES = np.concatenate([np.geomspace(0.05, 0.95, 10), 1 + np.geomspace(0.05, 0.95, 10)])
@@ -32,7 +33,7 @@ SOLIDS = {
 def line(oversampling: int):
     amplitude, phase = roughness.amplitudes(POINTS // 2, 0.7), roughness.phases(2014, 0, POINTS // 2)
     nodes = POINTS * oversampling
-    return closed_line(roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1))
+    return closed_nodes(roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1))
 
 
 def phase_moments(begin: float, speed: float, nodes: int, cells: float) -> np.ndarray:
@@ -53,7 +54,7 @@ def followed(under, solid, cells: float) -> np.ndarray:
         moments = phase_moments(begin, speed, nodes, cells)
         one, wanted = np.ones(moments.size), TIMES[(begin < TIMES) & (begin + 1 > TIMES)]
         way = travel + speed * (moments - begin)
-        found = follow_line(under, solid, moments, way, speed * one, LOAD * one, state, depth)
+        found = follow_line(under, solid, Schedule(moments, way, speed * one, LOAD * one), state, depth)
         drags.append(found.drag[np.searchsorted(moments, wanted)])
         state, depth, travel = found.state, float(found.depth[-1]), float(way[-1])
     return np.concatenate(drags)

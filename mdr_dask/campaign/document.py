@@ -109,6 +109,7 @@ def parse(text: str, source: str, problems: Problems) -> Document:
     return document
 
 
+_NO_TEXT = re.compile("[\0\ud800-\udfff]")
 _NO_BLANK = re.compile(r"(?:^|[{,])\s*(?:- )?([A-Za-z_]\w*):(?=[^\s:/\\])")
 
 
@@ -163,7 +164,7 @@ class _Reader:
         for key_node, value_node in node.value:
             key = key_node.value if isinstance(key_node, ScalarNode) else "?"
             place = self.document._at(key_node)
-            if key_node.tag not in (_TAG + "str", _TAG + "merge"):
+            if key_node.tag not in (_TAG + "str", _TAG + "merge") or _NO_TEXT.search(key):
                 self.problems.add(place, dotted((*path, key)), "expected a name as key (quote it)")
             elif key in data:
                 first = self.document.key_place((*path, key)).line
@@ -184,8 +185,9 @@ class _Reader:
             what = f"expected a shorter number, got {len(text)} digits"
             self.problems.add(self.document._at(node), dotted(path), what)
             return None
-        if "\0" in text:
-            self.problems.add(self.document._at(node), dotted(path), "expected text without null characters")
+        if _NO_TEXT.search(text):
+            what = "expected text without null characters and halves of characters"
+            self.problems.add(self.document._at(node), dotted(path), what)
             return None
         if kind == "int":
             return _integer(text.replace("_", ""))

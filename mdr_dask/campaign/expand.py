@@ -140,13 +140,14 @@ class _Expansion:
         """Return the parameters at each value of one axis, the others at their first value."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        last = self._validate(known, [one], len(one.items) - 1, broken)
+        elsewhere = broken | {other.path for other in variations if other is not one}  # told by their own columns
+        last = self._validate(known, [one], len(one.items) - 1, elsewhere)
         column: list[Parameters | None] = []
         seen = set()
         for position, item in enumerate(one.items):
             if item.inner and None in (base, last):
                 continue
-            checked = base if position == 0 else self._validate(known, [one], position, broken)
+            checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
             column.append(checked)
             value = None if checked is None else _get(checked, one.path)
             key = value if isinstance(value, int | float) else item.label

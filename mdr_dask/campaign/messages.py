@@ -250,7 +250,10 @@ def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     instead = getattr(around, "gone", {}).get(path[-1])
     if instead:
         return f"there is no {path[-1]} any more: {instead}"
-    return f"unknown key{did_you_mean(path[-1], list(around.model_fields) if around else [])}"
+    known = around.model_fields if around else {}
+    holding = [name for name, info in known.items() for one in fields.structures(info) if path[-1] in one.model_fields]
+    inside = f" (write {holding[0]}: {{{path[-1]}: ...}})" if holding else ""
+    return f"unknown key{inside or did_you_mean(path[-1], list(known))}"
 
 
 def _structure_around(path: Path, kind: type[BaseModel], data: Any) -> type[BaseModel] | None:

@@ -12,9 +12,9 @@ from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Place, Problems, dotted
 from mdr_dask.campaign.spec import Drawn, LatinHypercubeSpec, SaltelliSpec
 from mdr_dask.campaign.variation import Item, Origin, Variation
-from mdr_dask.errors import did_you_mean
+from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.base import Parameters
-from mdr_dask.tables import Cell, Sheet, TableError, read_sheet
+from mdr_dask.tables import Cell, Sheet, TableError, decoded, read_sheet
 
 if TYPE_CHECKING:
     from mdr_dask.arrays import FloatArray
@@ -99,10 +99,10 @@ def tabled(
     try:
         if path.exists() and not path.is_file():
             raise OSError(errno.EINVAL, "no regular file")
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not UTF-8"
-        problems.add(origin.place, origin.name, f"cannot read {path}: {reason}")
+        text = decoded(path.read_bytes(), str(path))
+    except (OSError, DataError) as error:
+        what = f"cannot read {path}: {error.strerror}" if isinstance(error, OSError) else str(error)
+        problems.add(origin.place, origin.name, what)
         return None
     try:
         sheet = read_sheet(text, name, numeric=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import NamedFile, Parameters, quantity, unquoted
 
 _LONGEST_NAME = 100
 
@@ -121,7 +121,7 @@ class StoreSpec(Parameters):
     path: str | None = Field(
         None, min_length=1, description="path or URL of the Zarr store; results/<name>.zarr if not given"
     )
-    blocks: dict[str, Annotated[int, Field(ge=1)]] = Field(
+    blocks: dict[str, Annotated[int, BeforeValidator(unquoted), Field(ge=1)]] = Field(
         default_factory=dict, description="chunk length along an axis or along realisation; chosen if not given"
     )
 

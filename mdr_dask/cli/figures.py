@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from mdr_dask.plots.page import Page
 
 #: Options of figures of outputs; those with a name have axes of their own.
-OF_OUTPUTS = ("over", "by", "panels", "effects", "log", "units")
+OF_OUTPUTS = ("over", "by", "panels", "effects", "log")
 COMMAND = "mdr_dask.command"
 
 
@@ -91,6 +91,7 @@ def plot(
     asked, style_file = _page(look), look.get("style")
     with page.drawing_for(asked, style_file), _readable(urls):
         groups = {key: data for url in urls for key, data in _groups(url, urls, series).items()}
+        _require_quantities(asked.units, groups)
         groups = selection.select_all(groups, selections, tell)
         if where:
             groups = {key: selection.where(data, where) for key, data in groups.items()}
@@ -98,6 +99,18 @@ def plot(
         for (name, figure), path in zip(figures.items(), places, strict=True):
             origin = table.provenance(name, urls, str(context.meta.get(COMMAND, "")))
             _draw(figure, groups, path, origin, everything)
+    if unused := asked.units.keys() - asked.used:
+        tell(f"--units {', '.join(sorted(unused))}: shown in no figure that was drawn")
+
+
+def _require_quantities(units: Mapping[str, str], groups: Mapping[str, xr.Dataset]) -> None:
+    """Refuse units of what is no parameter and no output."""
+    from mdr_dask.errors import DataError, did_you_mean
+
+    known = sorted({str(name) for data in groups.values() for name in data.variables})
+    for name in units:
+        if name not in known:
+            raise DataError(f"no quantity {name!r} to give a unit{did_you_mean(name, known)}")
 
 
 def _without(figure: Plot, where: str) -> Plot:

@@ -64,6 +64,9 @@ def fit(
     from mdr_dask.questions import selection
 
     require_suffix(figure, FIGURES)
+    if Path(store).is_file():
+        _fit_table(Path(store), names, form)
+        return
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
@@ -90,6 +93,16 @@ def fit(
 
         save(drawn(groups), figure, provenance("calibration", [store], str(context.meta[COMMAND])))
         tell(str(figure))
+
+
+def _fit_table(path: Path, names: tuple[str, ...], form: str | None) -> None:
+    """Fit what there is for tables."""
+    from mdr_dask.fits.calibration import read_file
+    from mdr_dask.fits.velocity_steps import of_table
+
+    require_known(names or ("rate_and_state",), ["rate_and_state"], "law for a table")
+    named = read_file(path)
+    _print(of_table(named["text"], named["name"]), "", form, 0)
 
 
 def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:

@@ -20,7 +20,9 @@ START = 2.0
 def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
     """Yield what a campaign was understood to be: the axes of each series, what its data hold, what it costs."""
     from mdr_dask import models
+    from mdr_dask.campaign.written import written_units
 
+    written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
         if series.name:
@@ -29,12 +31,12 @@ def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
         indent = "    " if series.name else "  "
         for axis in series.axes:
             unit = units.get(axis.path, axis.unit or "1")
-            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit)}"
+            yield f"{indent}{axis.name:{width}s}  {axis_range(axis, unit, written.get(axis.name, ''))}"
     yield from (f"  {note}" for note in costs.notes)
     yield from (f"  {line}" for line in cost_lines(costs))
 
 
-def axis_range(axis: Axis, unit: str) -> str:
+def axis_range(axis: Axis, unit: str, written: str = "") -> str:
     """Return the values of an axis, or their range and number: ``1 mN to 100 N, 20 values, geometric``."""
     count = len(axis.values)
     if axis.refinement is not None:
@@ -43,8 +45,9 @@ def axis_range(axis: Axis, unit: str) -> str:
         more = f", ... ({count} values)" if count > LISTED else ""
         return ", ".join(axis.labels[:LISTED]) + more
     if count <= LISTED:
-        return ", ".join(shown(value, unit) for value in axis.values)
-    ends = f"{shown(min(axis.values), unit)} to {shown(max(axis.values), unit)}, {count} values"
+        return ", ".join(shown(value, unit, written=written) for value in axis.values)
+    first, last = (shown(end, unit, written=written) for end in (min(axis.values), max(axis.values)))
+    ends = f"{first} to {last}, {count} values"
     return ends if axis.dim == "case" else ends + spacing(axis.values)
 
 

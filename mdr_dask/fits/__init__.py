@@ -15,9 +15,7 @@ SUBJECTS: tuple[str, ...] = (
     "kinetic_courses",
     "kinetics",
     "master_curve",
-    "mixed",
     "scaling",
-    "wear",
 )
 
 #: Entry point group in which other packages offer tuples of `Fit`.

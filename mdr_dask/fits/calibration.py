@@ -285,9 +285,7 @@ def summary(found: Calibration) -> xr.Dataset:
 
 def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
     """Return the median and the ends of the intervals."""
-    shares = [0.5, *(0.5 + sign * level / 2 for level in determined.LEVELS.values() for sign in (-1, 1))]
-    names = ["", *(f"_{end}{kind}" for kind in determined.LEVELS for end in ("low", "high"))]
-    return dict(zip(names, determined.quantiles(values, weights, shares).tolist(), strict=True))
+    return dict(zip(determined.ENDS, determined.quantiles(values, weights, determined.SHARES).tolist(), strict=True))
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:

@@ -21,6 +21,9 @@ NARROW = 0.25
 ROUNDED = 1.15
 #: Probabilities of the ends of intervals.
 LEVELS = {"": 0.95, "_68": 0.6827}
+#: Names of what is told of an unknown, the median and the ends of intervals, and their shares of the posterior.
+ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
+SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
 
 class Ends(NamedTuple):

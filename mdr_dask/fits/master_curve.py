@@ -52,6 +52,8 @@ def read_table(path: str | Path) -> pd.DataFrame:
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
     names = [cell.text for cell in sheet.names]
+    if len(set(names)) < len(names):
+        raise DataError(f"{path}: expected each name of a column once, got {', '.join(names)!r:.200}")
     table = pd.DataFrame(numbers(sheet), columns=names)
     table.attrs["units"] = dict(zip(names, sheet.units, strict=True)) if any(sheet.units) else {}
     return table

@@ -26,7 +26,7 @@ class Residuals(NamedTuple):
     scaled : array, shape (points,)
         Measured less predicted, over the standard deviation of both.
     relative : float
-        Root mean square of measured less predicted, over that of the measured.
+        Root mean square of measured less predicted, over that of the whole.
     chi_squared : float
         With the correlations of the errors; NaN where the errors of measurement are unknown.
     freedom : int
@@ -44,9 +44,9 @@ class Residuals(NamedTuple):
         return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else np.nan
 
 
-def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
-    """Say in words whether the model explains the points."""
-    told = f"residuals of {residuals.relative:.2g} of the measured values, rms"
+def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray], whole: str = "the measured values") -> str:
+    """Say in words whether the model explains the points; residuals are told as shares of the whole."""
+    told = f"residuals of {residuals.relative:.2g} of {whole}, rms"
     if residuals.freedom < 1:
         return "not tested: as many constants as points leave nothing to compare"
     if np.isfinite(residuals.chi_squared):

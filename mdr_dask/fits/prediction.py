@@ -173,8 +173,8 @@ def _fields(
 ) -> tuple[FloatArray, bool]:
     """Return what is interpolated, and whether the mean is in logarithms.
 
-    Shape (conditions ..., unknowns ..., fields): the mean, the rest of the scatter, errors of grid and interpolation,
-    and the directions in which the lines scatter together.
+    Shape (conditions ..., unknowns ..., fields): the mean, whether it is absent, the rest of the scatter, errors of
+    grid and interpolation, and the directions in which the lines scatter together.
     """
     order = [*along, *unknowns]
     array = dataset[output]
@@ -189,14 +189,27 @@ def _fields(
     if companion is not None:
         spread = abs(companion).mean("realisation") if "realisation" in companion.dims else abs(companion)
         grid = np.nan_to_num(spread.transpose(*order).to_numpy())
-    scale = Scale.of(mean[np.isfinite(mean)], spread=True) if np.isfinite(mean).any() else Scale(False)
+    absent = ~np.isfinite(mean)
+    mean = np.where(absent, np.mean(mean[~absent]) if not absent.all() else 0.0, mean)
+    for k, axis in enumerate(along):
+        absent = _and_neighbours(absent, k) if between[axis] else absent
+    scale = Scale.of(mean, spread=True)
     table = scale.of_values(mean)
     lost = np.zeros_like(mean)
     for k, axis in enumerate(order):
         if axis in unknowns or between[axis]:
             lost += missed(scale, table, _long_enough(dataset, axis), k)
     alone, modes = _scatter(values - mean[..., None], number, mean)
-    return np.concatenate([np.stack([table, alone, grid + lost], axis=-1), modes], axis=-1), scale.logarithmic
+    return np.concatenate([np.stack([table, absent, alone, grid + lost], axis=-1), modes], axis=-1), scale.logarithmic
+
+
+def _and_neighbours(absent: NDArray[np.bool_], axis: int) -> NDArray[np.bool_]:
+    """Return what is absent, and what lies beside it: slopes of cubics there depend on it."""
+    along = np.moveaxis(absent, axis, 0).copy()
+    before = along.copy()
+    along[1:] |= before[:-1]
+    along[:-1] |= before[1:]
+    return np.moveaxis(along, 0, axis)
 
 
 def _long_enough(dataset: xr.Dataset, axis: str) -> FloatArray:
@@ -255,7 +268,7 @@ def _at_point(fields: FloatArray, axes: Sequence[FloatArray], place: Sequence[fl
 
 
 def _require_whole(at_points: FloatArray, measured: Measured, unknowns: Mapping[str, FloatArray]) -> None:
-    lost = ~np.isfinite(at_points[..., 0])
+    lost = at_points[..., 1] > 0
     if lost.any():
         raise FitError(
             f"{measured.output}: of the {lost.size} values that {measured.source} is compared with, {int(lost.sum())} "
@@ -270,7 +283,7 @@ def _interpolators(
     scales = [Scale.of(values) for values in unknowns.values()]
     places = [scale.of_values(values) for scale, values in zip(scales, unknowns.values(), strict=True)]
     unit = [(place - place[0]) / (place[-1] - place[0]) for place in places]
-    table, errors = at_points[..., 0], at_points[..., 1:]
+    table, errors = at_points[..., 0], at_points[..., 2:]
     pieces = int(np.clip((LARGEST / table.size) ** (1 / len(unit)), 1, PIECES))
     fine = []
     for k, values in enumerate(unknowns.values()):

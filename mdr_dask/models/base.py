@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import lru_cache, reduce
+from functools import lru_cache, partial, reduce
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.tables import described
+from mdr_dask.tables import decoded, described
 
 
 class Status(IntEnum):
@@ -33,6 +33,11 @@ class Status(IntEnum):
 
 Ways = tuple[tuple[str, ...], ...]
 _WHOLE = re.compile(r"[+-]?\d{1,18}")
+
+
+def unquoted(value: Any) -> Any:
+    """Return a whole number in quotes as the number, anything else as it is."""
+    return int(value) if isinstance(value, str) and _WHOLE.fullmatch(value) else value
 
 
 class Parameters(BaseModel):
@@ -53,12 +58,7 @@ class Parameters(BaseModel):
         """Read a whole number in quotes as the number, for a number with a unit is a string too."""
         if not isinstance(data, dict):
             return data
-        quoted = {
-            key: int(data[key])
-            for key in data.keys() & _whole_fields(cls)
-            if isinstance(data[key], str) and _WHOLE.fullmatch(data[key])
-        }
-        return {**data, **quoted} if quoted else data
+        return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
 
     def require_one_way(self) -> None:
         """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
@@ -126,15 +126,15 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
     if unit != "m^(1-n)":  # of a body r^50 any number may be meant
-        field.metadata.append(AfterValidator(_conceivable))
+        field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
 
-def _conceivable(value: Any) -> Any:
+def _conceivable(least: float, value: Any) -> Any:
     """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
     for number in value if isinstance(value, tuple) else (value,):
-        if isinstance(number, float) and number != 0 and not LEAST <= abs(number) <= 1 / LEAST:
-            raise ValueError(f"expected a size between {LEAST:g} and {1 / LEAST:g} in SI units, got {number:g}")
+        if isinstance(number, float) and number != 0 and not least <= abs(number) <= 1 / LEAST:
+            raise ValueError(f"expected a size between {least:g} and {1 / LEAST:g} in SI units, got {number:g}")
     return value
 
 
@@ -169,15 +169,9 @@ class DataFile(BaseModel):
         Raises
         ------
         DataError
-            If the file has changed since the campaign was read, or is no text in UTF-8.
+            If the file has changed since the campaign was read, or is no text.
         """
-        content = self.read_bytes()
-        try:
-            return content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise DataError(
-                f"{self.path}: expected text in UTF-8, got byte {content[error.start]:#x} at {error.start}"
-            ) from None
+        return decoded(self.read_bytes(), self.path)
 
     def notes(self) -> tuple[str, ...]:
         """Return columns and ranges of a table, as it has them; nothing of any other file."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError, MdrDaskError
 from mdr_dask.models.base import Status
 from mdr_dask.store import is_damage
@@ -41,17 +42,20 @@ class Plot:
     def figure(self, groups: Mapping[str, xr.Dataset]) -> Figure:
         """Draw it from the groups of a store; results that failed or are missing are counted under it.
 
-        Axes of one value are parameters at a fixed value.
+        Axes of one value are parameters at a fixed value. Parameters have the units in which their campaigns are
+        written, where these agree.
 
         Raises
         ------
         DataError, FitError
             If the store has not the data for it.
         """
+        from mdr_dask.plots import page
         from mdr_dask.plots.style import leave_out
 
         try:
-            figure = self.draw({name: _prepared(data) for name, data in groups.items()})
+            with page.with_units(_written_units(groups)):
+                figure = self.draw({name: _prepared(data) for name, data in groups.items()})
         except MdrDaskError:
             raise
         except Exception as error:
@@ -62,6 +66,12 @@ class Plot:
             raise DataError(f"a fault of this figure, please report it with the campaign: {problem}") from error
         leave_out(figure, _without_value(groups))
         return figure
+
+
+def _written_units(groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return the units of parameters on which the campaigns of all groups agree."""
+    first, *others = [written_units(str(data.attrs.get("campaign", ""))) for data in groups.values()]
+    return {name: unit for name, unit in first.items() if all(other.get(name, unit) == unit for other in others)}
 
 
 def _prepared(data: xr.Dataset) -> xr.Dataset:

@@ -156,9 +156,9 @@ def absent(axes: Axes, x: xr.DataArray, why: str, **look: Any) -> None:
 def plain(
     axes: Axes, x: Any, y: Any, *form: str, label: str | None = None, of: xr.Dataset | None = None, **look: Any
 ) -> None:
-    """Draw data without errors of their own as `Axes.plot` does; `of` has the parameters of their case."""
+    """Draw data without errors of their own as `Axes.plot` does; parameters are those of y, or of the case `of`."""
     (line,) = axes.plot(flat(x), flat(y), *form, label=label, gid=style.DATA, **look)
-    _record(line, DATA, label, _fixed(of), {"x": flat(x), "y": flat(y)})
+    _record(line, DATA, label, _fixed(of) | _coordinates(y), {"x": flat(x), "y": flat(y)})
 
 
 def law(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -36,17 +36,29 @@ def _with(groups: Mapping[str, xr.Dataset], outputs: tuple[str, ...], *varied: s
     return curves.with_outputs(groups, outputs, *varied)
 
 
-def _table(dataset: xr.Dataset, output: str) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return W, U, G and an output of all cases of a series that succeeded, each of shape (cases,)."""
+class _Films(NamedTuple):
+    """The cases of a series: W, U, G and the film found, of one shape; NaN where there is no film."""
+
+    W: xr.DataArray
+    U: xr.DataArray
+    G: xr.DataArray
+    film: xr.DataArray
+
+    def put(self, values: Any) -> xr.DataArray:
+        """Return numbers of all cases with their parameters, where there is a film."""
+        return self.film.copy(data=values).where(self.film.notnull())
+
+
+def _films(dataset: xr.Dataset, output: str) -> _Films:
+    """Return the cases of a series."""
     one = _one(dataset)
-    columns = [np.ravel(array) for array in xr.broadcast(*groups_of(one.coords.get), one[output])]
-    known = np.isfinite(columns[3])
-    W, U, G, values = (column[known] for column in columns)
-    return W, U, G, values
+    W, U, G, film = xr.broadcast(*groups_of(one.coords.get), one[output])
+    known = film.notnull()
+    return _Films(W.where(known), U.where(known), G.where(known), film)
 
 
-def _require(values: FloatArray) -> None:
-    if not values.size:
+def _require(values: Any) -> None:
+    if not np.isfinite(values).any():
         raise DataError("expected a film, got no case that succeeded")
 
 
@@ -86,10 +98,11 @@ def _measured(data: xr.Dataset, output: str, factor: float = 1.0) -> drawing.Mea
 def _draw_one_profile(figure: Figure, axes: Axes, family: curves.Family) -> None:
     right = axes.twinx()
     deepest = []
+    pressure = style.quantity("pressure", family.curves[0].data["pressure"])
     for curve in family.curves:
         case = curve.data
         pressed = curve._replace(line="--", marker="", label="")
-        drawing.curve(axes, pressed, case["position"], _measured(case, "pressure", 1e-9))
+        drawing.curve(axes, pressed, case["position"], _measured(case, "pressure", pressure.factor))
         label = curve.label or ("film" if len(family.curves) == 1 else "")
         drawing.curve(
             right, curve._replace(line="-", marker="", label=label), case["position"], _measured(case, "film")
@@ -98,17 +111,19 @@ def _draw_one_profile(figure: Figure, axes: Axes, family: curves.Family) -> None
     if len(family.curves) == 1:
         case = family.curves[0].data
         W = float(groups_of(case.coords.get)[0])
-        p0 = 2e-9 * float(case["contact_modulus"]) * np.sqrt(W / (2 * np.pi))
+        p0 = 2 * pressure.factor * float(case["contact_modulus"]) * np.sqrt(W / (2 * np.pi))
         X = np.linspace(-1, 1, 201)
         dry = p0 * np.sqrt(1 - X**2)
         drawing.law(axes, X, dry, ":", of=case, color="0.5", label="dry contact (Hertz)")
-        style.legend(axes)
     right.set_ylim(0, 3 * max(deepest) if max(deepest) > 0 else 1)
     axes.set_ylim(bottom=0)
     axes.set_xlabel("position $x/a$ (flow to the right)")
-    axes.set_ylabel(style.with_unit("pressure $p$ (dashed)", "GPa"))
+    axes.set_ylabel(style.with_unit("pressure $p$ (dashed)", pressure.unit))
     right.set_ylabel("film $h/R$ (full line)")
-    curves.finish(figure, right, family)
+    if family.bar:
+        curves.colour_bar(figure, [axes], *family.bar)
+    curves.name_varying(right, family)
+    style.legend_below(axes, right)
 
 
 def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -122,10 +137,11 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
     ):
         maps, told = _film_maps(groups, output)
         for index, (name, dataset) in enumerate(maps.items()):
-            W, U, G, films = _table(dataset, output)
-            _require(films)
-            expected = formula(W, U, G)
-            inside = np.array([not formula.outside(*case) for case in zip(W, U, G, strict=True)])
+            cases = _films(dataset, output)
+            _require(cases.film)
+            expected = cases.put(formula(*cases[:3]))
+            outside = [bool(formula.outside(*case)) for case in zip(*map(drawing.flat, cases[:3]), strict=True)]
+            inside = np.reshape(np.logical_not(outside), cases.film.shape)
             marker = "os^Dv"[index % 5]
             look: dict[str, Any] = {
                 "marker": marker,
@@ -134,11 +150,11 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
                 "ms": 4,
             }
             label = name or "film"
-            drawing.plain(axes, expected[inside], films[inside] / expected[inside], label=label, of=dataset, **look)
-            if not inside.all():
+            ratio = cases.film / expected
+            drawing.plain(axes, expected, ratio.where(inside), label=label, **look)
+            if bool(ratio.where(~inside).notnull().any()):
                 label += ", outside the range of the formula"
-                x, y = expected[~inside], films[~inside] / expected[~inside]
-                drawing.plain(axes, x, y, label=label, of=dataset, markerfacecolor="none", **look)
+                drawing.plain(axes, expected, ratio.where(~inside), label=label, markerfacecolor="none", **look)
         axes.axhline(1, color="0.5", linewidth=1)
         axes.set_xlabel(f"{formula.name}: $h/R$")
         axes.set_title(output.replace("_", " "), fontsize="small")
@@ -162,25 +178,50 @@ def _film_maps(groups: Mapping[str, xr.Dataset], output: str) -> tuple[dict[str,
     return maps or found, [f"series {', '.join(rest)}, which do not vary W, U or G alone"] if rest else []
 
 
-def _moes(groups: Mapping[str, xr.Dataset]) -> tuple[list[FloatArray], list[str]]:
-    """Return W, U, G and minimum film of all cases that succeeded."""
+class _Moes(NamedTuple):
+    """The cases of a series in Moes' numbers; the film over R sqrt(2 U), and over the limit of its regime."""
+
+    M: xr.DataArray
+    L: xr.DataArray
+    film: xr.DataArray
+    share: xr.DataArray
+
+
+def _in_moes_numbers(cases: _Films) -> _Moes:
+    """Return the cases of one series."""
+    from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters, regime
+
+    numbers = moes_parameters(*cases[:3])
+    flat = [drawing.flat(each) for each in cases[:3]]
+    limits = limiting_films(*flat)[regime(*flat), range(flat[0].size)].reshape(cases.film.shape)
+    scaled = cases.film / np.sqrt(2 * cases.U)
+    return _Moes(cases.put(numbers.M), cases.put(numbers.L), scaled, cases.film / limits)
+
+
+def _every(series: Sequence[_Moes], name: str) -> FloatArray:
+    """Return one number of all cases that have a film."""
+    values: FloatArray = np.concatenate([drawing.flat(getattr(each, name)) for each in series])
+    return values[np.isfinite(values)]
+
+
+def _moes(groups: Mapping[str, xr.Dataset]) -> tuple[list[_Moes], list[str]]:
+    """Return the cases of every series in Moes' numbers, and what is left out."""
     maps, told = _film_maps(groups, "minimum_film")
-    columns = zip(*(_table(dataset, "minimum_film") for dataset in maps.values()), strict=True)
-    joined = [np.concatenate(column) for column in columns]
-    _require(joined[3])
-    return joined, told
+    found = [_in_moes_numbers(_films(data, "minimum_film")) for data in maps.values()]
+    _require(np.concatenate([drawing.flat(each.film) for each in found]))
+    return found, told
 
 
 def draw_regimes(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the minimum film in Moes' numbers with the isoviscous limits, coloured by L."""
-    from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
+    from mdr_dask.physics.lubrication.film_formulas import limiting_films
 
-    (W, U, G, minimum), told = _moes(groups)
-    M, L = moes_parameters(W, U, G)
-    film = minimum / np.sqrt(2 * U)
+    series, told = _moes(groups)
+    M, L, film = (_every(series, name) for name in ("M", "L", "film"))
     figure, (axes,) = drawing.panels(1)
     how, norm = style.shades(L)
-    dots = drawing.dots(axes, M, film, L, norm=norm, cmap=how, s=16, zorder=3)
+    for one in series:
+        dots = drawing.dots(axes, one.M, one.film, one.L, norm=norm, cmap=how, s=16, zorder=3)
     span = np.geomspace(M.min() / 2, M.max() * 2, 100)
     limits = limiting_films(span, np.full(100, 0.5), np.ones(100))
     drawing.law(axes, span, limits[0], "--", color="0.4", label="rigid isoviscous: $4.895/(2M)$")
@@ -199,11 +240,10 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw the four regimes over Moes' numbers with their names, and in them the films found over their limits."""
     from matplotlib.colors import ListedColormap
 
-    from mdr_dask.physics.lubrication.film_formulas import REGIMES, limiting_films, moes_parameters, regime
+    from mdr_dask.physics.lubrication.film_formulas import REGIMES, regime
 
-    (W, U, G, minimum), told = _moes(groups)
-    M, L = moes_parameters(W, U, G)
-    ratio = minimum / limiting_films(W, U, G)[regime(W, U, G), range(W.size)]
+    series, told = _moes(groups)
+    M, L = (_every(series, name) for name in ("M", "L"))
     across = np.geomspace(min(0.1, M.min() / 2), max(1e3, M.max() * 2), 300)
     up = np.geomspace(min(0.1, L[L > 0].min(initial=0.1) / 2), max(1e2, L.max() * 2), 300)
     field = regime(across, 0.5, up[:, None])  # with 2 U = 1, M is W and L is G
@@ -216,7 +256,9 @@ def draw_regime_map(groups: Mapping[str, xr.Dataset]) -> Figure:
         if rows.size:
             middle = (across[int(np.median(places))], up[int(np.median(rows))])
             axes.annotate(name.replace(" ", "\n"), middle, ha="center", va="center", weight="bold", zorder=3)
-    dots = drawing.dots(axes, M, L, ratio, cmap="viridis", edgecolor="0.2", linewidth=0.5)
+    how, norm = style.shades(_every(series, "share"), logarithmic=False)
+    for one in series:
+        dots = drawing.dots(axes, one.M, one.L, one.share, cmap=how, norm=norm, edgecolor="0.2", linewidth=0.5)
     figure.colorbar(dots, label="minimum film found / limit of its regime")
     axes.set(xlabel="Moes' load $M = W (2U)^{-1/2}$", ylabel="Moes' lubricant parameter $L = G (2U)^{1/4}$")
     isoviscous = int((L <= 0).sum())
@@ -240,7 +282,7 @@ def _draw_along(
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 label = curve.label if output == outputs[0] else ""
                 drawn = curve._replace(line=line if family.joined else "", marker=marker, label=label)
-                drawing.curve(axes, drawn, curve.data[along], _measured(curve.data, output))
+                drawing.curve(axes, drawn, style.shown(along, curve.data[along]), _measured(curve.data, output))
         if len(outputs) > 1:
             for output, line, marker in zip(outputs, style.LINES, style.MARKERS, strict=False):
                 axes.plot([], [], line, marker=marker, ms=3, color="k", label=output.replace("_", " "))

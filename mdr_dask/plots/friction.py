@@ -45,20 +45,20 @@ def is_plane(data: xr.Dataset) -> bool:
 
 
 class _Shown(NamedTuple):
-    """What stands on the axes: friction over what, velocity times what, and both labels."""
+    """What stands on the axes: friction times what, the velocity in which form, and both labels."""
 
     factor: Any
-    speed: Any
+    velocity: Any
     x: str
     y: str
 
 
 def _in_units(data: xr.Dataset) -> _Shown:
     """Return friction against velocity: over the rms slope where that of the spectrum is known."""
-    x = style.label("velocity", data["velocity"])
+    x, velocity = style.label("velocity", data["velocity"]), style.shown("velocity", data["velocity"])
     if on_generated_line(data):
-        return _Shown(1 / spectral_slope(data), 1.0, x, r"$\mu$ / rms slope")
-    return _Shown(1.0, 1.0, x, r"coefficient of friction $\mu$")
+        return _Shown(1 / spectral_slope(data), velocity, x, r"$\mu$ / rms slope")
+    return _Shown(1.0, velocity, x, r"coefficient of friction $\mu$")
 
 
 def _in_numbers(data: xr.Dataset) -> _Shown:
@@ -68,13 +68,13 @@ def _in_numbers(data: xr.Dataset) -> _Shown:
     _, _, number = numbers(data)
     factor = 1 / (np.sqrt(2) * spectral_slope(data))
     x = r"velocity number $v \tau \nabla z / (\sqrt{2} h)$"
-    return _Shown(factor, number / data["velocity"], x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
+    return _Shown(factor, number, x, r"$\mu$ / ($\sqrt{2}$ rms slope)")
 
 
 def _mean_of(data: xr.Dataset, how: Callable[[xr.Dataset], _Shown]) -> tuple[Any, drawing.Mean]:
     """Return where the points of a curve lie and their means."""
     shown = how(data)
-    return data["velocity"] * shown.speed, curves.measured(data, MU, shown.factor)
+    return shown.velocity, curves.measured(data, MU, shown.factor)
 
 
 def slim(data: xr.Dataset) -> xr.Dataset:
@@ -177,12 +177,11 @@ def draw_regions(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def _draw_regions(axes: Axes, curve: drawing.Curve) -> None:
     data = curve.data
-    velocity, value = _mean_of(data, _in_units)
-    drawing.curve(axes, curve._replace(label="simulated"), velocity, value)
+    speeds, value = _mean_of(data, _in_units)
+    drawing.curve(axes, curve._replace(label="simulated"), speeds, value)
     _, force, number = numbers(data)
-    scale = _number(number / data["velocity"])
+    scale = _number(number / speeds)
     exponent = _number(laws.alpha(data["hurst"]))
-    speeds = np.asarray(velocity.values)
     fine = np.geomspace(speeds.min(), speeds.max(), 300)
     law = np.sqrt(2) * laws.interpolation(_number(force), fine * scale, exponent, laws.BETA)
     drawing.law(axes, fine, law, "k--", of=data, lw=1, label=LAW)
@@ -282,16 +281,25 @@ def draw_plateau(groups: Mapping[str, xr.Dataset]) -> Figure:
     return _against_hurst("plateau", groups, "plateau of friction", (row,))
 
 
-def _indenter_points(data: xr.Dataset) -> dict[str, np.ndarray]:
-    """Return the points of one series of indenters, flat."""
+class _Indented(NamedTuple):
+    """The cases of one series of indenters: xi, friction where it is known, and where the law is meant to hold."""
+
+    xi: xr.DataArray
+    friction: drawing.Mean
+    within: xr.DataArray
+
+    def where(self, chosen: xr.DataArray) -> drawing.Mean:
+        """Return the friction of some of the cases."""
+        return drawing.Mean(*(each.where(chosen) for each in self.friction))
+
+
+def _indented(data: xr.Dataset) -> _Indented:
+    """Return the cases of one series."""
     slope = spectral_slope(data)
     value = curves.measured(data, MU, 1 / (np.sqrt(2) * slope))
-    within = within_indenter_law(data, slope)
-    columns = xr.broadcast(indenter_xi(data, slope), *value, within)
-    names = ("xi", "value", "low", "high", "within")
-    return {
-        name: np.asarray(column.values, dtype=np.float64).ravel() for name, column in zip(names, columns, strict=True)
-    }
+    xi, within, *friction = xr.broadcast(indenter_xi(data, slope), within_indenter_law(data, slope), *value)
+    known = (friction[0] > 0) & np.isfinite(xi) & (xi > 0)
+    return _Indented(xi, drawing.Mean(*(each.where(known) for each in friction)), within & known)
 
 
 def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
@@ -299,7 +307,7 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     points, reasons = {}, []
     for name, data in curves.with_outputs(groups, [MU]).items():
         try:
-            points[name] = _indenter_points(slim(data))
+            points[name] = _indented(slim(data))
         except FitError as error:
             reasons.append(f"{name}: {error}" if name else str(error))
     if not points:
@@ -307,15 +315,11 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     figure, (axes,) = drawing.panels(1)
     inside = 0
     for (name, one), colour in zip(points.items(), style.scale(len(points)), strict=True):
-        known = np.isfinite(one["value"]) & (one["value"] > 0) & np.isfinite(one["xi"]) & (one["xi"] > 0)
-        within = known & (one["within"] > 0)
-        inside += int(within.sum())
-        away = known & ~within
-        drawing.plain(axes, one["xi"][away], one["value"][away], ".", ms=2, color="0.6", zorder=1)
-        value = drawing.Mean(*(xr.DataArray(one[key][within]) for key in ("value", "low", "high")))
-        drawing.points(axes, one["xi"][within], value, colour, "o", name or "simulated")
-    spans = [one["xi"][np.isfinite(one["xi"]) & (one["xi"] > 0)] for one in points.values()]
-    span = np.concatenate(spans)
+        inside += int(one.within.sum())
+        drawing.plain(axes, one.xi, one.where(~one.within).value, ".", ms=2, color="0.6", zorder=1)
+        drawing.points(axes, one.xi, one.where(one.within), colour, "o", name or "simulated")
+    span = np.concatenate([drawing.flat(one.xi.where(one.xi > 0)) for one in points.values()])
+    span = span[np.isfinite(span)]
     if not span.size:
         raise DataError("expected friction of a rough indenter, got no case that succeeded")
     axes.plot([], [], ".", color="0.6", label="outside the law: steep or barely touching body, region IV")
@@ -326,7 +330,7 @@ def draw_indenter(groups: Mapping[str, xr.Dataset]) -> Figure:
     style.logarithmic(axes, "xy")
     style.legend(axes)
     held = curves.fixed_by_all([{str(k): v for k, v in groups[name].coords.items() if v.ndim == 0} for name in points])
-    total = sum(int(np.isfinite(one["value"]).sum()) for one in points.values())
+    total = sum(int(one.friction.value.count()) for one in points.values())
     bars_text = curves.meaning_of_bars(*(groups[name] for name in points), outputs=[MU])
     subject = f"rough indenters against their law: {inside} of {total} cases lie within it"
     style.title(figure, subject, curves.fixed_text(held, CASE), bars_text)

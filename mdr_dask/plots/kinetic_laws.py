@@ -78,7 +78,7 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
     family = curves.family(found, names[0], "velocity", ("normal_force", "hurst"))
     for axes, output, label in zip(panels, names, (BEFORE, JUMP), strict=True):
         for curve in family.curves:
-            speed = curve.data["velocity"]
+            speed = style.shown("velocity", curve.data["velocity"])
             drawing.curve(axes, curve, speed, _constants(curve.data, output), bars=True)
             if output == names[1] and family.joined:
                 law = jump_law(np.asarray(curve.data[names[0]].values), LAW)
@@ -103,10 +103,9 @@ class _Cases(NamedTuple):
         """Return one number for every case."""
         return np.ravel(np.asarray(self.data[name].values, dtype=np.float64))
 
-    def constant(self, name: str, where: Any = slice(None)) -> drawing.Mean:
-        """Return one constant of some of the cases, with its interval."""
-        columns = (self.column(f"{name}{end}")[where] for end in ("", "_low", "_high"))
-        return drawing.Mean(*(xr.DataArray(column, dims="case") for column in columns))
+    def constant(self, name: str, where: Any = True) -> drawing.Mean:
+        """Return one constant with its interval, NaN but for some of the cases."""
+        return drawing.Mean(*(self.data[f"{name}{end}"].where(where) for end in ("", "_low", "_high")))
 
 
 def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
@@ -183,7 +182,8 @@ def draw_rate(groups: Mapping[str, xr.Dataset]) -> Figure:
         left += int(np.count_nonzero(~good))
         x = cases.column("passing_number")
         label = _hurst_label(found, cases)
-        drawing.points(axes, x[good], cases.constant("rate", good), cases.colour, ".", label)
+        rates = cases.constant("rate", good.reshape(cases.data["rate"].shape))
+        drawing.points(axes, x, rates, cases.colour, ".", label)
         _draw_powers(axes, powers, cases, x[good])
         whole = np.sort(x)
         law = np.where(whole < 1, whole, whole ** (1 - cases.hurst))
@@ -240,8 +240,7 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     )
     for number, (regime, power, label) in enumerate(rows):
         for cases in by_hurst(found.sel(regime=regime)):
-            known = np.isfinite(cases.column(power))
-            value = cases.constant(power, known)
+            value = cases.constant(power)
             across = np.full(value.value.size, cases.hurst)
             drawing.points(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
         axes.plot([], [], style.MARKERS[number], color=style.COLOURS[number], ms=4, label=label)

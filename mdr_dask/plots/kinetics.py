@@ -138,7 +138,7 @@ def draw_velocities(groups: Mapping[str, xr.Dataset]) -> Figure:
     slope, label = over_slope(data)
     for curve in steady.curves:
         value = curves.measured(curve.data, BEFORE_JUMP, 1 / slope)
-        drawing.curve(left, curve, curve.data["velocity"], value, bars=True)
+        drawing.curve(left, curve, style.shown("velocity", curve.data["velocity"]), value, bars=True)
     left.set(xlabel=style.label("velocity", data["velocity"]), ylabel=label)
     style.logarithmic(left, "x")
     shown = data if over else data.expand_dims("velocity")

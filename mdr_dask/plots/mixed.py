@@ -151,7 +151,7 @@ def draw_temperature(groups: Mapping[str, xr.Dataset]) -> Figure:
         families.append(family)
         told += family.left_out
         _draw_row(panel, family, PER_CENT, "temperature", bars=True)
-        panel.set_xlabel(style.label("temperature"))
+        panel.set_xlabel(style.label("temperature", data["temperature"]))
         if by_speed:
             panel.set_title(style.named("rotation_speed", part["rotation_speed"]), fontsize="small")
     curves.finish(figure, panels[-1] if families[0].bar else panels[0], families[0])
@@ -222,7 +222,7 @@ def draw_stribeck(groups: Mapping[str, xr.Dataset]) -> Figure:
             _draw_row(panel, family, row, "rotation_speed", bars=False)
             if row.outputs == ("film_ratio",):
                 panel.axhline(1, color="0.7", lw=0.8, ls=":")
-        mine[-1].set_xlabel(style.label("rotation_speed"))
+        mine[-1].set_xlabel(style.label("rotation_speed", data["rotation_speed"]))
         curves.finish(figure, mine[0], family)
     alike = curves.fixed_by_all([each.held for each in families])
     for column, (name, family) in enumerate(zip(found, families, strict=True)):

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from mdr_dask.errors import DataError
 from mdr_dask.units import to_si
@@ -27,12 +27,23 @@ INCH = 0.0254
 LEAST, MOST = 0.02, 1.0
 
 
-class Page(NamedTuple):
-    """What a user asks of the look of a figure: width and height in inches, and units by the name of a quantity."""
+@dataclass(frozen=True)
+class Page:
+    """What a user asks of the look of a figure: width and height in inches, and units by the name of a quantity.
+
+    `used` names the quantities that were shown in a unit asked for.
+    """
 
     width: float | None = None
     height: float | None = None
-    units: Mapping[str, str] = MappingProxyType({})
+    units: Mapping[str, str] = field(default_factory=dict)
+    used: set[str] = field(default_factory=set)
+
+    def unit(self, name: str) -> str | None:
+        """Return the unit that a quantity is to be shown in, None for its usual one."""
+        if name in self.units:
+            self.used.add(name)
+        return self.units.get(name)
 
 
 _NOTHING_ASKED = Page()
@@ -71,7 +82,7 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
 @contextmanager
 def with_units(units: Mapping[str, str]) -> Iterator[None]:
     """Show quantities in units, unless others were asked for."""
-    token = _PAGE.set(_PAGE.get()._replace(units={**units, **_PAGE.get().units}))
+    token = _PAGE.set(replace(_PAGE.get(), units={**units, **_PAGE.get().units}))
     try:
         yield
     finally:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BEFORE = 0.08  # of the time shown
+#: What a loading history prescribes.
+DRIVEN = ("velocity", "normal_force")
 #: Width of a column alone, and beside others, in inches.
 ALONE, BESIDE = 6.4, 3.4
 
@@ -69,11 +71,11 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
         top.set_title(name or case.protocol.shape, fontsize="small")
         top.set_ylabel(label)
         time, speed, force = course(case, last)
-        labels = style.label("velocity"), style.label("normal_force")
-        for axes, row, text, colour in zip(below, (speed, force), labels, style.COLOURS[1:], strict=False):
+        for axes, row, name, colour in zip(below, (speed, force), DRIVEN, style.COLOURS[1:], strict=False):
+            row = style.quantity(name, values[name]).of(row)
             drawing.plain(axes, time, row, of=values, color=colour, lw=1.2)
             axes.set_ylim(min(0.0, 1.15 * float(row.min())), 1.15 * max(float(row.max()), 1e-300))
-            axes.set_ylabel(text)
+            axes.set_ylabel(style.label(name, values[name]))
         below[1].set_xlabel(TIME)
         below[1].set_xlim(-BEFORE * last, last)
     style.legend(panels[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -70,31 +70,44 @@ def _draw_growth(axes: Axes, curve: drawing.Curve, force: Any, fraction: Any) ->
         drawing.law(axes, force, np.minimum(law, 1), "--", name="eq. 3.12", of=curve.data, lw=0.8, color=curve.colour)
 
 
+class _Scaled(NamedTuple):
+    """Cases on the scales of eq. 3.23: velocity over crossover, friction over plateau; NaN without friction."""
+
+    x: xr.DataArray
+    y: xr.DataArray
+    hurst: xr.DataArray
+    force: xr.DataArray
+
+
+def _scaled(data: xr.Dataset) -> _Scaled:
+    """Return the cases of one series."""
+    ratio, number, velocity = numbers(data)
+    crossover = laws.crossover(number, laws.alpha(data["hurst"]), laws.BETA)
+    friction = aggregation.mean(ratio) / np.sqrt(2)
+    columns = xr.broadcast(velocity / crossover, friction, data["hurst"], number)
+    return _Scaled(*(column.where(columns[1] > 0) for column in columns))
+
+
 def draw_collapse(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw all friction of planes on the scales of eq. 3.23: velocity over crossover, friction over plateau."""
     found = curves.with_outputs(groups, [MU], where=is_plane)
     figure, (axes,) = drawing.panels(1)
-    points = []
-    for data in found.values():
-        one = slim(data)
-        ratio, number, velocity = numbers(one)
-        crossover = laws.crossover(number, laws.alpha(one["hurst"]), laws.BETA)
-        columns = xr.broadcast(velocity / crossover, aggregation.mean(ratio) / np.sqrt(2), one["hurst"], number)
-        points.append([np.asarray(column.values, dtype=np.float64).ravel() for column in columns])
-    x, y, hurst, force = (np.concatenate(column) for column in zip(*points, strict=True))
-    known = np.isfinite(y) & (y > 0)
-    if not known.any():
+    scaled = [_scaled(slim(data)) for data in found.values()]
+    columns = ([drawing.flat(column) for column in each] for each in zip(*scaled, strict=True))
+    x, y, hurst, force = map(np.concatenate, columns)
+    if not (known := np.isfinite(y)).any():
         raise DataError("expected friction of a rough plane, got no case that succeeded")
-    by, values = (style.label("hurst"), hurst) if np.ptp(hurst) > 0 else (r"force number $F_N / (G h L)$", force)
-    how, norm = style.shades(values[known])
-    drawn = drawing.dots(axes, x[known], y[known], values[known], s=8, cmap=how, norm=norm)
+    by_hurst = np.ptp(hurst[known]) > 0
+    how, norm = style.shades((hurst if by_hurst else force)[known])
+    for one in scaled:
+        drawn = drawing.dots(axes, one.x, one.y, one.hurst if by_hurst else one.force, s=8, cmap=how, norm=norm)
     fine = np.geomspace(x[known].min(), x[known].max(), 300)
     drawing.law(axes, fine, (1 + fine**-2.0) ** -0.5, "k-", lw=1, label=LAW)
     off = y[known] / (1 + x[known] ** -2.0) ** -0.5
     axes.set_xlabel(r"velocity number / crossover: $v \tau \nabla z / (\sqrt{2} h) / f(F_N / G h L)$")
     axes.set_ylabel(r"$\mu$ / ($\sqrt{2}$ rms slope)")
     style.logarithmic(axes, "xy")
-    figure.colorbar(drawn, ax=axes, label=by)
+    figure.colorbar(drawn, ax=axes, label=style.label("hurst") if by_hurst else r"force number $F_N / (G h L)$")
     style.legend(axes)
     spread = f"{int(known.sum())} cases; half of them deviate from the law by less than {_half(off):.0%}"
     shifted = _said("collapse", "collapsed", "share of the spread that free shifts take away", found)

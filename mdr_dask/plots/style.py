@@ -41,6 +41,10 @@ class Quantity(NamedTuple):
     factor: float = 1.0
     offset: float = 0.0
 
+    def of(self, values: Any) -> Any:
+        """Return values in SI in the unit shown."""
+        return values * self.factor + self.offset
+
 
 #: Parameters by name; a store whose unit is 1 (a dimensionless campaign) keeps the symbol alone.
 QUANTITIES: Mapping[str, Quantity] = {
@@ -73,6 +77,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "roller_radius": Quantity("roller radius", "mm", 1e3),
     "stick_radius": Quantity("stick radius $c/a_0$", ""),
     "cycles": Quantity("cycles", ""),
+    "pressure": Quantity("pressure $p$", "GPa", 1e-9),
+    "wear_volume": Quantity("worn volume $V$", "m^3"),
     "amplitude": Quantity("amplitude $U_0$", "µm", 1e6),
     "depth": Quantity("depth $d_0$", "µm", 1e6),
     "path": Quantity("sliding path", "m"),
@@ -106,7 +112,7 @@ def quantity(name: str, values: xr.DataArray | None = None) -> Quantity:
     unit = None if values is None else values.attrs.get("units")
     words = name.replace("_", " ") if values is None or name in values.coords else meaning(values, name)
     known = QUANTITIES.get(name, Quantity(words, "" if unit in (None, "1") else str(unit)))
-    wanted = page.asked().units.get(name)
+    wanted = None if values is None else page.asked().unit(name)
     if wanted is None:
         return Quantity(known.symbol, "") if unit == "1" else known
     try:
@@ -128,8 +134,7 @@ def shown(name: str, values: xr.DataArray) -> Any:
     """Return the values of a parameter in the unit that figures show."""
     if values.dtype.kind not in "fiu":
         return values.values
-    how = quantity(name, values)
-    return np.asarray(values.values, dtype=np.float64) * how.factor + how.offset
+    return quantity(name, values).of(np.asarray(values.values, dtype=np.float64))
 
 
 def label(name: str, values: xr.DataArray | None = None) -> str:
@@ -144,6 +149,9 @@ def with_unit(symbol: str, unit: str) -> str:
 
 
 def _raised(unit: str) -> str:
+    """Return a unit as it is printed: powers raised, ``um`` as µm, ``degC`` as °C."""
+    unit = re.sub(r"\bu(?=(m|s|N|Pa|W|rad)\b)", "µ", unit)
+    unit = re.sub(r"\bpercent\b", "%", re.sub(r"\bdeg(?=C?\b)", "°", unit))
     return re.sub(r"\^(-?\d+)", r"$^{\1}$", unit)
 
 
@@ -274,3 +282,13 @@ def legend(axes: Axes, heading: str = "") -> None:
     long = len(handles) > 9
     place: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)} if long else {"loc": "best"}
     axes.legend(title=heading or None, fontsize="x-small", title_fontsize="x-small", framealpha=0.7, **place)
+
+
+def legend_below(*axes_of: Axes) -> None:
+    """Draw one legend for all axes of a panel under it, where curves leave no room."""
+    found = [axes.get_legend_handles_labels() for axes in axes_of]
+    handles = [each for one, _ in found for each in one]
+    labels = [each for _, one in found for each in one]
+    if handles:
+        place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16)}
+        axes_of[-1].legend(handles, labels, ncols=min(3, len(handles)), fontsize="x-small", **place)

@@ -179,11 +179,10 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
         most = max(most, data.sizes["realisation"])
         told += [f"{name}: {each}" if name else each for each in one.left_out]
         for curve in one.curves:
-            drawing.curve(axes, curve, curve.data[along], _spread(curve.data))
+            drawing.curve(axes, curve, style.shown(along, curve.data[along]), _spread(curve.data))
         axes.set_xlabel(_over(along, data))
-        axes.set_ylabel(
-            style.with_unit("worn volume $V$", "m³") if not dimensionless(data) else "worn volume $V/(a_0^2 d_0)$"
-        )
+        volume = style.label("wear_volume", data["wear_volume"])
+        axes.set_ylabel("worn volume $V/(a_0^2 d_0)$" if dimensionless(data) else volume)
         values = np.asarray(data[along].values, dtype=np.float64)
         if style.is_geometric(values):
             style.logarithmic(axes, "x")
@@ -200,19 +199,19 @@ def draw_volume(groups: Mapping[str, xr.Dataset]) -> Figure:
 
 def _spread(data: xr.Dataset) -> drawing.Mean:
     """Return the median of the realisations and what 95 % of them lie within."""
-    volume = data["wear_volume"]
+    volume, how = data["wear_volume"], style.quantity("wear_volume", data["wear_volume"])
     if volume.sizes["realisation"] < 2:
-        return curves.measured(data, "wear_volume")
+        return curves.measured(data, "wear_volume", how.factor)
     known = volume.notnull().any("realisation")
     ends = volume.where(known, 0.0).quantile([0.025, 0.5, 0.975], "realisation", skipna=True).where(known)
-    low, middle, high = (ends.isel(quantile=k) for k in range(3))
+    low, middle, high = (how.of(ends.isel(quantile=k)) for k in range(3))
     return drawing.Mean(middle, low, high)
 
 
 def _over(along: str, data: xr.Dataset) -> str:
     """Return the label of cycles or path."""
     if along == "path":
-        return r"sliding path $k E^* l / (\sigma_0 a_0)$" if dimensionless(data) else style.label("path")
+        return r"sliding path $k E^* l / (\sigma_0 a_0)$" if dimensionless(data) else style.label("path", data["path"])
     return "cycles $N/N_0$" if dimensionless(data) else "cycles $N$"
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from mdr_dask import store
 from mdr_dask.models.base import Status
 
@@ -55,7 +57,8 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
         for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = store.ledger(url, series, dataset["status"].shape)
-    return [message for place, message in last.items() if ledger[place] == Status[message["status"].upper()]]
+    inside = [place for place in last if len(place) == ledger.ndim and np.less(place, ledger.shape).all()]
+    return [last[place] for place in inside if ledger[place] == Status[last[place]["status"].upper()]]
 
 
 def grouped(found: Sequence[dict[str, Any]]) -> list[Group]:

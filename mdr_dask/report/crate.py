@@ -52,7 +52,7 @@ def metadata(study: Study, digests: Mapping[str, str], sizes: Mapping[str, int],
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": {"@id": terms["@id"]},
         "hasPart": parts,
-        "mentions": [{"@id": "#run"}],
+        "mentions": {"@id": "#run"},
     }
     written = {"@id": CRATE, "@type": "CreativeWork", "conformsTo": {"@id": PROFILE}, "about": {"@id": "./"}}
     graph = [written, root, *named, *folders, terms, _program(study), _run(study, beside, arrays)]
@@ -98,13 +98,13 @@ def _program(study: Study) -> dict[str, Any]:
 
 
 def _run(study: Study, beside: list[str], arrays: list[str]) -> dict[str, Any]:
-    given = [name for name in beside if name.removeprefix(PUBLISHED) not in MEANINGS]
+    given = [{"@id": name} for name in beside if name.removeprefix(PUBLISHED) not in MEANINGS]
     found: dict[str, Any] = {
         "@id": "#run",
         "@type": "CreateAction",
         "name": f"run of the campaign {study.title}",
         "instrument": {"@id": "#mdr_dask"},
-        "object": [{"@id": name} for name in given],
+        "object": given if len(given) > 1 else given[0],
         "result": [{"@id": "zarr.json"}, *({"@id": f"{name}/"} for name in arrays)],
         "startTime": study.facts["laid out"],
     }

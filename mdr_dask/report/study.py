@@ -254,6 +254,12 @@ def _laws(url: str, model: str, groups: Mapping[str, xr.Dataset]) -> tuple[list[
         except (FitError, DataError) as error:
             missing.append((name, str(error)))
             continue
+        except Exception as error:
+            if store.is_damage(error):
+                raise
+            # as of figures: a fault of one law must not end the page
+            missing.append((name, f"a fault of this law, please report it with the campaign: {error}"))
+            continue
         found += [_law(url, f"{name} {series}".strip(), law.summary, result) for series, result in results.items()]
     return found, missing
 

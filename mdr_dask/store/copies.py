@@ -95,13 +95,13 @@ def read_copy(url: str, series: str) -> Copy | None:
         held = json.loads(content)
         stated = held.pop("digest")
         files = {name: base64.b64decode(text) for name, text in held["files"].items()}
+        study, own, before = (dict(held[name]) for name in ("study", "own", "before"))
+        of_group = held["series"] == ("" if series == ROOT else series)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise damaged from None
-    if held["series"] != ("" if series == ROOT else series):
+    if not of_group or stated != digest(json.dumps(held, sort_keys=True).encode()):
         raise damaged
-    if stated != digest(json.dumps(held, sort_keys=True).encode()):
-        raise damaged
-    return Copy(held["series"], files, held["study"], held["own"], held["before"])
+    return Copy(held["series"], files, study, own, before)
 
 
 def groups_laid_out(url: str) -> list[str]:

@@ -166,13 +166,22 @@ def _leaves(tree: Mapping[str, Any], prefix: str) -> dict[str, Any]:
     """Flatten parameters to dotted paths; of a named file only the digest counts."""
     found: dict[str, Any] = {}
     for name, value in tree.items():
-        if isinstance(value, Mapping) and value.keys() == DataFile.model_fields.keys():
-            found[prefix + name] = value["sha256"]
-        elif isinstance(value, Mapping):
+        if isinstance(value, Mapping) and not _is_file(value):
             found |= _leaves(value, f"{prefix}{name}.")
         else:
-            found[prefix + name] = value
+            found[prefix + name] = _by_digest(value)
     return found
+
+
+def _is_file(value: Any) -> bool:
+    return isinstance(value, Mapping) and value.keys() == DataFile.model_fields.keys()
+
+
+def _by_digest(value: Any) -> Any:
+    """Return a value with the digests of named files in their place, those of lists, too."""
+    if isinstance(value, list):
+        return [_by_digest(each) for each in value]
+    return value["sha256"] if _is_file(value) else value
 
 
 def _extend(series: Series, held: Mapping[str, Any]) -> tuple[Series, dict[str, IntArray]]:

@@ -51,9 +51,7 @@ def opened(line: bytes) -> dict[str, Any] | None:
     """Return what a line says; None if it is not what was written. Records of version 0.1 have no digest."""
     try:
         record: dict[str, Any] = json.loads(line)
-        attempt, block = record["attempt"], record["block"]
-        whole = isinstance(attempt, int) and all(isinstance(i, int) for i in block)
-        if not whole or not isinstance(record["messages"], list):
+        if not _is_one(record):
             return None
         stated = record.pop("digest", None)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
@@ -62,6 +60,19 @@ def opened(line: bytes) -> dict[str, Any] | None:
         return record
     text = json.dumps(record, sort_keys=True)
     return record if stated == digest(text.encode()) else None
+
+
+def _is_one(found: Mapping[str, Any]) -> bool:
+    """Say whether a document has the shape of a record."""
+    whole = type(found["attempt"]) is int and all(type(i) is int and i >= 0 for i in found["block"])
+    texts = all(type(one) is str for one in found.get("chunks", {}).values()) and type(found.get("kind", "")) is str
+    return whole and texts and type(found["messages"]) is list and all(map(_is_message, found["messages"]))
+
+
+def _is_message(told: Mapping[str, Any]) -> bool:
+    texts = type(told["message"]) is str and told["status"] in ("done", "not_converged", "failed", "not_needed")
+    plain = all(isinstance(value, str | int | float | None) for value in told["case"].values())
+    return texts and plain and all(type(i) is int and i >= 0 for i in told.get("place", ()))
 
 
 def record(url: str, series: str, index: BlockIndex, attempt: int) -> dict[str, Any] | None:

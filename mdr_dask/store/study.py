@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from mdr_dask.errors import StoreError
 from mdr_dask.store.copies import groups_laid_out
+from mdr_dask.store.expected import faults
 from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, local, read_json
-
-#: What this program and its earlier versions write. Another codec might run code, and is not opened.
-CODECS = {"bytes", "vlen-utf8", "zstd", "crc32c"}
-#: What the attributes of a study hold, and those of a group of results besides, and of what type.
-_STUDY = {"model": str, "model_version": int, "seed": int, "title": str, "history": list}
-_GROUP = {"axes": list, "outputs": list, "blocks": dict, "parameters": str}
 
 
 def document(url: str, series: str = "") -> dict[str, Any] | None:
@@ -31,49 +26,16 @@ def document(url: str, series: str = "") -> dict[str, Any] | None:
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
         raise StoreError(f"{url}: {name} is damaged; {_remedy(url)}")
     attributes = found.get("attributes", {})
-    if "mdr_dask_layout" in attributes and not only_claimed(attributes):
-        for fault in _faults(found, attributes):
+    layout = attributes.get("mdr_dask_layout")
+    is_newer = isinstance(layout, int) and layout > LAYOUT  # which is said in its own words
+    if "mdr_dask_layout" in attributes and not only_claimed(attributes) and not is_newer:
+        for fault in faults(found):
             raise StoreError(f"{url}: {name}: {fault}; {_remedy(url)}")
     return found
 
 
 def _remedy(url: str) -> str:
     return f"'mdr-dask verify {url}' looks into it"
-
-
-def _faults(found: Mapping[str, Any], attributes: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what is wrong with the metadata of a group."""
-    if found.get("zarr_format") != 3:
-        yield f"expected zarr_format 3, got {found.get('zarr_format')!r}"
-    if not isinstance(attributes["mdr_dask_layout"], int):
-        yield f"expected a number as mdr_dask_layout, got {attributes['mdr_dask_layout']!r}"
-    elif attributes["mdr_dask_layout"] > LAYOUT:
-        return  # said in its own words
-    expected = _STUDY | (_GROUP if "axes" in attributes else {})
-    for key, kind in expected.items():
-        if not isinstance(attributes.get(key), kind):
-            yield f"expected {key!r} among the attributes as {kind.__name__}, got {attributes.get(key)!r:.60}"
-    consolidated = found.get("consolidated_metadata")
-    members = consolidated.get("metadata") if isinstance(consolidated, dict) else None
-    if not isinstance(members, dict) or not all(isinstance(member, dict) for member in members.values()):
-        yield "expected consolidated metadata of all members"
-        return
-    for name, member in members.items():
-        yield from (f"{name}: {fault}" for fault in _member_faults(member))
-
-
-def _member_faults(member: Mapping[str, Any]) -> Iterator[str]:
-    if member.get("zarr_format") != 3:
-        yield f"expected zarr_format 3, got {member.get('zarr_format')!r}"
-    elif member.get("node_type") == "array":
-        codecs = member.get("codecs")
-        names = [codec.get("name") if isinstance(codec, dict) else codec for codec in codecs or ()]
-        if not names or not all(isinstance(name, str) and name in CODECS for name in names):
-            yield f"expected codecs of {', '.join(sorted(CODECS))}, got {names!r:.80}"
-        if member.get("storage_transformers"):
-            yield f"expected no storage transformers, got {member['storage_transformers']!r:.60}"
-    elif member.get("node_type") != "group":
-        yield f"expected an array or a group, got {member.get('node_type')!r:.60}"
 
 
 def exists(url: str) -> bool:

@@ -16,7 +16,6 @@ NAMES = ("sliding_friction", "velocity_jump", "fretting_wear", "ehl_line", "mixe
 NEED_MORE = {
     "path": "in place of cycles and amplitude",
     "temperature": "needs a law",
-    "measured": "names a file",
     "protocol": "names a file, or several entries",
     "film_thickness": "in place of a formula",
 }

@@ -1,11 +1,21 @@
 """Unknowns from measured points: planted values are held as often as stated, and what is open is named."""
 
+import json
+from time import process_time
+
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
+import mdr_dask
 from mdr_dask.campaign.measured import Measured
-from mdr_dask.fits.calibration import calibrate, summary
+from mdr_dask.cli import main
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits import available
+from mdr_dask.fits.calibration import calibrate, calibration, summary
+from mdr_dask.fits.posterior import Likelihood, Noise
+from mdr_dask.fits.prediction import prediction
 
 AXES = {
     "normal_force": (np.geomspace(0.1, 10, 5), "N"),
@@ -61,3 +71,139 @@ def test_intervals_hold_the_truth_as_often_as_they_say(lines, scatter, given, ta
     for level, hits in held.items():
         # the two unknowns of a table err together
         assert abs(np.mean(hits) - level) < 3.3 * np.sqrt(level * (1 - level) / tables)
+
+
+@pytest.mark.parametrize(("given", "tables"), [(True, 5), (False, 1)])
+def test_only_what_the_data_determine_has_a_number(given, tables):
+    """Velocity alone in region I: v tau slope^2 and nothing else; the product is known as well as the points are."""
+    rng = np.random.default_rng(5)
+    held = 0
+    for _ in range(tables):
+        found = summary(calibrate(study(function=slow), table(rng, given=given, function=slow)))
+        for name in TRUE:
+            assert all(np.isnan(found[name + end]) for end in ("", "_low", "_high", "_low_68", "_high_68"))
+        product = "relaxation_time x rms_roughness^2"
+        true = TRUE["relaxation_time"] * TRUE["rms_roughness"] ** 2
+        assert found[product].attrs["units"] == "s m^2"
+        held += bool(found[f"{product}_low"] < true < found[f"{product}_high"])
+        # 3 % at each of twelve points, twice that within 95 %
+        assert float(found[f"{product}_high"] / found[f"{product}_low"]) < 1 + 4 * 0.03 / np.sqrt(12) * 2
+        assert not any(name.startswith("correlation") for name in found)
+        assert "only relaxation_time x rms_roughness^2" in found["determined"].item()
+        assert "no number is given for relaxation_time and rms_roughness" in found["determined"].item()
+    assert held >= tables - 1
+
+
+def test_an_unknown_may_be_bounded_from_one_side_only():
+    """On the plateau of fast sliding the relaxation time is long enough, whatever it is."""
+    data = study().isel(rms_roughness=3, drop=True)
+    force, velocity = np.full(10, 0.1), np.geomspace(0.1, 1, 10)
+    exact = friction(force, velocity, 8e-3, 1e-6)
+    measured = Measured(
+        "rig.csv", "mu", exact, 0.03 * exact, {"normal_force": force, "velocity": velocity}, tuple(range(10))
+    )
+    found = summary(calibrate(data, measured))
+    assert np.isnan(found["relaxation_time"])
+    assert 1e-4 < float(found["relaxation_time_low"]) < 8e-3
+    assert np.isinf(found["relaxation_time_high"])
+    assert "bounded from below" in found["determined"].item()
+
+
+def test_data_that_the_model_cannot_have_are_told_and_widen_the_interval():
+    rng = np.random.default_rng(3)
+    right = table(rng)
+    wrong = right.__class__(**{**vars(right), "values": right.values * (1 + 0.3 * np.sin(9 * right.values / 0.3))})
+    told = [summary(calibrate(study(), each)) for each in (right, wrong)]
+    assert [one["law_holds"].item()[:3] for one in told] == ["yes", "no:"]
+    widths = [float(np.log(one["rms_roughness_high"] / one["rms_roughness_low"])) for one in told]
+    assert widths[1] > 2 * widths[0]
+
+
+def test_ten_thousand_likelihoods_are_arrays():
+    """Vectorised: far below a millisecond each, however slow the machine."""
+    measured = table(np.random.default_rng(0), points=30)
+    likelihood = Likelihood(prediction(study(20, 0.1), measured), measured.values, [Noise(np.ones(1), measured.errors)])
+    places = np.random.default_rng(1).uniform(size=(10_000, 2))
+    begin = process_time()
+    assert likelihood(places).shape == (10_000, 1)
+    assert process_time() - begin < 10
+
+
+TOY = """
+name: rig
+model: toy
+realisations: 6
+parameters:
+  slope: {linear: [1, 3, 6]}
+  position: {linear: [0.5 m, 3 m, 5]}
+  noise: 0.05
+measured: {table: rig.csv}
+"""
+MADE = "position [m],height [m]\n" + "".join(
+    f"{x},{2 * x * (1 + e):.4f}\n"
+    for x, e in zip((0.6, 1.1, 1.7, 2.2, 2.8), (0.02, -0.03, 0.01, 0.03, -0.02), strict=True)
+)
+RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.001\n1, 0.1, 0.09, 0.001\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "change", "message"),
+    [
+        (RIG.replace("mu", "wear_volume [m^3]"), {}, r"expected a column with one output of the study \(mu\)"),
+        (RIG.replace("velocity [m/s]", "voltage [m/s]"), {}, "unknown column 'voltage'"),
+        (RIG.replace(" [N]", ""), {}, "column normal_force: expected its unit"),
+        (RIG.replace("1, 0.1, 0.09, 0.001\n", ""), {}, "expected at least two measured points, got 1"),
+        (
+            RIG.replace("1, 0.1,", "1, 30,"),
+            {},
+            r"rig.csv:3: velocity of 30 m/s: this study has it from 0.001 m/s to 1 m/s",
+        ),
+        (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
+        (RIG, {"velocity": slice(3)}, "this study has it from"),
+        (
+            RIG.replace(", standard_error", "").replace(", 0.001", ""),
+            {},
+            "2 measured points without errors cannot tell 2",
+        ),
+    ],
+)
+def test_bad_input_is_one_sentence(text, change, message):
+    data = study().isel(change).assign_attrs(measured={"name": "rig.csv", "text": text})
+    with pytest.raises((DataError, FitError), match=message):
+        calibration({"": data})
+
+
+def test_a_study_without_a_table_half_filled_or_sampled_is_refused():
+    with pytest.raises(FitError, match=r"no table of measurements: give measured: \{table: rig.csv\}"):
+        calibration({"": study()})
+    table_ = {"name": "rig.csv", "text": RIG}
+    half = study().where(study()["relaxation_time"] < 1e-3).assign_attrs(measured=table_)
+    with pytest.raises(
+        FitError, match=r"mu: of the \d+ values that rig.csv is compared with, \d+ are not in the study"
+    ):
+        calibration({"": half})
+    sampled = study().stack(case=[*AXES]).reset_index("case").assign_attrs(measured=table_)
+    with pytest.raises(FitError, match="calibration needs a grid"):
+        calibration({"": sampled})
+
+
+def test_every_model_has_calibration_from_python_and_in_a_shell(toy, tmp_path, capsys):
+    """A study of a model of one's own, with the table of its campaign and another one, as JSON and as a figure."""
+    assert "calibration" in available("toy")
+    campaign = tmp_path / "rig.yaml"
+    campaign.write_text(TOY)
+    (tmp_path / "rig.csv").write_text(MADE)
+    url = str(tmp_path / "rig.zarr")
+    assert main(["run", str(campaign), "--store", url, "--quiet"]) == 0
+    capsys.readouterr()
+    assert main(["fit", url, "calibration", "--json", "-o", str(tmp_path / "figure.png")]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    assert (tmp_path / "figure.png").stat().st_size > 10_000
+    (tmp_path / "figure.csv").unlink()
+    (tmp_path / "figure.csv").write_text(MADE)
+    assert main(["fit", url, "calibration", "-o", str(tmp_path / "figure.png")]) == 2
+    assert (tmp_path / "figure.csv").read_text() == MADE
+    assert row["determined"] == "every unknown is determined"
+    assert row["slope_low"] < 2 < row["slope_high"]
+    again = mdr_dask.fit(url, "calibration", measured=pd.read_csv(tmp_path / "rig.csv"))
+    assert float(again["slope"]) == row["slope"]

@@ -30,5 +30,7 @@ def test_a_file_that_has_changed_is_refused(tmp_path):
 def test_a_file_in_another_encoding_is_refused_with_the_byte(tmp_path):
     path = tmp_path / "table.csv"
     path.write_bytes(b"x,z [\xb5m]\n")
-    with pytest.raises(DataError, match=r"expected text in UTF-8, got byte 0xb5 at 5"):
+    assert data_file(path).read_text() == "x,z [µm]\n"
+    path.write_bytes(b"x,z [\xcem]\n")
+    with pytest.raises(DataError, match=r"expected text in UTF-8, got byte 0xce at 5"):
         data_file(path).read_text()

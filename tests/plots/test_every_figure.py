@@ -14,11 +14,11 @@ import re
 import numpy as np
 import planted
 import pytest
-from drawn import LAST, check_picture, expected, mismatches
+from drawn import LAST, check_laws, check_picture, expected, mismatches
 
 from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.plots import available, curves, style
+from mdr_dask.plots import available, curves, page, style
 
 V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 11]}\n"
 FEW_V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 8]}\n"
@@ -249,11 +249,15 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         assert all(texts) or len(panels) > 1
         assert not any(re.search(r"\((m|m/s|N|Pa|s)\)", text) for text in texts), "units stand in [ ]"
     check_picture(figure)
+    check_laws(name, figure)
     table = figure.table()
     data = table[table["what"] == "data"]
     assert len(data), "nothing of the store is drawn"
     known = expected(name, groups)
     assert mismatches(data, known).empty
+    if name in OF_CASES:
+        axes = [{axis["name"] for axis in each.attrs["axes"]} for each in groups.values()]
+        assert data[sorted(set.intersection(*axes) - {*table.attrs["held"]})].notna().all(axis=None)
     told = style.left_out(figure)
     if len(groups) == 1 and not re.search("values of|series|cases|not known", told) and name not in PARTLY:
         assert mismatches(known, data).empty
@@ -267,6 +271,8 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         figure.savefig(io.BytesIO(), dpi=20)
 
 
+#: Figures with a point for each case, whose tables have all its parameters.
+OF_CASES = {"collapse", "indenter", "film_formula", "film_regimes", "regime_map", "jump_law", "relaxation_rate"}
 #: Figures of which a store may hold rows that they do not draw: of one moment, of one case, or as another quantity.
 PARTLY = {
     "collapse",
@@ -283,6 +289,40 @@ PARTLY = {
     "wear_development",
     "wear_growth",
 }
+
+
+@pytest.mark.parametrize(
+    ("shape", "name", "quantity", "unit", "column", "factor"),
+    [
+        ("force, velocity", "regions", "velocity", "km/h", "x", 3.6),
+        ("force, velocity", "force", "velocity", "mm/s", "x", 1e3),
+        ("jumps: velocity", "jump_velocities", "velocity", "mm/s", "x", 1e3),
+        ("rollers: operation", "stribeck", "rotation_speed", "rad/s", "x", np.pi / 30),
+        ("film: units", "film_profile", "pressure", "MPa", "y", 1e3),
+        ("wear: units", "wear_growth", "wear_volume", "mm^3", "y", 1e9),
+    ],
+)
+def test_named_figures_take_units(shape, name, quantity, unit, column, factor, stores):
+    plot = available(model_of(TABLE[shape][0]))[name]
+    usual = plot.figure(stores(shape)).table()
+    asked = page.Page(units={quantity: unit})
+    with page.drawing_for(asked):
+        figure = plot.figure(stores(shape))
+    assert quantity in asked.used
+    assert any(f"[{unit.replace('^3', '$^{3}$')}]" in axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes)
+    changed = figure.table()[column] / usual[column]
+    moved = np.isclose(changed, factor, rtol=1e-9) | (usual[column] == 0)
+    assert moved[usual["panel"] == 1].any()
+    assert np.all(moved | np.isclose(changed, 1.0) | usual[column].isna())
+
+
+def test_parameters_have_the_units_in_which_they_are_written(tmp_path):
+    text = planted.ROLLERS + "  normal_force: [0.2 kN, 0.8 kN]\n  temperature: 60 degC\n"
+    groups = planted.make(tmp_path, text + "  rotation_speed: {geometric: [1 rev/s, 100 rev/s, 4]}\n")
+    figure = available("mixed_lubrication")["stribeck"].figure(groups)
+    assert [axes.get_xlabel() for axes in figure.axes if axes.get_xlabel()] == ["rotation speed [rev/s]"]
+    assert figure.axes[0].get_legend().get_texts()[1].get_text() == "$F_N$ = 0.8 kN"
+    assert "temperature = 60 °C" in figure.get_suptitle()
 
 
 def test_bars_are_intervals_of_scatter_and_grid(stores):

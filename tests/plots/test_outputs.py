@@ -8,7 +8,7 @@ from drawn import check_picture, mismatches, rows, stored
 from matplotlib.colors import LogNorm
 
 from mdr_dask.errors import DataError
-from mdr_dask.plots import page, style
+from mdr_dask.plots import curves, page, style
 from mdr_dask.plots.outputs import View, of_output
 
 V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 6]}\n"
@@ -170,7 +170,7 @@ def test_units_size_and_style_of_the_page(stores, tmp_path):
     axes = figure.axes[0]
     assert axes.spines["left"].get_linewidth() == 3
     assert axes.get_xlabel() == "rotation speed [rad/s]"
-    assert "[percent]" in axes.get_ylabel()
+    assert "[%]" in axes.get_ylabel()
     np.testing.assert_allclose(axes.lines[0].get_xdata(), data["rotation_speed"])
     np.testing.assert_allclose(np.nanmax(axes.lines[0].get_ydata()) / 100, data["film_ratio"].max(), rtol=0.3)
     assert axes.get_legend_handles_labels()[1][0] == "$F_N$ = 200 N, temperature = 313.1 K"
@@ -218,3 +218,16 @@ def test_a_style_that_is_not_there_is_one_sentence():
         page.drawing_for(page.Page(), "nowhere.mplstyle"),
     ):
         pass
+
+
+@pytest.mark.parametrize(("best", "place", "said"), [([1.0, 2.0, 9.0, 3.0, 0.0], 2, "4 of 5"), (None, 2, "4 of 5")])
+def test_what_is_held_is_held_in_the_middle_or_where_the_best_is(best, place, said):
+    """Of two axes that are held together, one value each; NaN is no best."""
+    data = xr.Dataset({"y": (("a", "b"), np.arange(20.0).reshape(5, 4))}, {"a": np.arange(5.0), "b": np.arange(4.0)})
+    for shift in range(-1, 2) if best else (0,):
+        known = None if best is None else xr.DataArray(np.roll(best, shift), dims="a")
+        held, sentences = curves.hold(data, ["a", "b"], known)
+        assert (held["a"].item(), held["b"].item()) == (place + shift, 2)
+        assert [sentence.startswith(start) for sentence, start in zip(sentences, (said, "3 of 4"), strict=True)]
+    nowhere = xr.DataArray(np.full(5, np.nan), dims="a")
+    assert curves.hold(data, ["a"], nowhere)[0]["a"].item() == 2

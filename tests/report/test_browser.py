@@ -3,9 +3,10 @@
 import itertools
 import math
 import re
+import time
 
 import pytest
-from browser import Browser, program
+from browser import PATIENCE, Browser, program
 from report_stores import friction, hostile
 
 from mdr_dask import aggregation, store
@@ -62,15 +63,19 @@ def test_all_figures_are_drawn_without_a_complaint_or_a_request(opened, place):
 
 
 def test_hover_shows_the_numbers_of_the_store(opened, place):
-    opened.js("document.querySelector('[data-choose]').scrollIntoView()")
-    opened.until("document.querySelector('[data-choose] .points path')")
-    at = opened.js(
-        "(() => { const box = document.querySelector('[data-choose] .points path').getBoundingClientRect();"
-        " return [box.x + box.width / 2, box.y + box.height / 2]; })()"
-    )
-    opened.mouse(at[0] + 60, at[1])
-    opened.mouse(*at)
-    said = opened.until("document.querySelector('[data-choose] .hoverlayer .hovertext')?.textContent")
+    opened.js("document.querySelector('[data-choose]').scrollIntoView({ behavior: 'instant' })")
+    opened.until("!!document.querySelector('[data-choose] .points path')")
+    said, end = None, time.monotonic() + PATIENCE
+    while not said:  # figures above are drawn meanwhile, and move the point
+        assert time.monotonic() < end, "no hover"
+        x, y = opened.js(
+            "(() => { const box = document.querySelector('[data-choose] .points path').getBoundingClientRect();"
+            " return [box.x + box.width / 2, box.y + box.height / 2]; })()"
+        )
+        opened.mouse(x + 60, y)
+        opened.mouse(x, y)
+        time.sleep(0.2)
+        said = opened.js("document.querySelector('[data-choose] .hoverlayer .hovertext')?.textContent")
     (data,) = store.datasets(str(place / "small.zarr")).values()
     means = aggregation.mean(data["friction_coefficient"])
     shown = [float(number) for number in re.findall(r"friction: (\S+) \[", said)]
@@ -111,7 +116,7 @@ def test_the_keyboard_reaches_what_the_mouse_reaches(opened):
     opened.js(f"{VELOCITY}.host.querySelector('summary').focus()")
     opened.press("Enter", "\r")
     rows = opened.until(f"{VELOCITY}.host.querySelectorAll('tbody tr').length")
-    assert rows == opened.js(f"[...{VELOCITY}.rows()].length")
+    assert rows == min(500, opened.js(f"[...{VELOCITY}.rows()].length"))
 
 
 def test_everything_has_a_name_that_is_read_aloud(opened):

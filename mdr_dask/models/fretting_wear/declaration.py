@@ -107,6 +107,7 @@ class FrettingWear(Parameters):
 
     gone: ClassVar[Mapping[str, str]] = {
         "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
+        "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "method": "write wear_rule: exact, fast or limit; exact is the default",
         "tolerance": "write accuracy",
         "load": "write normal_force",
@@ -167,9 +168,6 @@ class FrettingWear(Parameters):
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
     wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
     history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load instead of `cycles`")] = ()
-    measured: NamedFile | None = Field(
-        default=None, description="table of cycles and volume, or of radius and height, for mdr-dask fit"
-    )
     extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 

@@ -13,7 +13,6 @@ from mdr_dask.models.base import (
     Block,
     Coordinate,
     Model,
-    NamedFile,
     Number,
     Output,
     Parameters,
@@ -60,6 +59,7 @@ class MixedLubrication(Parameters):
     gone: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
+        "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "load_share": "write asperity_load_share",
         "profile_1": "write surface_1: {profile: ...}",
         "profile_2": "write surface_2: {profile: ...}",
@@ -131,9 +131,6 @@ class MixedLubrication(Parameters):
         default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
     trace_points: int = quantity("1", "angles of contact_length_trace in a turn", default=3600, ge=2, le=10**6)
-    measured: NamedFile | None = Field(
-        default=None, description="table of measured contact probabilities, for the fit `breakthrough`"
-    )
 
     @model_validator(mode="before")
     @classmethod
@@ -278,13 +275,22 @@ def coordinates(parameters: MixedLubrication) -> dict[str, Coordinate]:
     }
 
 
+#: Parameters on which lines depend: cases that differ in others share theirs.
+OF_LINES = {
+    *("points", "hurst", "longest_wavelength", "shortest_wavelength", "cutoff_force", "surface_1", "surface_2"),
+    *("roller_radius", "roller_width", "contact_modulus"),
+}
+
+
 def seconds(block: Block[MixedLubrication]) -> float:
-    """Estimate the time of a block from points, cases, creep, drawn places and the solutions of the film."""
+    """Estimate the time of a block from its lines, points, cases, creep, drawn places and solutions of the film."""
     millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
     case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
     films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
-    return films + len(block.realisations) * float(0.06 * millions.max() + np.sum(millions * case))
+    keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
+    lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
+    return films + len(block.realisations) * float(0.06 * sum(lines.values()) + np.sum(millions * case))
 
 
 MODEL = Model(

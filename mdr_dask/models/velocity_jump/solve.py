@@ -26,8 +26,8 @@ from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.accuracy import Aim, Jumps, Problem, solve_jumps
-from mdr_dask.physics.transients.elements.follow import closed_line, indented_line
+from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, Jumps, solve_jumps
+from mdr_dask.physics.transients.elements.follow import closed_nodes, indented_nodes
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import Course
@@ -170,14 +170,14 @@ class _Marched(_Group):
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         course = Course(times, wavenumber, self.steps, self.block.accuracy or 0.0) if transient else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
-        aim = Aim(
+        aim = JumpAim(
             {LEVELS[name] for name in self.outputs},
             self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
             course,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
-        jumps = solve_jumps(Problem(RoughLine(waves), loads, deborah), aim)
+        jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), aim)
         return self._of(jumps, loads, which), loads.size
 
     def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -238,9 +238,9 @@ class _Followed(_Group):
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
         body = self.setting.body
         line = (
-            closed_line(heights, slopes)
+            closed_nodes(heights, slopes)
             if body is None
-            else indented_line(np.append(heights, heights[0]), np.append(slopes, slopes[0]), body)
+            else indented_nodes(np.append(heights, heights[0]), np.append(slopes, slopes[0]), body)
         )
         elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
         times = np.array(case.relaxation_times)

@@ -37,15 +37,18 @@ class Settings(NamedTuple):
     refinements: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128, 256, 512)  # of its cells, where they are touched
     quickest: float = 1e-4  # accuracy that needs more than going from node to node
     # from node to node, for every column: of the last change between grids, of the one before it over that, and of the
-    # largest relative change of any column but the depth (of the depth in rms heights)
+    # largest relative change of any column but the depth (of the depth in rms heights): the last one, that of the
+    # first two grids in slow sliding, however many nodes touch, and the one before
     of_change: tuple[float, ...] = (0.07, 0.2, 0.2, 0.2)
     of_change_before: float = 0.1
-    of_any_change: tuple[float, ...] = (0.02, 0.01, 0.2, 0.2)
-    averaged: float = 800.0  # nodes whose errors are an average: fewer of them are trusted less
+    of_any_change: tuple[float, ...] = (0.04, 0.01, 0.2, 0.2)
+    of_any_first: tuple[float, ...] = (0.4, 0.02, 0.5, 0.3)
+    of_any_before: tuple[float, ...] = (0.01, 0.001, 0.1, 0.1)
+    averaged: float = 300.0  # nodes whose errors are an average: fewer of them are trusted less
     by_chance: float = 0.3  # over the nodes in contact: what agrees on the first two grids by chance
     few: int = 5  # nodes in contact that are too few to go from node to node
     # of the profile between nodes, under the lightest contacts: relative errors, and of the depth in rms heights
-    profile: tuple[float, ...] = (5e-5, 1e-6, 5e-5, 5e-5)
+    profile: tuple[float, ...] = (5e-5, 8e-6, 5e-5, 5e-5)
     lightest: float = 0.1  # Nyquist points in contact for which that is twice as large
     hope: int = 4  # refinement from which on a grid without a solution ends the way from node to node
     roughly: float = 0.5  # of the accuracy, that the search for the depth may leave on the second grid
@@ -179,8 +182,9 @@ class Ladder:
                 grids, trusted = (coarse, fine), settings.trusted * accuracy
                 coarse, fine = fine, vectorised.settle(line, refinement, *cases, grids, trusted)
             found, change = fine.steady(), _changes(coarse, fine)
-            touched = fine.contact_fraction * self.line.points
-            errors_now = _sampled_errors(found, touched, settings.sampled * refinement, change, before)
+            cells = self.line.points * settings.sampled * refinement
+            seen = Seen(fine.contact_fraction * self.line.points, cases[0] * cells)
+            errors_now = _sampled_errors(found, seen, settings.sampled * refinement, change, before)
             known = Errors(*(errors_now + np.where(np.isnan(fine.doubts), 0.0, fine.doubts)))
             steady, errors = steady.replaced(left, found), errors.replaced(left, known)
             still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
@@ -245,25 +249,37 @@ def _column(factors: tuple[float, ...]) -> FloatArray:
     return np.array(factors)[:, None]
 
 
+class Seen(NamedTuple):
+    """What a grid sees of cases: the Nyquist points in contact, and the Deborah number v tau in cells."""
+
+    touched: FloatArray
+    deborah: FloatArray
+
+
 def _sampled_errors(
-    steady: Steady, touched: FloatArray, oversampling: int, change: FloatArray, before: FloatArray
+    steady: Steady, seen: Seen, oversampling: int, change: FloatArray, before: FloatArray
 ) -> FloatArray:
     """Return the errors of the finer of two grids from the changes of the columns, infinite if too few nodes touch.
 
     Two grids may agree by chance: hardly in all columns, hardly twice, and hardly where many nodes touch, or for the
-    contact where many do not. `touched` is how many Nyquist points are in contact.
+    contact where many do not. Where the first two agree it tells the less the slower the sliding: an element averages
+    over the cells in which it recovers, but the contact fraction does not.
     """
-    settings = SETTINGS
+    settings, is_first = SETTINGS, oversampling == SETTINGS.sampled
     of_change, of_any, profile = map(_column, (settings.of_change, settings.of_any_change, settings.profile))
+    touched, slow = seen.touched, 1 / np.sqrt(1 + seen.deborah)
+    of_first = _column(settings.of_any_first) * np.array([slow, slow, np.ones(slow.size), slow])
     sizes = np.array([steady.drag, np.ones(steady.drag.size), steady.contact_fraction, steady.contact_slope])
     touching = touched * oversampling
     with np.errstate(all="ignore"):
         apart = np.clip(touching * (1 / steady.contact_fraction - 1), settings.few, touching)
         nodes = np.array([touching, touching, apart, apart])
-        any_change = np.max((change / sizes)[[0, 2, 3]], axis=0)
+        any_change, any_before = (np.max((each / sizes)[[0, 2, 3]], axis=0) for each in (change, before))
         errors = np.maximum(of_change * change, of_change * settings.of_change_before * before)
         errors = np.maximum(errors, of_any * any_change * sizes) * (1 + np.sqrt(settings.averaged / nodes))
-        if oversampling == settings.sampled:
+        other = of_first * any_change if is_first else _column(settings.of_any_before) * any_before
+        errors = np.maximum(errors, other * sizes)
+        if is_first:
             errors[[0, 2, 3]] = np.maximum(errors, settings.by_chance / nodes * sizes)[[0, 2, 3]]
         errors += profile * (1 + settings.lightest / touched) * sizes
     return np.where((touching > settings.few) & np.isfinite(errors), errors, np.inf)

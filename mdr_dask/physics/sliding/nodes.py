@@ -206,7 +206,7 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
         height[place + 1], slope[place + 1] = value, rate / refinement
 
 
-def summit(line: Nodes) -> float:
+def summit_rise(line: Nodes) -> float:
     """Return how high over the first node the line reaches in the cell before it."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))

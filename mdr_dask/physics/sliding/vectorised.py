@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, IN_A_TILE, Nodes, nodes, summit, weights
+from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, IN_A_TILE, Nodes, nodes, summit_rise, weights
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
@@ -202,7 +202,7 @@ def begin(
     coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True)
-    return line, coarse, _settled(line, summit(line), 1, cases, coarse.depth, rates, trusted)
+    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, rates, trusted)
 
 
 def settle(
@@ -230,7 +230,7 @@ def settle(
     """
     coarse, fine = grids
     ahead = SETTINGS.ahead * (fine.depth - coarse.depth)
-    rise = summit(line)
+    rise = summit_rise(line)
     top = line.top + rise
     depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
     return _settled(line, rise, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
-from mdr_dask.physics.transients.ends import Ends, Line, ends_on
+from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
 from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jumps
 
 
@@ -57,7 +57,7 @@ class Settings(NamedTuple):
 SETTINGS = Settings()
 
 
-class Problem(NamedTuple):
+class JumpProblem(NamedTuple):
     """Jumps on one line without dimensions.
 
     Parameters
@@ -73,16 +73,16 @@ class Problem(NamedTuple):
     loads: FloatArray
     deborah: FloatArray
 
-    def only(self, cases: NDArray[np.int64]) -> Problem:
+    def only(self, cases: NDArray[np.int64]) -> JumpProblem:
         """Return some of the cases."""
         return self._replace(loads=self.loads[cases], deborah=self.deborah[cases])
 
-    def on(self, oversampling: int) -> Line:
+    def on(self, oversampling: int) -> PreparedLine:
         """Return the line with so many nodes for every Nyquist point."""
-        return Line.of(self.line.cubic(self.line.points * oversampling))
+        return PreparedLine.of(self.line.cubic(self.line.points * oversampling))
 
 
-class Aim(NamedTuple):
+class JumpAim(NamedTuple):
     """What is wanted of the jumps of a line.
 
     Parameters
@@ -144,7 +144,7 @@ class Jumps(NamedTuple):
     outcome: NDArray[np.int8]
 
 
-def solve_jumps(problem: Problem, aim: Aim) -> Jumps:
+def solve_jumps(problem: JumpProblem, aim: JumpAim) -> Jumps:
     """Return the jumps of a line: their levels to an accuracy, the transient on the grid given."""
     whole, near = problem.on(aim.oversampling), None
     if aim.accuracy is not None:
@@ -191,7 +191,7 @@ def _changes(jump: Jump, path: FloatArray, grids: tuple[Ends, Ends], k: int, tim
     return found
 
 
-def _refined(problem: Problem, aim: Aim, coarse: Ends, fine: Ends) -> tuple[Levels, Levels]:
+def _refined(problem: JumpProblem, aim: JumpAim, coarse: Ends, fine: Ends) -> tuple[Levels, Levels]:
     """Return the levels on the coarsest grid on which all that are wanted meet the accuracy, and their errors."""
     points, oversampling, allowed = problem.line.points, aim.oversampling, aim.accuracy or 0.0
     levels, change = np.stack(Levels.of(fine)), _change(coarse, fine)

@@ -11,7 +11,7 @@ from mdr_dask.physics.compiling import compiled, inlined
 from mdr_dask.physics.sliding.kelvin import BLOCK
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
-    Moment,
+    Instant,
     Wakes,
     foreseen,
     left_before,
@@ -87,7 +87,7 @@ def _remember(place: float, places: FloatArray, known: int) -> int:
 
 
 @inlined
-def _leaving(now: Moment, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
+def _leaving(now: Instant, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
     """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones.
 
     At `until` the force vanishes, or the part ends.
@@ -102,12 +102,12 @@ def _leaving(now: Moment, depth: float, low: float, until: float, next_free: flo
 
 
 @compiled
-def touch(now: Moment, reachable: Reachable, work: Workspace) -> int:
+def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
 
     Parameters
     ----------
-    now : Moment
+    now : Instant
     reachable : Reachable
         Its stretches must hold the patches at the depth.
     work : Workspace

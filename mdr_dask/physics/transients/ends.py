@@ -35,7 +35,7 @@ NEWTON_STEPS = 60
 EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, and what it may miss
 
 
-class Line(NamedTuple):
+class PreparedLine(NamedTuple):
     """One periodic line as the sweep takes it and as the march does, with the barriers of some Deborah numbers."""
 
     cells: Cells
@@ -44,7 +44,7 @@ class Line(NamedTuple):
     known: dict[float, Barriers]
 
     @classmethod
-    def of(cls, line: CubicLine) -> Line:
+    def of(cls, line: CubicLine) -> PreparedLine:
         """Prepare a line."""
         cells = cut(line)
         return cls(cells, blocks_of(cells), track_of(cells), {})
@@ -107,7 +107,7 @@ class Ends(NamedTuple):
         return Ends(*columns)
 
 
-def ends_on(line: Line, loads: FloatArray, deborah: FloatArray, near: Ends | None = None) -> Ends:
+def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: Ends | None = None) -> Ends:
     """Solve the ends of jumps on one line.
 
     At the instant of a jump displacements and depth do not change, but the rate of the depth does, and elements whose
@@ -115,8 +115,8 @@ def ends_on(line: Line, loads: FloatArray, deborah: FloatArray, near: Ends | Non
 
     Parameters
     ----------
-    line : Line
-        From :meth:`Line.of`.
+    line : PreparedLine
+        From :meth:`PreparedLine.of`.
     loads : array, shape (cases,)
         F_N / (4 G L), in the unit of height.
     deborah : array, shape (cases, 2)

@@ -26,7 +26,7 @@ FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that i
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
-class Moment(NamedTuple):
+class Instant(NamedTuple):
     """A moment after the jump: the line, the state before the jump, the depths so far, time, and Deborah number.
 
     `left` is the part exp(-time) that is left of a displacement at the jump.
@@ -85,7 +85,7 @@ def _follows(history: History, t: float) -> float:
 
 
 @inlined
-def _left_from(now: Moment, x: float, place: float) -> tuple[float, float, float]:
+def _left_from(now: Instant, x: float, place: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place`, its slope along x, and the derivative by depth.
 
     The leaving point of that element is where its load vanished then, not where it vanishes now; a few Newton steps
@@ -115,7 +115,7 @@ def _left_from(now: Moment, x: float, place: float) -> tuple[float, float, float
 
 
 @inlined
-def left_before(now: Moment, x: float) -> tuple[float, float]:
+def left_before(now: Instant, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
     track, first = now.track, now.first
     s = x - now.deborah * now.time
@@ -129,7 +129,7 @@ def left_before(now: Moment, x: float) -> tuple[float, float]:
 
 
 @inlined
-def wake_at(now: Moment, wakes: Wakes, x: float) -> tuple[float, float, float]:
+def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
@@ -175,7 +175,7 @@ def foreseen(
 
 
 @inlined
-def meeting(now: Moment, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
+def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
     """Return where the line rises through the wake, the slopes of their gap by place and depth."""
     depth = now.history.depth[now.history.count - 1]
     slope, gain = 1.0, 0.0
@@ -198,7 +198,7 @@ def meeting(now: Moment, wakes: Wakes, low: float, high: float, x: float) -> tup
 
 
 @inlined
-def losing(now: Moment, depth: float, low: float, high: float) -> float:
+def losing(now: Instant, depth: float, low: float, high: float) -> float:
     """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
     while high - low > 1e-12:
         x = 0.5 * (low + high)
@@ -212,7 +212,7 @@ def losing(now: Moment, depth: float, low: float, high: float) -> float:
 
 
 @inlined
-def write_spreads(now: Moment, window: float, spreads: FloatArray) -> None:
+def write_spreads(now: Instant, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
     history = now.history
     last = history.count - 1
@@ -237,7 +237,7 @@ def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
 
 
 @inlined
-def worth_keeping(now: Moment, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
+def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0
     for k in range(wakes.count):
@@ -252,7 +252,7 @@ def worth_keeping(now: Moment, wakes: Wakes, x: float, pressed: float, spreads: 
 
 
 @inlined
-def next_free_place(now: Moment, x: float) -> float:
+def next_free_place(now: Instant, x: float) -> float:
     """Return the first place from x on whose element was free at the jump."""
     track, first = now.track, now.first
     travel = now.deborah * now.time

@@ -11,7 +11,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
-from mdr_dask.physics.transients.free_flight import Moment
+from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.patches import DRAG, DRAG_STIFFNESS, LOAD, STIFFNESS, History, Patches, Track
 
 TRIALS = 80
@@ -21,7 +21,7 @@ SETTLED = 2.5  # times the time since when a march has been near its end: where 
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits it was prepared for
 
 
-class Pace(NamedTuple):
+class Stepping(NamedTuple):
     """How the steps of a march go.
 
     Parameters
@@ -45,7 +45,7 @@ class Pace(NamedTuple):
     until: float
 
 
-class Aim(NamedTuple):
+class Finish(NamedTuple):
     """Where a march ends: final depth and drag, and how near to both, the drag as a part of its largest distance."""
 
     depth: float
@@ -104,7 +104,7 @@ def _balance(
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
-    moment = Moment(
+    moment = Instant(
         marching.track, marching.first, history, history.time[now], marching.deborah, np.exp(-history.time[now])
     )
     low, high = marching.low, marching.high
@@ -143,7 +143,7 @@ def _weights(found: Trajectory, now: int) -> tuple[float, float]:
 
 
 @njit(nogil=True, cache=True)
-def march(marching: Marching, pace: Pace, aim: Aim, found: Trajectory, work: Workspace) -> tuple[int, int]:
+def march(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three.
 
     Parameters

@@ -15,8 +15,8 @@ from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
-from mdr_dask.physics.transients.ends import Ends, Line, ends_on
-from mdr_dask.physics.transients.march import LEFT_LIMITS, Aim, Marching, Pace, Trajectory, march, retrace
+from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
+from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
 
@@ -122,7 +122,7 @@ class Jump(NamedTuple):
         return int(self.path.shape[1])
 
 
-def pace_after(course: Course, deborah: float, change: float, load: float) -> Pace:
+def pace_after(course: Course, deborah: float, change: float, load: float) -> Stepping:
     """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio.
 
     Parameters
@@ -138,7 +138,7 @@ def pace_after(course: Course, deborah: float, change: float, load: float) -> Pa
     scale = max(abs(change), SETTINGS.negligible * load)
     close = SETTINGS.newton * min(1.0, (8 / course.per_decade) ** 2)
     last = float(course.times[-1])
-    return Pace(first, 10 ** (1 / course.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
+    return Stepping(first, 10 ** (1 / course.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
 
 
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], course: Course) -> Jump:
@@ -157,12 +157,12 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], co
         v_1 tau / L and v_2 tau / L.
     course : Course
     """
-    prepared, loads, numbers = Line.of(line), np.array([load]), np.array([deborah])
+    prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
     return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), course)[0]
 
 
 def velocity_jumps(
-    line: Line,
+    line: PreparedLine,
     loads: FloatArray,
     deborah: FloatArray,
     ends: Ends,
@@ -188,7 +188,9 @@ def velocity_jumps(
     return jumps
 
 
-def retraced(line: Line, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump]) -> list[FloatArray]:
+def retraced(
+    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump]
+) -> list[FloatArray]:
     """Return the paths of jumps on another grid at every second of their moments, with NaN where none is found.
 
     Parameters
@@ -217,7 +219,7 @@ def _failed(times: FloatArray, outcome: Outcome) -> Jump:
 class _Relaxation(NamedTuple):
     """One case between its ends, in units of cells; depths from the highest point of the line."""
 
-    line: Line
+    line: PreparedLine
     load: float
     deborah: FloatArray
     before: float
@@ -229,10 +231,12 @@ class _Relaxation(NamedTuple):
     first: Patches
     is_full: bool
     course: Course
-    pace: Pace
+    pace: Stepping
 
     @classmethod
-    def of(cls, line: Line, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course) -> _Relaxation:
+    def of(
+        cls, line: PreparedLine, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course
+    ) -> _Relaxation:
         """Take the k-th case of some ends."""
         n, depth = line.track.cells, ends.depth[k]
         return cls(
@@ -302,7 +306,7 @@ class _Relaxation(NamedTuple):
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
         close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
         marching, found, work = self.begun(limits, SETTINGS.moments)
-        count, outcome = march(marching, self.pace, Aim(self.depth[1], self.after, close, settled), found, work)
+        count, outcome = march(marching, self.pace, Finish(self.depth[1], self.after, close, settled), found, work)
         if outcome == LEFT_LIMITS:
             return None
         time, depth, _, drag = (column[:count] for column in found)

@@ -35,7 +35,7 @@ def draw_effects(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, li
     names = names[:MOST_EFFECTS]
     figure, axes_of = drawing.panels(len(names), size=(3.6, 3.2), sharey=True)
     how = style.quantity(view.output, data[view.output])
-    cases = aggregation.mean(data[view.output]) * how.factor + how.offset
+    cases = how.of(aggregation.mean(data[view.output]))
     if cases.size > MOST_POINTS:
         told.append(f"the {cases.size} cases themselves")
     for axes, name in zip(axes_of, names, strict=True):
@@ -44,7 +44,7 @@ def draw_effects(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, li
             x = places(data, name).broadcast_like(cases).transpose(*cases.dims)
             drawing.plain(axes, x, cases, ".", label="a case", ms=3, color="0.7", zorder=1)
         across, mean = _bins(data, view.output, name, dim) if is_sampled(data, dim) else _means(data, view, name)
-        shown = drawing.Mean(*(each * how.factor + how.offset for each in mean))
+        shown = drawing.Mean(*map(how.of, mean))
         joined = drawing.Curve(data, "mean, 95 % interval", style.COLOURS[0], "-", "o")
         drawing.curve(axes, joined, across, shown, bars=True)
         scale(axes, "x", name, data[name], view)

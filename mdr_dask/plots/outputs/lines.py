@@ -147,7 +147,7 @@ def _draw_law(axes: Axes, curve: drawing.Curve, law: laws.Law, view: View) -> No
     """Draw the law of an output for one curve."""
     fine = laws.along(curve.data, view.over[0])
     how = style.quantity(view.output, curve.data[view.output])
-    course = law.value(fine) * how.factor + how.offset
+    course = how.of(law.value(fine))
     x = places(fine, view.over[0])
     drawing.law(axes, x, course, "--", name=law.name, of=curve.data, lw=0.8, color=curve.colour)
 

@@ -115,7 +115,7 @@ def _unfit(data: xr.Dataset, view: View) -> str:
 def value(data: xr.Dataset, output: str) -> drawing.Mean:
     """Return the mean of an output over the realisations with its interval, in the unit shown."""
     how = style.quantity(output, data[output])
-    return drawing.Mean(*(each * how.factor + how.offset for each in curves.measured(data, output)))
+    return drawing.Mean(*map(how.of, curves.measured(data, output)))
 
 
 #: Steps of a thousand for which a unit has a prefix that everybody reads, and what is written with them.

@@ -81,7 +81,7 @@
           this.draw();
         };
         const box = element("input", { type: "checkbox", checked: !this.state.hidden.has(key), onchange: change, "data-field": `curve ${key}` });
-        return element("label", {}, box, swatch(trace), report.labelled(trace.curve || report.escaped(key)));
+        return element("label", {}, box, swatch(trace), element("span", {}, report.labelled(trace.curve || report.escaped(key))));
       });
       return element("fieldset", { class: "controls curves" }, element("legend", {}, "Curves"), ...boxes);
     }
@@ -265,11 +265,13 @@
     for (const figure of figures) {
       figure.host.querySelector(".curves")?.replaceWith(figure.curves());
       figure.come();
+      for (const plot of figure.plots) Plotly.relayout(plot, figure.plots.length > 1 ? { width: 330, height: 260 } : { width: 660, height: 380 });
     }
   });
   addEventListener("afterprint", () => {
     report.printing = false;
     redraw();
+    for (const plot of figures.flatMap((figure) => figure.plots)) Plotly.relayout(plot, { autosize: true, width: null, height: null });
   });
 
   // Follow a run: how far it has come every second, and the page anew whenever it was made anew.

@@ -8,8 +8,8 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
-from mdr_dask.physics.transients.ends import Line
-from mdr_dask.physics.transients.free_flight import Moment
+from mdr_dask.physics.transients.ends import PreparedLine
+from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.patches import History, barriers_for
 
 POINTS = 200
@@ -23,13 +23,13 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
     """On coarse grids contact comes and goes inside of single cells, which both must see."""
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(7, 1, POINTS // 2)
     nodes = POINTS * oversampling
-    line = Line.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
+    line = PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
     for depth in (0.01, 0.1, 0.5, 2.0, 6.0):
         first, barriers = line.patches(0.5 * depth, 2 * deborah, np.empty(SUMS)), line.barriers(deborah)
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
         everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf))
         work = workspace_for(nodes, barriers)
-        found = touch(Moment(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
+        found = touch(Instant(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
         sums = np.empty(SUMS)
         start, end = patches_at(line.cells, line.blocks, *barriers_for(line.track), deborah, depth, sums)
         assert found == start.size

@@ -10,13 +10,14 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.transients.elements.edges import Line
 from mdr_dask.physics.transients.elements.follow import (
     Response,
-    closed_line,
+    closed_nodes,
     follow_line,
-    indented_line,
+    indented_nodes,
     steady_start,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
+from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
 POINTS = 50
@@ -35,7 +36,7 @@ def rough(oversampling: int = 8) -> tuple[np.ndarray, np.ndarray]:
 
 def bowl(nodes: int, coefficient: float = 10.0) -> Line:
     """Return a smooth parabola."""
-    return indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, 2.0))
+    return indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, 2.0))
 
 
 def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
@@ -51,7 +52,9 @@ def jump(
     assert status == Outcome.CONVERGED
     moments = moments_to(last, reaches[1], line.height.size - 1, cells)
     one = np.ones(moments.size)
-    found = follow_line(line, solid, moments, moments * reaches[1], reaches[1] * one, load * one, state, depth)
+    found = follow_line(
+        line, solid, Schedule(moments, moments * reaches[1], reaches[1] * one, load * one), state, depth
+    )
     assert found.status == Outcome.CONVERGED
     return moments, found
 
@@ -65,7 +68,7 @@ def missing(found: Response) -> float:
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
 @pytest.mark.parametrize("indenter", [False, True])
 def test_work_is_stored_or_lost(solid: Foundation, indenter: bool) -> None:
-    line = bowl(400) if indenter else closed_line(*rough())
+    line = bowl(400) if indenter else closed_nodes(*rough())
     _, found = jump(line, solid, (0.05, 0.08), 0.1, 1.0)
     assert missing(found) < BALANCE
 
@@ -74,7 +77,7 @@ def test_work_is_that_of_drag_and_load() -> None:
     """The work on the elements is F_x v + F_N d_dot, of the forces at the moments, at second order."""
     errors = []
     for oversampling in (8, 32):
-        moments, found = jump(closed_line(*rough(oversampling)), KELVIN, (0.05, 0.06), 0.3, 2.0)
+        moments, found = jump(closed_nodes(*rough(oversampling)), KELVIN, (0.05, 0.06), 0.3, 2.0)
         power = 0.06 * found.drag + 0.3 * found.rate
         errors.append(abs(np.trapezoid(power, moments) / found.work[-1] - 1))
     assert errors[1] < 3e-4
@@ -89,8 +92,8 @@ def at_times(line: Line, solid: Foundation, reaches: tuple[float, float], cells:
 
 @pytest.mark.parametrize("solid", [STANDARD, SERIES])
 def test_second_order_in_the_grid(solid: Foundation) -> None:
-    exact = at_times(closed_line(*rough(40)), solid, (0.1, 0.12))
-    found = [np.max(np.abs(at_times(closed_line(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
+    exact = at_times(closed_nodes(*rough(40)), solid, (0.1, 0.12))
+    found = [np.max(np.abs(at_times(closed_nodes(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
     assert found[1] < 5e-4
     assert found[1] < found[0] / 3**SECOND
 
@@ -101,7 +104,7 @@ def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     reaches = 0.1, 0.1 * (1 + change)
     march = velocity_jump(periodic_line(*rough(64)), 0.3, reaches, Course(TIMES, np.pi * POINTS, 96))
     exact = np.append(march.at, march.trace)
-    found = [np.abs(at_times(closed_line(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
+    found = [np.abs(at_times(closed_nodes(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
     assert found[1][0] < 2e-4
     assert found[1].max() < 2e-4
     assert found[1].max() < found[0].max() / 4**SECOND
@@ -109,7 +112,7 @@ def test_second_order_in_the_grid_against_the_march(change: float) -> None:
 
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
 def test_second_order_in_the_step(solid: Foundation) -> None:
-    line = closed_line(*rough(8))
+    line = closed_nodes(*rough(8))
     exact = at_times(line, solid, (0.1, 0.12), 1 / 16)
     found = [np.max(np.abs(at_times(line, solid, (0.1, 0.12), cells) / exact - 1)) for cells in (2.0, 0.5)]
     assert found[1] < (5e-5 if solid is KELVIN else 1e-3)
@@ -118,11 +121,11 @@ def test_second_order_in_the_step(solid: Foundation) -> None:
 
 def test_every_course_keeps_the_balance() -> None:
     """Reversal, rest and changing load."""
-    line = closed_line(*rough())
+    line = closed_nodes(*rough())
     state, depth, _ = steady_start(line, STANDARD, 0.0, 0.2)
     moments = np.linspace(0, 4, 4001)
     speed, load = 0.1 * np.sin(2 * moments), 0.2 + 0.1 * np.sin(3 * moments)
-    found = follow_line(line, STANDARD, moments, 0.05 * (1 - np.cos(2 * moments)), speed, load, state, depth)
+    found = follow_line(line, STANDARD, Schedule(moments, 0.05 * (1 - np.cos(2 * moments)), speed, load), state, depth)
     assert found.status == Outcome.CONVERGED
     assert missing(found) < BALANCE
     assert np.all(np.diff(found.lost) > -1e-15)
@@ -131,7 +134,7 @@ def test_every_course_keeps_the_balance() -> None:
 @pytest.mark.parametrize(("solid", "last"), [(STANDARD, 25.0), (SERIES, 40.0)])
 def test_ends_in_the_direct_steady_state(solid: Foundation, last: float) -> None:
     height, slope = rough()
-    _, found = jump(closed_line(height, slope), solid, (0.1, 0.12), 0.3, last)
+    _, found = jump(closed_nodes(height, slope), solid, (0.1, 0.12), 0.3, last)
     body = rheology.prony(1.0, solid.moduli, solid.times, solid.viscosity)
     steady = material_on_line(height, 1 / height.size, body, 0.12, 4 * 0.3)
     # second order in eight nodes for the shortest half wavelength
@@ -143,7 +146,7 @@ def test_kelvin_ends_in_the_direct_steady_state_at_second_order() -> None:
     errors = []
     for oversampling in (8, 32):
         height, slope = rough(oversampling)
-        _, found = jump(closed_line(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
+        _, found = jump(closed_nodes(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
         steady = on_line(height, slope, np.array([0.12]), np.array([0.3]))
         errors.append(abs(found.drag[-1] / steady.drag[0] - 1))
     assert errors[0] < 6e-3
@@ -164,7 +167,7 @@ def test_fast_arm_is_a_dashpot() -> None:
 
 def test_limits_of_a_general_body() -> None:
     """An arm of no stiffness beside the dashpot is the Kelvin body; two arms of one time are one arm."""
-    line = closed_line(*rough(4))
+    line = closed_nodes(*rough(4))
     pairs = [
         (KELVIN, foundation([1e-10], [0.3], 1.0)),
         (STANDARD, foundation([1.0, 2.0], [0.25, 0.25 * (1 + 1e-9)], 0.0)),
@@ -179,7 +182,7 @@ def test_full_contact_is_exact(solid: Foundation) -> None:
     """One wave in full contact: the stretch of an arm is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
     nodes, k, before, after = 1000, 2 * np.pi, 0.05, 0.08
     x = np.arange(nodes) / nodes
-    moments, found = jump(closed_line(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
+    moments, found = jump(closed_nodes(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
     exact = 0.5 * solid.viscosity * after * k * k * np.ones(moments.size)
     for modulus, tau in zip(solid.moduli, solid.times, strict=True):
         first, last = (1j * k * reach / (1j * k * reach + 1 / tau) for reach in (before, after))
@@ -195,7 +198,9 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
     state, depth, status = steady_start(line, KELVIN, 0.05, 0.05)
     moments = np.linspace(0, 20, 2001)
     one = np.ones(moments.size)
-    found = follow_line(line, KELVIN, moments, 0.05 * moments, 0.05 * one, 0.05 * np.exp(moments), state, depth)
+    found = follow_line(
+        line, KELVIN, Schedule(moments, 0.05 * moments, 0.05 * one, 0.05 * np.exp(moments)), state, depth
+    )
     assert (status, found.status) == (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
 
 
@@ -204,7 +209,7 @@ def test_rest_is_static() -> None:
     line = bowl(400)
     state, depth, _ = steady_start(line, STANDARD, 0.0, 0.05)
     moments = np.linspace(0, 1, 11)
-    found = follow_line(line, STANDARD, moments, 0 * moments, 0 * moments, 0.05 + 0 * moments, state, depth)
+    found = follow_line(line, STANDARD, Schedule(moments, 0 * moments, 0 * moments, 0.05 + 0 * moments), state, depth)
     assert np.allclose(found.depth, found.depth[0], rtol=1e-12)
     assert np.max(np.abs(found.drag)) < 1e-10
     exact = 10 * (3 * 0.05 / (4 * 10)) ** (2 / 3)  # F / (4 G) = (4 / 3) c a^3

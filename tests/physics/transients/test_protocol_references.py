@@ -12,12 +12,13 @@ from mdr_dask.physics.surfaces.shapes import PowerLaw
 from mdr_dask.physics.transients.elements.edges import Line
 from mdr_dask.physics.transients.elements.follow import (
     Response,
-    closed_line,
+    closed_nodes,
     follow_line,
-    indented_line,
+    indented_nodes,
     steady_start,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
+from mdr_dask.physics.transients.elements.steps import Schedule
 
 Array = np.ndarray
 STANDARD = foundation([3.0], [0.25], 0.0)
@@ -48,7 +49,7 @@ def followed(line: Line, solid: Foundation, before: float, cells: float = 0.5) -
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
     moments = np.concatenate([grown, np.linspace(grown[-1], LAST, int((LAST - grown[-1]) / step) + 2), TIMES])
     moments = np.unique(moments)
-    found = follow_line(line, solid, moments, travel(moments), reach(moments), load(moments), state, depth)
+    found = follow_line(line, solid, Schedule(moments, travel(moments), reach(moments), load(moments)), state, depth)
     assert found.status == Outcome.CONVERGED
     return moments, found
 
@@ -106,7 +107,7 @@ def test_arms_under_a_wave_in_partial_contact(solid: Foundation) -> None:
     errors = []
     for nodes in (100, 400):
         x = np.arange(nodes) / nodes
-        moments, found = followed(closed_line(np.cos(k * x), -k * np.sin(k * x)), solid, 0.0)
+        moments, found = followed(closed_nodes(np.cos(k * x), -k * np.sin(k * x)), solid, 0.0)
         assert found.contact.max() < 0.5
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) - drag)) / np.max(np.abs(drag)))
         off = np.max(np.abs(np.interp(TIMES, moments, found.depth) - depth))
@@ -123,7 +124,7 @@ def test_arms_under_indenters(coefficient: float, exponent: float) -> None:
     drag, depth = at_rest_then_slide(STANDARD, 2000, height, 1.25)
     errors = []
     for nodes in (200, 800):
-        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
+        line = indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
         moments, found = followed(line, STANDARD, 0.0)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) - drag)) / np.max(np.abs(drag)))
         off = np.max(np.abs(np.interp(TIMES, moments, found.depth) / depth - 1))
@@ -170,7 +171,7 @@ def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
     instant = forces(start, rate_of(start, reach(0.0), LOAD), reach(0.0))[1]
     errors, first = [], []
     for nodes in (200, 800):
-        line = indented_line(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
+        line = indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
         moments, found = followed(line, KELVIN, 0.05)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) / np.array(drag) - 1)))
         first.append(abs(found.drag[0] / instant - 1))

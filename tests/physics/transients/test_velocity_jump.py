@@ -7,8 +7,9 @@ from scipy.optimize import brentq
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.follow import follow
-from mdr_dask.physics.transients.ends import Line, ends_on
+from mdr_dask.physics.transients.elements.follow import follow_kelvin
+from mdr_dask.physics.transients.elements.steps import Schedule
+from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jump, velocity_jumps
 
 POINTS, OVERSAMPLING = 100, 8
@@ -76,19 +77,18 @@ def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np
     u = np.maximum(first.depth[0] + height, 0.0)
     u *= LOAD / u.mean()
     same = np.full(run_in.size, LOAD)
-    state = follow(height, slope, run_in, run_in * REACH, np.full(run_in.size, REACH), same, u, float(first.depth[0]))
+    state = follow_kelvin(
+        height, slope, Schedule(run_in, run_in * REACH, np.full(run_in.size, REACH), same), u, float(first.depth[0])
+    )
     reach = REACH * (1 + change)
     start = np.geomspace(1e-4, 1, 30) * step
     moments = np.concatenate([[0.0], np.cumsum(start)])
     moments = np.concatenate([moments, np.arange(moments[-1] + step, last, step)])
     travels = run_in[-1] * REACH + moments * reach
-    after = follow(
+    after = follow_kelvin(
         height,
         slope,
-        moments,
-        travels,
-        np.full(moments.size, reach),
-        np.full(moments.size, LOAD),
+        Schedule(moments, travels, np.full(moments.size, reach), np.full(moments.size, LOAD)),
         state.displacement,
         float(state.depth[-1]),
     )
@@ -125,7 +125,9 @@ def test_jump_condition_against_ever_finer_steps() -> None:
         u = np.roll(u, int(np.argmax(fine_height)))
         reach = 1.2 * REACH
         one = np.ones(1)
-        state = follow(fine_height, fine_slope, 0 * one, 0 * one, reach * one, LOAD * one, u, float(steady.depth[0]))
+        state = follow_kelvin(
+            fine_height, fine_slope, Schedule(0 * one, 0 * one, reach * one, LOAD * one), u, float(steady.depth[0])
+        )
         errors.append(abs(state.drag[0] / found.at - 1))
     assert errors[1] < 0.5 * errors[0]
     assert errors[1] < 1e-4
@@ -233,7 +235,7 @@ def test_transient_within_the_accuracy_is_not_computed() -> None:
 def test_a_path_is_retraced_at_every_second_moment(reach: float) -> None:
     """On the grid of the march itself the difference is that of the steps; on a coarser one that of the nodes, too."""
     loads, deborah, apart = np.array([LOAD]), np.array([[reach, 1.2 * reach]]), []
-    grids = [Line.of(periodic_line(*line(oversampling=nodes))) for nodes in (8, 4)]
+    grids = [PreparedLine.of(periodic_line(*line(oversampling=nodes))) for nodes in (8, 4)]
     ends = [ends_on(grid, loads, deborah) for grid in grids]
     jumps = velocity_jumps(grids[0], loads, deborah, ends[0], Course(TIMES, WAVENUMBER, 12))
     path = jumps[0].path[:, ::EVERY]
@@ -249,7 +251,7 @@ def test_a_path_is_retraced_at_every_second_moment(reach: float) -> None:
 
 def test_a_path_without_a_solution_on_the_other_grid_is_unknown() -> None:
     loads, deborah = np.array([LOAD]), np.array([[REACH, 1.2 * REACH]])
-    grid = Line.of(periodic_line(*line()))
+    grid = PreparedLine.of(periodic_line(*line()))
     ends = ends_on(grid, loads, deborah)
     jumps = velocity_jumps(grid, loads, deborah, ends, Course(TIMES, WAVENUMBER, 8))
     nowhere = ends._replace(outcome=np.array([Outcome.DEPTH_NOT_FOUND], np.int8))

@@ -4,7 +4,7 @@ import pytest
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.ends import Line, ends_on
+from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jumps
 
 POINTS = 500
@@ -21,7 +21,7 @@ def test_extremes_come_to_rest(hurst: float) -> None:
     line = periodic_line(*(roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1)))
     load, reach, change = (axis.ravel() for axis in np.meshgrid(LOADS, REACHES, CHANGES))
     both = np.column_stack([reach, reach * (1 + change)])
-    line = Line.of(line)
+    line = PreparedLine.of(line)
     jumps = velocity_jumps(line, load, both, ends_on(line, load, both), Course(TIMES, np.pi * POINTS, 8))
     failed = sum(jump.outcome != Outcome.CONVERGED for jump in jumps)
     assert failed <= 0.02 * load.size  # single asperities that come and go at the lowest velocity

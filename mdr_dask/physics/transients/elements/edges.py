@@ -157,7 +157,7 @@ def _forces(
 
 
 @njit(nogil=True, cache=True)
-def balance(
+def carrying_rate(
     weight: float,
     gaps: FloatArray,
     pulls: FloatArray,

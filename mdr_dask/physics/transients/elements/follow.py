@@ -17,6 +17,7 @@ from mdr_dask.physics.transients.elements.edges import Edges, Line, under_elemen
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation
 from mdr_dask.physics.transients.elements.steps import (
     ROWS,
+    Schedule,
     State,
     follow_elements,
     mean_after,
@@ -62,12 +63,12 @@ class Response(NamedTuple):
     state: State
 
 
-def closed_line(height: FloatArray, slope: FloatArray) -> Line:
+def closed_nodes(height: FloatArray, slope: FloatArray) -> Line:
     """Return a periodic line of unit length from heights and slopes at its n nodes."""
     return Line(np.append(height, height[0]), np.append(slope, slope[0]), True)
 
 
-def indented_line(height: FloatArray, slope: FloatArray, body: Shape) -> Line:
+def indented_nodes(height: FloatArray, slope: FloatArray, body: Shape) -> Line:
     """Return the line of a rough indenter, which does not close.
 
     Parameters
@@ -175,10 +176,7 @@ def _sliding(line: Line, solid: Foundation, state: State, deborah: float, depth:
 def follow_line(
     line: Line,
     solid: Foundation,
-    moments: FloatArray,
-    travels: FloatArray,
-    deborahs: FloatArray,
-    loads: FloatArray,
+    schedule: Schedule,
     state: State,
     depth: float,
 ) -> Response:
@@ -191,14 +189,10 @@ def follow_line(
     Parameters
     ----------
     line : Line
-        From :func:`closed_line` or :func:`indented_line`; elements enter the latter undeformed.
+        From :func:`closed_nodes` or :func:`indented_nodes`; elements enter the latter undeformed.
     solid : Foundation
-    moments : array, shape (m,)
-        Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
-    travels, deborahs : array, shape (m,)
-        Distance travelled over L, and its derivative, of either sign.
-    loads : array, shape (m,)
-        F_N / (4 G_inf L), positive; linear between the moments.
+    schedule : Schedule
+        Travel, velocity and load at every moment.
     state, depth
         At the first moment, as :func:`steady_start` or an earlier `Response` gives them; left as they are.
 
@@ -207,19 +201,16 @@ def follow_line(
     Response
     """
     now = _copy(state)
-    out = np.full((ROWS, moments.size), np.nan)
-    status = follow_elements(solid, line, moments, travels, deborahs, loads, now, depth, out)
+    out = np.full((ROWS, schedule.moments.size), np.nan)
+    status = follow_elements(solid, line, schedule, now, depth, out)
     drag, depths, rate, contact, stored, work, lost = out
     return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, Outcome(status), now)
 
 
-def follow(
+def follow_kelvin(
     height: FloatArray,
     slope: FloatArray,
-    moments: FloatArray,
-    travels: FloatArray,
-    deborahs: FloatArray,
-    loads: FloatArray,
+    schedule: Schedule,
     displacement: FloatArray,
     depth: float,
 ) -> Response:
@@ -229,18 +220,18 @@ def follow(
     ----------
     height, slope : array, shape (n,)
         Profile of unit length, as in :func:`mdr_dask.physics.transients.patches.cubic_profile`.
-    moments, travels, deborahs, loads
-        As in :func:`follow_line`.
+    schedule : Schedule
+        As in :func:`follow_line`; time in tau.
     displacement : array, shape (n,)
         Of every element at the first moment; the profile stands over element j at ``x_j + travel``.
     depth : float
         Depth at the first moment.
     """
-    line = closed_line(height, slope)
+    line = closed_nodes(height, slope)
     under, grade = np.empty(height.size), np.empty(height.size)
-    under_elements(line, float(travels[0]), under, grade)
+    under_elements(line, float(schedule.travels[0]), under, grade)
     w = depth + under
     touching = np.abs(w - displacement) < TOUCHING * (abs(depth) + np.abs(under) + displacement)
     u = np.where(touching, w, displacement)
     state = untouched(u.size, 0)._replace(displacement=u, free=u.copy(), touching=touching)
-    return follow_line(line, KELVIN, moments, travels, deborahs, loads, state, depth)
+    return follow_line(line, KELVIN, schedule, state, depth)

@@ -16,7 +16,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.elements.edges import Line
 from mdr_dask.physics.transients.elements.follow import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.foundation import Foundation
-from mdr_dask.physics.transients.elements.steps import State
+from mdr_dask.physics.transients.elements.steps import Schedule, State
 
 
 class Settings(NamedTuple):
@@ -179,7 +179,7 @@ def trace(
         moments = _with_times(moments, times)
         way, speed, load = piece.at(moments)
         travels = stand.travel + way
-        part = follow_line(line, solid, moments, travels, speed, load, stand.state, stand.depth)
+        part = follow_line(line, solid, Schedule(moments, travels, speed, load), stand.state, stand.depth)
         if part.status != Outcome.CONVERGED:
             return _failed(times, Outcome(part.status))
         found.append((moments, part.drag / load, part.depth))
@@ -203,7 +203,7 @@ def _failed(times: FloatArray, outcome: Outcome) -> Trace:
 def _still(line: Line, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
     """Return the response at one moment."""
     one = np.ones(1)
-    return follow_line(line, solid, 0 * one, 0 * one, velocity * one, load * one, state, depth)
+    return follow_line(line, solid, Schedule(0 * one, 0 * one, velocity * one, load * one), state, depth)
 
 
 def _end(line: Line, solid: Foundation, piece: Piece) -> float:

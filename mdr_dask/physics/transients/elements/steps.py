@@ -12,7 +12,7 @@ from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.elements.edges import Edges, Line, balance, depth_for, under_elements
+from mdr_dask.physics.transients.elements.edges import Edges, Line, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Scratch,
@@ -119,7 +119,35 @@ def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     return lost / n
 
 
-class Workspace(NamedTuple):
+class Schedule(NamedTuple):
+    """What a loading history asks of the elements at its moments, shape (moments,) each.
+
+    Parameters
+    ----------
+    moments : array
+        Times, increasing, in the unit of the solid. Velocity and load may jump at the first one.
+    travels, deborahs : array
+        Distance travelled over L, and its derivative, of either sign.
+    loads : array
+        F_N / (4 G_inf L), positive; linear between the moments.
+    """
+
+    moments: FloatArray
+    travels: FloatArray
+    deborahs: FloatArray
+    loads: FloatArray
+
+
+class Step(NamedTuple):
+    """One step: how long it is, the depth at its start, and v tau / L at its start and end."""
+
+    time: float
+    depth: float
+    deborah: float
+    next_deborah: float
+
+
+class StepWorkspace(NamedTuple):
     """Arrays of one step: heights and slopes over the elements at its end and start, where each would be at the end
     without contact, when and where it is let go, gaps and forces, and decay over the whole step.
     """
@@ -142,9 +170,9 @@ class Workspace(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def _workspace_for(solid: Foundation, n: int) -> Workspace:
+def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     rows = np.empty((11, n))
-    return Workspace(
+    return StepWorkspace(
         rows[0],
         rows[1],
         rows[2],
@@ -164,44 +192,33 @@ def _workspace_for(solid: Foundation, n: int) -> Workspace:
 
 
 @njit(nogil=True, cache=True)
-def _let_go(
-    solid: Foundation,
-    state: State,
-    workspace: Workspace,
-    depth: float,
-    fall: float,
-    deborah0: float,
-    deborah1: float,
-    step: float,
-) -> None:
+def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
-    plain, damping = solid.times.size == 0, solid.viscosity
+    plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
     for j in range(workspace.under.size):
         if not state.touching[j]:
             continue
         u, w1 = state.displacement[j], depth + workspace.under[j]
-        rise0, rise1 = fall + deborah0 * workspace.old_slope[j], fall + deborah1 * workspace.slope[j]
+        rise0, rise1 = fall + step.deborah * workspace.old_slope[j], fall + step.next_deborah * workspace.slope[j]
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
         arms, scratch = state.arms, workspace.scratch
-        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step, workspace.fades, scratch.arms)
+        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step.time, workspace.fades, scratch.arms)
         if part < 1 or workspace.parts[j] < 1:
             pressed = part if part < 1 else 0.0
-            workspace.after[j] = flight(solid, u, arms, j, pressed, leaves, step, workspace.decay, scratch)
+            workspace.after[j] = flight(solid, u, arms, j, pressed, leaves, step.time, workspace.decay, scratch)
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
 @njit(nogil=True, cache=True)
-def _move(
-    solid: Foundation, state: State, workspace: Workspace, old_depth: float, depth: float, step: float
-) -> tuple[float, float]:
+def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
     work, lost = 0.0, 0.0
     for j in range(n):
-        w0, w1, was = old_depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
+        w0, w1, was = step.depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
         if not was:
             state.free[j] = after[j]
             for m in range(solid.times.size):
@@ -220,7 +237,7 @@ def _move(
                 state.arms[j, m] = workspace.after_arms[j, m]
             continue
         if was and plain and w1 > after[j]:
-            gone = damping * (w1 - u[j]) ** 2 / step
+            gone = damping * (w1 - u[j]) ** 2 / step.time
             work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
             lost += gone
             u[j] = w1
@@ -236,7 +253,7 @@ def _move(
             after[j],
             w0,
             w1,
-            step,
+            step.time,
             workspace.decay,
             workspace.fades,
             workspace.scratch,
@@ -252,13 +269,10 @@ def _move(
 def _step(
     solid: Foundation,
     state: State,
-    workspace: Workspace,
+    workspace: StepWorkspace,
+    step: Step,
     mean: float,
-    old_depth: float,
     guess: float,
-    deborah0: float,
-    deborah1: float,
-    step: float,
 ) -> tuple[float, float, float, bool]:
     """Take all elements through a step to a mean displacement; return depth, work and loss, and whether it is found."""
     plain = solid.times.size == 0
@@ -277,11 +291,11 @@ def _step(
         depth, good = depth_for(workspace.under, workspace.after, mean, depth)
         if not good:
             return depth, 0.0, 0.0, False
-        _let_go(solid, state, workspace, depth, (depth - old_depth) / step, deborah0, deborah1, step)
+        _let_go(solid, state, workspace, step, depth)
     depth, good = depth_for(workspace.under, workspace.after, mean, depth)
     if not good:
         return depth, 0.0, 0.0, False
-    work, lost = _move(solid, state, workspace, old_depth, depth, step)
+    work, lost = _move(solid, state, workspace, step, depth)
     return depth, work, lost, True
 
 
@@ -301,7 +315,7 @@ def _state_energy(solid: Foundation, state: State) -> float:
 def forces_now(
     solid: Foundation,
     state: State,
-    workspace: Workspace,
+    workspace: StepWorkspace,
     depth: float,
     rate: float,
     deborah: float,
@@ -320,7 +334,7 @@ def forces_now(
         workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
     edges, force, power = state.edges, workspace.force, workspace.power
     if solid.viscosity > 0:
-        rate, drag, length = balance(
+        rate, drag, length = carrying_rate(
             solid.viscosity,
             workspace.gaps,
             workspace.pulls,
@@ -336,7 +350,7 @@ def forces_now(
         )
         return depth, rate, drag, length
     glass = 1 + solid.moduli.sum()
-    more, drag, length = balance(
+    more, drag, length = carrying_rate(
         glass,
         workspace.gaps,
         workspace.pulls,
@@ -357,15 +371,13 @@ def forces_now(
 def follow_elements(
     solid: Foundation,
     line: Line,
-    moments: FloatArray,
-    travels: FloatArray,
-    deborahs: FloatArray,
-    loads: FloatArray,
+    schedule: Schedule,
     state: State,
     depth: float,
     out: FloatArray,
 ) -> int:
     """March all elements through the moments and write `out`, shape (ROWS, moments)."""
+    moments, travels, deborahs, loads = schedule
     n = line.height.size - 1
     workspace, modes = _workspace_for(solid, n), np.empty(solid.rates.size)
     shift = under_elements(line, travels[0], workspace.under, workspace.slope)
@@ -376,24 +388,22 @@ def follow_elements(
             return Outcome.DEPTH_NOT_FOUND
     for now in range(moments.size):
         if now > 0:
-            step = moments[now] - moments[now - 1]
+            time = moments[now] - moments[now - 1]
             workspace.old_under[:] = workspace.under
             workspace.old_slope[:] = workspace.slope
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
                 lost += _forget(solid, state, old_shift, shift)
-            fading(solid, step, workspace.decay, workspace.fades)
-            mean = mean_after(solid, state, loads[now - 1], loads[now], step, modes)
-            guess = depth + rate * step
-            depth, done, gone, good = _step(
-                solid, state, workspace, mean, old_depth, guess, deborahs[now - 1], deborahs[now], step
-            )
+            fading(solid, time, workspace.decay, workspace.fades)
+            mean = mean_after(solid, state, loads[now - 1], loads[now], time, modes)
+            step = Step(time, old_depth, deborahs[now - 1], deborahs[now])
+            depth, done, gone, good = _step(solid, state, workspace, step, mean, depth + rate * time)
             if not good:
                 return Outcome.DEPTH_NOT_FOUND
             work, lost = work + done, lost + gone
             if solid.viscosity == 0:
-                rate = (depth - old_depth) / step
+                rate = (depth - old_depth) / time
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return Outcome.OUTSIDE_LINE

@@ -1,0 +1,47 @@
+"""The units that a campaign file is written in, for whoever shows its parameters to a reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+from mdr_dask.campaign.document import parse
+from mdr_dask.campaign.problems import Problems
+from mdr_dask.campaign.variation import RANGES
+from mdr_dask.units import unit_behind
+
+
+@lru_cache(maxsize=16)
+def written_units(text: str) -> dict[str, str]:
+    """Return the unit of every parameter whose values are all written in the same one.
+
+    Parameters
+    ----------
+    text : str
+        A campaign file that has been checked.
+
+    Returns
+    -------
+    dict of str to str
+        By the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
+    """
+    data = parse(text, "", Problems()).data
+    series = (data.get("series") or {}).values()
+    found: dict[str, set[str]] = {}
+    for parameters in (data.get("parameters"), *series):
+        for name, unit in _below("", parameters):
+            found.setdefault(name, set()).add(unit)
+    return {name: unit for name, (unit, *others) in found.items() if not others}
+
+
+def _below(name: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Yield parameter and unit of every quantity; what stands in lists and ranges belongs to the parameter varied."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from _below(name if key in RANGES else f"{name}_{key}".strip("_"), inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from _below(name, inner)
+    elif isinstance(value, str) and (unit := unit_behind(value)):
+        yield name, unit
