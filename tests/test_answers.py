@@ -10,6 +10,7 @@ from test_execute import digests, run
 
 from mdr_dask import bootstrap, execute, fits, store
 from mdr_dask.campaign import Replication, Tolerance, loads
+from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, FitError
 from mdr_dask.execute import Part, Resources
 from mdr_dask.fits.base import Fit
@@ -164,9 +165,13 @@ def test_what_is_no_output_is_a_constant_of_a_fit():
         ("calibration.tau: 1 %", r"of the fit calibration \(none\), got 'tau'"),
     ],
 )
-def test_what_is_neither_is_refused_before_anything_is_written(url, tmp_path, until, expected):
+def test_what_is_neither_is_refused_before_anything_is_written(url, tmp_path, capsys, until, expected):
     with pytest.raises(CampaignError, match=expected):
         run(study(until), url)
+    (tmp_path / "a.yaml").write_text(TEXT.format(until=until))
+    assert main(["check", str(tmp_path / "a.yaml")]) == 2
+    assert re.search(expected, capsys.readouterr().err)
+    (tmp_path / "a.yaml").unlink()
     assert not list(tmp_path.iterdir())
 
 
