@@ -98,10 +98,17 @@ def _anything(like: xr.DataArray, noise: xr.DataArray) -> xr.DataArray:
     return value * noise
 
 
+#: What stands for parameters that a study on a measured surface, or of a measured material, does not have.
+USUAL = {"hurst": 0.7, "rms_roughness": 0.5e-6, "length": 0.02, "shear_modulus": 1e7, "relaxation_time": 1e-3}
+
+
+def _as_usual(data: xr.Dataset) -> xr.Dataset:
+    return data.assign_coords({name: value for name, value in USUAL.items() if name not in data.coords})
+
+
 def _sliding(data: xr.Dataset, noise: xr.DataArray) -> dict[str, xr.DataArray]:
-    """Return friction after the law of planes, where the series has what it needs."""
-    if not {"rms_roughness", "shear_modulus", "length"} <= set(data.coords):
-        return {}
+    """Return friction after the law of planes."""
+    data = _as_usual(data)
     slope = 0.01 * (1 + data["hurst"])
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
@@ -118,6 +125,7 @@ def _sliding(data: xr.Dataset, noise: xr.DataArray) -> dict[str, xr.DataArray]:
 
 def _jumps(data: xr.Dataset, noise: xr.DataArray) -> dict[str, xr.DataArray]:
     """Return friction that jumps and relaxes after the laws of the thesis."""
+    data = _as_usual(data)
     slope = 0.01 * (1 + data["hurst"])
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])

@@ -75,6 +75,16 @@ class Fit:
         return found
 
 
+def require(data: xr.Dataset, *names: str) -> None:
+    """Raise FitError where a study lacks parameters of a Kelvin body on a generated line that a law is written in."""
+    missing = [name for name in names if name not in data.variables]
+    if missing:
+        raise FitError(
+            f"the law holds for a Kelvin body on a generated line: expected {', '.join(names)},"
+            f" got a study without {', '.join(missing)}"
+        )
+
+
 LAW_HOLDS = {"units": "1", "long_name": "whether the law holds"}
 
 

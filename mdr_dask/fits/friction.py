@@ -13,7 +13,7 @@ from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds, require
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
@@ -34,6 +34,9 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     """Return the spectral rms slope: from the store, or from the parameters of a line without roll-off."""
     if "rms_slope" in data:
         return data["rms_slope"].mean("realisation")
+    if "hurst" not in data:
+        raise FitError("expected the output rms_slope in the store of a measured surface, got none")
+    require(data, "hurst", "points", "rms_roughness", "length")
     unit = xr.apply_ufunc(
         lambda hurst, points: roughness.spectral_slope(roughness.amplitudes(int(points) // 2, float(hurst))),
         data["hurst"],
@@ -44,15 +47,12 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
     return slope
 
 
-def _require_kelvin(data: xr.Dataset) -> None:
-    missing = [name for name in ("shear_modulus", "relaxation_time", "rms_roughness", "length") if name not in data]
-    if missing:
-        raise FitError(f"the laws hold for a Kelvin body on a generated line: the store has no {', '.join(missing)}")
+KELVIN = ("shear_modulus", "relaxation_time", "rms_roughness", "length")
 
 
 def loads_and_velocities(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray]:
     """Return F_N / (G h L) and v tau slope / (sqrt 2 h)."""
-    _require_kelvin(data)
+    require(data, *KELVIN)
     slope = spectral_slope(data)
     force = laws.force_number(data["normal_force"], data["shear_modulus"], data["rms_roughness"], data["length"])
     velocity = laws.velocity_number(data["velocity"], data["relaxation_time"], slope, data["rms_roughness"])
@@ -65,7 +65,8 @@ def numbers(data: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]
 
 
 def one_value(data: xr.Dataset, name: str) -> float:
-    """Return a parameter of which a law has one value; raise FitError where the cases of a sampled study differ."""
+    """Return a parameter of which a law has one value; raise FitError where there is none or the cases differ."""
+    require(data, name)
     values = data[name]
     if values.size != 1:
         raise FitError(
@@ -87,9 +88,9 @@ def holds(sentence: str) -> Variables:
     return {"law_holds": xr.Variable((), sentence, LAW_HOLDS)}
 
 
-def measure(name: str, value: float, long_name: str) -> Variables:
+def measure(name: str, value: float, long_name: str, unit: str = "1") -> Variables:
     """Return a number without an interval."""
-    return {name: xr.Variable((), value, {"units": "1", "long_name": long_name})}
+    return {name: xr.Variable((), value, {"units": unit, "long_name": long_name})}
 
 
 def _groups(value: xr.DataArray, inner: list[str]) -> Iterator[dict[str, Any]]:
@@ -242,7 +243,8 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 def _plateau(data: xr.Dataset) -> Variables:
     """Return the top of a parabola through the points about the largest friction, over the logarithm of velocity."""
-    _, velocities = loads_and_velocities(data)
+    require(data, "shear_modulus", "relaxation_time")
+    velocities, name, unit = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
@@ -264,7 +266,7 @@ def _plateau(data: xr.Dataset) -> Variables:
         errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
     top = np.concatenate([top, errors]) + (unbiased - top[0])
     ends = bootstrap.interval(rise, count)
-    verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])))
+    verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])), f"{name} = {{:.2g}}{unit}")
     flat = x[stack[0] > (1 - FLAT) * stack[0].max()]
     found = constant("plateau", top, count, "largest friction coefficient over rms slope")
     if verdict.startswith("no:"):
@@ -272,7 +274,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     return {
         **found,
         **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
-        **measure("plateau_velocity", float(np.exp(at[0])), "v tau slope / (sqrt 2 h) of the largest friction"),
+        **measure("plateau_velocity", float(np.exp(at[0])), f"{name} of the largest friction", unit.strip() or "1"),
         **measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
         **holds(verdict),
     }
@@ -312,12 +314,19 @@ def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
 
 
-def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float]) -> str:
+def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str, str]:
+    """Return velocities, what they are, and their unit: no store holds the rms height of a measured surface."""
+    if "rms_roughness" in data:
+        return loads_and_velocities(data)[1], "v tau slope / (sqrt 2 h)", ""
+    return data["velocity"] * data["relaxation_time"], "v tau", " m"
+
+
+def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float], place: str) -> str:
     """Say whether the largest friction is a plateau or top, or lies at an end of the velocities and changes there."""
     inside = x[0] < at < x[-1] and abs(rise) < 1e-9
     change = f"d ln mu / d ln v = {rise:.2g} ({ends[0]:.2g}, {ends[1]:.2g})"
     if inside:
-        return f"yes: friction falls to both sides of v tau slope / (sqrt 2 h) = {np.exp(at):.2g}"
+        return f"yes: friction falls to both sides of {place.format(np.exp(at))}"
     if abs(rise) <= FLAT:
         return f"yes: friction is level at the end of the velocities, {change}"
     end = "still rises at the largest velocity" if rise > 0 else "still falls at the lowest velocity"
@@ -426,7 +435,7 @@ def _half_width(data: xr.Dataset) -> Any:
 
 def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
     """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
-    _require_kelvin(data)
+    require(data, *KELVIN)
     low = laws.indenter_low(
         _half_width(data),
         data["velocity"],

@@ -15,6 +15,7 @@ from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
+from mdr_dask.fits.base import require
 
 LEVELS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_coefficient_after")
 LEAST = 2  # realisations of a case that must have succeeded
@@ -63,7 +64,8 @@ class Cases:
         return int(self.counts[used].min(initial=self.data.sizes["realisation"]))
 
     def column(self, name: str) -> FloatArray:
-        """Return a parameter for every case."""
+        """Return a parameter for every case; raise FitError where the study has none."""
+        require(self.data, name)
         column: FloatArray = np.asarray(self._like(self.data[name]), dtype=np.float64).ravel()
         return column
 

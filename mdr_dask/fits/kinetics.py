@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds, require
 from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, law_rate
 from mdr_dask.fits.relaxation import (
     AMPLITUDE_FIELDS,
@@ -228,8 +228,11 @@ def relaxation_curves(data: xr.Dataset) -> xr.Dataset:
     )
 
 
-def _rows_of(hurst: FloatArray) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return a label and the cases of every Hurst exponent, and of all."""
+def _rows_of(cases: Cases) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Return a label and the cases of every Hurst exponent, and of all; a measured surface has no exponent."""
+    if "hurst" not in cases.data:
+        return [("all", np.ones(cases.counts.size, dtype=bool))]
+    hurst = cases.column("hurst")
     rows = [(f"{value:.4g}", hurst == value) for value in np.unique(hurst)]
     return [*rows, ("all", np.ones(hurst.size, dtype=bool))] if len(rows) > 1 else rows
 
@@ -242,7 +245,7 @@ def _jump_law(series: Series) -> xr.Dataset:
     known = _rising(cases, numbers) & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
         raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
-    rows = _rows_of(cases.column("hurst"))
+    rows = _rows_of(cases)
     table: dict[str, list[float | str]] = {}
     for _, chosen in rows:
         for name, value in _constant(before, jump, chosen & known, cases).items():
@@ -325,7 +328,7 @@ def _jump_limits(series: Series) -> xr.Dataset:
     }
     if not any(np.any(inside) for inside, *_ in limits.values()):
         raise FitError(f"expected cases with mu_1 / rms_slope below {REGION_ONE} or above {PLATEAU}")
-    rows = _rows_of(cases.column("hurst"))
+    rows = _rows_of(cases)
     table = np.full((len(rows), len(limits), len(LIMIT_FIELDS)), np.nan)
     verdicts = np.empty(table.shape[:2], dtype=object)
     for i, (_, chosen) in enumerate(rows):
@@ -395,6 +398,7 @@ POWER_FIELDS = {
 def _rate_power(series: Series) -> xr.Dataset:
     """Fit the power of the rate over v_1 tau q_max below and above 1, for every value of the other axes."""
     cases = Cases.of(series, *_needed())
+    require(cases.data, "relaxation_time", "length")
     along = {dim for name in ("velocity", "relaxation_time", "points", "length") for dim in cases.data[name].dims}
     rows = [dim for dim in cases.template.dims if dim not in along]
     samples = _relaxations(cases).stacks

@@ -107,6 +107,8 @@ def master_curve(
     frame = _frame(table)
     over, values, by = _columns(frame, abscissa, ordinate, group)
     second = _second_group(frame, {over, values, by})
+    if isinstance(table, xr.Dataset):
+        _require_no_axis_beside(table[values], {over, by, second, "realisation"})
     frame, left_out = _finite(frame, [over, values, by] + ([second] if second else []))
     if second is not None:
         found = _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
@@ -118,6 +120,13 @@ def master_curve(
     units = frame.attrs.get("units", {})
     dataset = _dataset(result, over, values, by, units)
     return _with_laws(dataset, (result, by, units.get(by, ""))).assign_attrs(left_out=left_out, **_untold(free))
+
+
+def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None:
+    """Refuse a study whose curves differ in more than they are shifted by."""
+    for name in values.dims:
+        if name not in used and name in values.coords and values.sizes[name] > 1:
+            raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
 
 
 def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
@@ -427,7 +436,7 @@ def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     wanted = {"normal_force", "velocity"}
     means = [
         (
-            float(dataset.coords.get("rms_roughness", 1.0)),
+            float(np.max(dataset.coords.get("rms_roughness", 1.0))),
             dataset["friction_coefficient"].mean("realisation", keep_attrs=True),
         )
         for dataset in series.values()

@@ -117,9 +117,9 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 def _contact_slope(data: xr.Dataset) -> Variables:
     """Compare the slope in contact with eq. 3.21 over the size of the contact."""
+    hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
     fractions = table_of(data, _one(1.0), output="contact_fraction")
-    hurst, points = one_value(data, "hurst"), one_value(data, "points")
     law = contact_slope_law(fractions.mean(), hurst, points)
     used = np.flatnonzero((slopes.mean() > 0) & np.isfinite(law))
     if used.size < 3:
@@ -294,7 +294,7 @@ def _collapsed(found: Collapse, spread: float, loads: FloatArray, stated: FloatA
         **measure("rms_error", rms, "rms relative distance of the points from the common curve"),
         **measure("rms_before", spread, "the same before shifting"),
         **measure("collapsed", 1 - (rms / spread) ** 2, "share of the spread that shifting takes away"),
-        **measure("points", found.residuals.shape[1], "number of points"),
+        **measure("cases", found.residuals.shape[1], "number of cases shifted"),
         **{
             name: xr.Variable("curve", value, {"units": "1", "long_name": text})
             for name, (value, text) in names.items()

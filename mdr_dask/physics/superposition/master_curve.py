@@ -208,7 +208,11 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
 
 
 def _bootstrap(problem: Problem, found: Found, draws: int, seed: int) -> FloatArray:
-    """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves)."""
+    """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves).
+
+    A fit anew repeats the best fit. What the curves leave open, as along a plateau, is drawn from a normal distribution
+    beside.
+    """
     generator = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed)))
     linear, points = _Merged.at(problem, found), problem.points
     fitted, scatter = linear.residuals()
@@ -220,6 +224,10 @@ def _bootstrap(problem: Problem, found: Found, draws: int, seed: int) -> FloatAr
         again = points._replace(y=fitted + drawn - along)
         smoothing = found.weight, found.variance
         row[:] = np.concatenate(fit(again, found.shifts, problem.grid, found.prior, smoothing, DRAW_ITERATIONS)[0])
+    size = found.covariance.shape[0]
+    free = np.r_[1 : problem.curves, problem.curves + 1 : 2 * problem.curves][:size]
+    values, vectors = np.linalg.eigh(found.covariance - linear.repeated())
+    samples[:, free] += generator.standard_normal((draws, size)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     return samples
 
 
@@ -271,6 +279,12 @@ class _Merged:
         cross = along @ gain @ covariance
         variance = np.sum((along @ alone) * along, axis=1) + np.sum(cross * (along @ gain), axis=1)
         return along @ self.coefficients, np.sqrt(np.maximum(variance, 0)), cross
+
+    def repeated(self) -> FloatArray:
+        """Return the covariance of shifts that are fitted anew to other residuals, all else as it is."""
+        gain = self.inverse[self.splines :] @ self.design.T
+        covariance: FloatArray = self.noise**2 * (gain @ gain.T)
+        return covariance
 
     def residuals(self) -> tuple[FloatArray, FloatArray]:
         """Return fitted values, and residuals enlarged by their leverage."""

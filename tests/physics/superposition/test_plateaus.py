@@ -55,6 +55,14 @@ def test_flat_noisy_curves_are_answered_with_intervals_as_long_as_their_overlap(
     assert found.horizontal_error[-1] > 0.6
 
 
+def test_the_bootstrap_is_as_wide_as_the_intervals_along_a_plateau():
+    groups, curves, _ = plateau_family("decay", 8, 20, 0.02, 0.3, 3)
+    found = superpose(groups, curves, draws=100)
+    others = np.arange(groups.size) != groups.size // 2
+    ratio = found.draws[:, : groups.size].std(axis=0)[others] / found.horizontal_error[others]
+    assert np.all((ratio > 0.7) & (ratio < 1.5))  # standard deviation of 100 draws: 7 %
+
+
 def test_five_percent_of_scatter_is_no_reason_to_refuse():
     for seed in range(10):
         groups, curves, truth = plateau_family("steep", 15, 10, 0.05, 0.3, seed)
