@@ -40,7 +40,7 @@ COMMANDS = {
     ),
     "law study.zarr contact_fraction -o law.nc": (
         {"matplotlib", "numba"},
-        {"contact_fraction", "contact_fraction_error"},
+        {"contact_fraction", "contact_fraction_error", "status"},
     ),
     "plot study.zarr velocity -o velocity.png": (
         {"distributed"},

@@ -122,7 +122,7 @@ def test_after_any_failed_write_a_plain_run_ends_with_the_same_bytes(toy, tmp_pa
     expected, count = digests(whole), disk.writes - first
     shapes = look(old) + look(whole)
     assert count > 3
-    for broken_write in range(1, count + 1):
+    for broken_write in range(1 + lasting, count + 1, 2):  # each write in one of the two ways
         url = str(tmp_path / "broken.zarr")
         if before:
             shutil.copytree(old, url)

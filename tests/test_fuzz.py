@@ -40,7 +40,7 @@ DOUBLED = "Hz, MPa, MPa\n0.1, 8, 1\n1, 9, 1.5\n"
     ("name", "text", "command", "code"),
     [
         ("a.yaml", HALF, ("check", "a.yaml"), 2),
-        ("a.yaml", HUGE, ("check", "a.yaml"), 0),
+        ("a.yaml", HUGE, ("check", "a.yaml"), 2),
         ("t.csv", DOUBLED, ("master-curve", "t.csv", "--over", "Hz", "--of", "MPa", "--by", "MPa"), 2),
     ],
     ids=["half a character", "a bare number near the largest", "names given twice"],

@@ -117,7 +117,7 @@ def damaged() -> dict[str, bytes]:
     files = {name: text.encode() for name, text in tables.items()}
     return files | {
         "UTF-16": SOUND.encode("utf-16"),
-        "Latin-1": SOUND.replace("degC", "°C").encode("latin-1"),
+        "Shift-JIS": SOUND.replace("degC", "℃").encode("shift_jis"),
         "a picture": b"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR",
         "a spreadsheet": b"PK\x03\x04\x14\x00\x06\x00" + bytes(range(128, 256)),
         "zeros": SOUND.encode().replace(b"\n0.1,", b"\n\x00\x00,"),

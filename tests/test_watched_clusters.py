@@ -13,6 +13,7 @@ from slow_campaign import make, mdr_dask
 from test_execute import digests
 
 PYTHON = sys.executable
+KEPT = "what is in the store is kept: run the campaign again"
 
 pytestmark = pytest.mark.slow
 
@@ -81,9 +82,8 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     alone = mdr_dask(*command[1:], "--patience", "6")
     assert alone.returncode == 2
     assert re.search(r"^no worker yet, waiting for \d s; giving up after 6 s$", alone.stderr, flags=re.M)
-    kept = "what is in the store is kept: run the campaign again"
     last = alone.stderr.splitlines()[-1]
-    assert re.fullmatch(rf"no worker for \d+ s; {kept}, with more --patience if need be", last)
+    assert re.fullmatch(rf"no worker for \d+ s; {KEPT}, with more --patience if need be", last)
 
     first = worker(start, head, address)
     told = told_by(start(*command, "--patience", "6"), first)
@@ -91,7 +91,7 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
 
     worker(start, head, address)
     told += told_by(start(*command), head)
-    assert told[-1] == f"the scheduler went away; {kept}"
+    assert told[-1] == f"the scheduler went away; {KEPT}"
     assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))
 
     assert mdr_dask("run", "long.yaml", PAUSE="0").returncode == 0
@@ -100,3 +100,15 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     events = [json.loads(line)["event"] for line in Path("log.jsonl").read_text().splitlines()]
     assert {"run begun", "laid out", "block begun", "block done", "worker lost", "block lost"} <= set(events)
     assert events.count("run broken off") == 3
+
+
+def test_a_scheduler_that_is_stopped_ends_a_run_in_one_sentence(folder, start):
+    head, address = scheduler(start)
+    worker(start, head, address)
+    driver = start("mdr-dask", "run", "long.yaml", "--scheduler", address, "--patience", "10")
+    said(driver, r"([1-9]\d*) of 120 results")
+    head.send_signal(signal.SIGSTOP)
+    told = driver.stderr.read().splitlines()
+    assert driver.wait() == 2
+    assert re.fullmatch(rf"no answer of the scheduler for \d+ s; {KEPT}, with more --patience if need be", told[-1])
+    assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))

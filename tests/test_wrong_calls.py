@@ -68,10 +68,10 @@ WRONG = [
     ("show STORE --columns wear", "no column 'wear'; known: "),
     ("show STORE --group-by case", "expected axes to group by, got 'case'"),
     ("aggregate STORE -o small.yaml/x.csv", "small.yaml/x.csv: Not a directory"),
-    ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: zone_one"),
+    ("fit STORE nothing", "no law for sliding_friction is called 'nothing'; known: calibration, zone_one"),
     (
         "plot STORE nothing",
-        "no figure of sliding_friction is called 'nothing'; known: contact, lines, regions, velocity",
+        "no figure of sliding_friction is called 'nothing'; known: calibration, contact, lines, regions, velocity",
     ),
     ("plot STORE friction_coefficient", "friction_coefficient is an output: say --over AXIS, or --effects"),
     ("plot STORE friction_coefficient --over speed", "no axis 'speed' (did you mean 'velocity'?)"),

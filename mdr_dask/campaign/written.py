@@ -26,7 +26,7 @@ def written_units(text: str) -> dict[str, str]:
     dict of str to str
         By the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     """
-    data = parse(text, "", Problems()).data
+    data = parse(text, "", Problems()).data or {}
     series = (data.get("series") or {}).values()
     found: dict[str, set[str]] = {}
     for parameters in (data.get("parameters"), *series):

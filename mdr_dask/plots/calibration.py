@@ -165,9 +165,12 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     ends = determined.quantiles(across, weights, [1e-4, 1 - 1e-4])
     if known and is_free:
         ends = np.array([across.min(), across.max()])
-    density, edges = np.histogram(
-        across, PARTS, tuple(ends + np.array([-1, 1]) * 1e-9 * np.abs(ends).max()), weights=weights
-    )
+    margin = 1e-9 * np.abs(ends).max()
+    edges = np.linspace(ends[0] - margin, ends[1] + margin, PARTS + 1)
+    if known:
+        place = found.posterior.places[:, found.unknowns.index(name)]
+        edges = _of_whole_cells(ends, across, place, found.posterior.width)
+    density = np.histogram(across, edges, weights=weights)[0]
     centres = (edges[1:] + edges[:-1]) / 2
     smooth = np.convolve(np.pad(density, 2, mode="edge"), [0.1, 0.2, 0.4, 0.2, 0.1], mode="valid")
     height = smooth / smooth.max()
@@ -186,6 +189,17 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
         style.logarithmic(axes, "x")
     if is_free:
         axes.set_title("not determined", fontsize="small")
+
+
+def _of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:
+    """Return edges of parts that hold as many cells each: others would show a density that beats with the cells."""
+    low, high = int(place.argmin()), int(place.argmax())
+    cell = width * (across[high] - across[low]) / (place[high] - place[low])
+    start = across[low] - cell / 2
+    first, last = np.floor((ends[0] - start) / cell), np.ceil((ends[1] - start) / cell)
+    cells = max(1, int(np.ceil((last - first) / PARTS)))
+    edges: FloatArray = start + cell * np.arange(first, max(last, first + cells) + 1, cells)
+    return edges
 
 
 def _is_geometric(found: room.Calibration, name: str) -> bool:

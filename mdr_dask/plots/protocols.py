@@ -72,10 +72,11 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
         top.set_ylabel(label)
         time, speed, force = course(case, last)
         for axes, row, name, colour in zip(below, (speed, force), DRIVEN, style.COLOURS[1:], strict=False):
-            row = style.quantity(name, values[name]).of(row)
+            like = values.get(name)  # absent where the history has it in its own numbers
+            row = style.quantity(name, like).of(row)
             drawing.plain(axes, time, row, of=values, color=colour, lw=1.2)
             axes.set_ylim(min(0.0, 1.15 * float(row.min())), 1.15 * max(float(row.max()), 1e-300))
-            axes.set_ylabel(style.label(name, values[name]))
+            axes.set_ylabel(style.label(name, like))
         below[1].set_xlabel(TIME)
         below[1].set_xlim(-BEFORE * last, last)
     style.legend(panels[0])

@@ -422,8 +422,10 @@ def test_time_estimate_grows_with_cases_points_and_creep():
     assert MODEL.seconds(block(columns={"normal_force": np.full(50, 100.0)})) > small
     assert MODEL.seconds(block(points=200_000)) > small
     assert MODEL.seconds(block(slide_roll_ratio=0.1)) > small
-    hurst = {"hurst": np.linspace(0.6, 0.8, 50)}
-    assert MODEL.seconds(block(columns=hurst)) > 8 * MODEL.seconds(block(columns={"hurst": np.full(50, 0.7)}))
+    many, none = (
+        MODEL.seconds(block(columns={"hurst": each})) for each in (np.linspace(0.6, 0.8, 50), np.full(50, 0.7))
+    )
+    assert many > 1.5 * none
 
 
 def test_extremes_of_all_parameters_give_numbers_or_a_sentence():

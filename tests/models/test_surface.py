@@ -80,7 +80,7 @@ def test_each_realisation_takes_one_of_several_files(tmp_path):
     ]
     both = solved(MODEL, SlidingFriction, length=LENGTH, surface=surface).values["friction_coefficient"]
     for k in range(2):
-        np.testing.assert_allclose(both[0, k], alone[k]["friction_coefficient"][0, 0], rtol=1e-4)
+        np.testing.assert_allclose(both[0, k], alone[k]["friction_coefficient"][0, 0], rtol=1e-3)
 
 
 def test_a_table_of_a_cut_gives_more_slope_than_the_cut_has(tmp_path):

@@ -111,7 +111,9 @@ def find_both(problem: Problem) -> Found:
         spread = _of_steps(found.covariance[:size, :size])
     wider = np.sqrt(np.clip(1 - np.diag(spread) / np.diag(scanned), 0.0, 1.0))
     sums = np.tri(size)
-    found.covariance[:size, :size] += sums @ (wider[:, None] * scanned * wider) @ sums.T
+    # on a plateau the linear problem stays near its start, and the scan may find another place
+    other = (second.shifts.across - found.shifts.across)[1:]
+    found.covariance[:size, :size] += sums @ (wider[:, None] * scanned * wider) @ sums.T + np.outer(other, other)
     return found._replace(told=second.told, common=second.common)
 
 
