@@ -359,7 +359,7 @@ def _part(template: Template, dim: str, most: int) -> int:
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
-    if dim == "realisation" and replication.until:
+    if dim == "realisation" and replication.goes_on:
         return max(part for part in range(1, most + 1) if math.gcd(part, replication.at_least) == part)
     return math.ceil(size / math.ceil(size / most))
 

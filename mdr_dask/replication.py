@@ -23,7 +23,7 @@ def rounds(replication: Replication) -> Iterator[int]:
     """Yield the number of realisations after each round: multiples of ``at_least``, the last one ``at_most``."""
     count = replication.at_least
     yield count
-    while replication.until and count < replication.at_most:
+    while replication.goes_on and count < replication.at_most:
         count += replication.at_least * math.ceil(GROWTH * count / replication.at_least)
         count = min(count, replication.at_most)
         yield count

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -136,11 +136,27 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """How many realisations each case gets: ``at_least``, then whole rounds until every tolerance is met."""
+    """How many realisations each case gets: ``at_least``, then whole rounds until every tolerance is met.
+
+    Parameters
+    ----------
+    at_least, at_most : int
+        Realisations of the first round, and of the last one that there may be.
+    until : mapping of str to Tolerance
+        Standard error of the mean of outputs.
+    answers : mapping of str to Tolerance
+        Half of the 95 % interval of fitted constants, by ``fit.constant``; cases go on that narrow it.
+    """
 
     at_least: int
     at_most: int
     until: Mapping[str, Tolerance]
+    answers: Mapping[str, Tolerance] = field(default_factory=dict)
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether there may be more than one round."""
+        return bool(self.until or self.answers)
 
 
 @dataclass(frozen=True)

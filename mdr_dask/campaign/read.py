@@ -15,7 +15,7 @@ from mdr_dask.campaign.measured import require_readable
 from mdr_dask.campaign.messages import report_errors
 from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
-from mdr_dask.campaign.tolerances import tolerances
+from mdr_dask.campaign.tolerances import answers, is_of_fit, tolerances
 from mdr_dask.errors import DataError, ModelError, did_you_mean
 from mdr_dask.models.base import DataFile, Model
 from mdr_dask.units import to_si
@@ -152,8 +152,11 @@ def _replication(
         path: Path = ("realisations", "at_most")
         what = f"expected a whole number of at least {wanted.at_least} (at_least), got {wanted.at_most}"
         problems.add(document.place(path), dotted(path), what)
-    until = tolerances(document, ("realisations", "until"), wanted.until, model, outputs, problems)
-    return Replication(wanted.at_least, wanted.at_most, until)
+    path = ("realisations", "until")
+    fitted = {name: given for name, given in wanted.until.items() if is_of_fit(name, model)}
+    of_outputs = {name: given for name, given in wanted.until.items() if name not in fitted}
+    until = tolerances(document, path, of_outputs, model, outputs, problems)
+    return Replication(wanted.at_least, wanted.at_most, until, answers(document, path, fitted, problems))
 
 
 def _check_measured(

@@ -37,7 +37,9 @@ class AdaptiveSpec(Parameters):
     at_least: int = Field(20, ge=2, description="realisations that every case gets")
     at_most: int = Field(description="realisations after which a case is left as it is", ge=2)
     until: dict[str, float | str | ToleranceSpec] = Field(
-        min_length=1, description="standard error wanted of each output named: 1 %, or {relative: 1 %, absolute: 2 um}"
+        min_length=1,
+        description="standard error wanted of each output named: 1 %, or {relative: 1 %, absolute: 2 um}; "
+        "or half of the interval of a fitted constant: zone_one.alpha: 0.01, plateau: 2 %",
     )
 
 

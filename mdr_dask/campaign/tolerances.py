@@ -58,6 +58,26 @@ def tolerances(
     return found
 
 
+def is_of_fit(name: str, model: Model[Any]) -> bool:
+    """Return whether a tolerance is meant for a fitted constant: ``zone_one.alpha``, and no output or nearly one."""
+    return "did you mean" not in did_you_mean(name, [output.name for output in model.outputs])
+
+
+def answers(document: Document, path: Path, given: Mapping[str, Written], problems: Problems) -> dict[str, Tolerance]:
+    """Return the tolerances of fitted constants, by fit and constant: a part with ``%``, else as it is."""
+    found = {}
+    for name, written in given.items():
+        constant = name if "." in name else f"{name}.{name}"
+        try:
+            wanted = tolerance(written, "1")
+        except ValueError as error:
+            problems.add(document.place((*path, name)), dotted((*path, name)), str(error))
+            continue
+        is_part = isinstance(written, ToleranceSpec) or (isinstance(written, str) and "%" in written)
+        found[constant] = wanted if is_part else Tolerance(absolute=wanted.relative)
+    return found
+
+
 def tolerance(given: Written, unit: str) -> Tolerance:
     """Return a tolerance in SI.
 

@@ -115,6 +115,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         try:
             with at_work(f"checking {path}"):
                 campaign = load(path)
+                require_answers(campaign)
                 costs = estimate(campaign)
         except CampaignError as error:
             problems += list(error.args)
@@ -128,6 +129,14 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         print_json({"units": {"bytes": "B", "seconds": "s", "compiling": "s"}, "rows": rows})
     if problems:
         raise CampaignError(*problems)
+
+
+def require_answers(campaign: Campaign) -> None:
+    """Refuse realisations until constants are known that no fit finds; fits are imported for such campaigns only."""
+    if campaign.replication.answers:
+        from mdr_dask.fits.answers import require_known
+
+        require_known(campaign)
 
 
 def ask(campaign: Campaign) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN, ask
+from mdr_dask.cli.campaigns import CAMPAIGN, ask, require_answers
 from mdr_dask.cli.log import telling
 from mdr_dask.cli.printing import print_json
 from mdr_dask.cli.progress import reporter
@@ -59,6 +59,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     if url.startswith("memory:"):
         raise click.UsageError(f"expected a store that outlasts this command, got {url!r}")
     ask(study)
+    require_answers(study)
     if dry_run:
         _print_plan(study, url, form)
         return 0
@@ -82,7 +83,7 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
 
         progress = outlook(study, url)
         kept, to_do = progress.kept, progress.to_do
-        if not to_do and not study.replication.until and form != "json":
+        if not to_do and not study.replication.goes_on and form != "json":
             click.echo(f"{url}: all {kept} results are there already; nothing to do")
             return
     costs = estimate(study)

@@ -66,6 +66,7 @@ def find_cells(
         open_states += [Status.FAILED, Status.NOT_CONVERGED]
     in_round = np.zeros(status.shape, dtype=bool)
     in_round[..., slice(*realisations)] = asked[..., None]
+    in_round[..., : realisations[0]] |= needed[..., None] & (status[..., : realisations[0]] == Status.NOT_NEEDED)
     if own is not None:
         in_round &= own
     wanted = in_round & needed[..., None] & np.isin(status, open_states)

@@ -10,14 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import store
+from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
+from mdr_dask.execute.answers import cases_that_narrow, unanswered
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
 from mdr_dask.execute.executors import Execute, check, executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import cases_of, following, stored_layout
+from mdr_dask.fits.answers import require_known
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Stage
 from mdr_dask.replication import needs_more, rounds
@@ -47,12 +50,16 @@ class _Job:
 
 @dataclass(frozen=True)
 class _Round:
-    """One round: the shape of the store, its cases and those of them still needed, the realisations (from, to)."""
+    """One round: the shape of the store, its cases and those of them still needed, the realisations (from, to).
+
+    `taken` is how many realisations each case has taken part in.
+    """
 
     layout: tuple[Template, ...]
     asked: Masks
     needed: Masks
     realisations: tuple[int, int]
+    taken: tuple[IntArray, ...]
 
 
 def run(
@@ -100,6 +107,8 @@ def run(
         If a cluster cannot be started, goes away, or has no worker for too long.
     """
     check(resources)  # what is refused leaves no lock behind
+    if campaign.replication.answers:
+        require_known(campaign)
     stored_layout(Stage.first(campaign), url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
@@ -148,7 +157,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
             for t, mask in zip(layout, asked, strict=True)
         ]
         progress = _begin_round(progress, groups)
-        if progress.to_do or campaign.replication.until or not stage.is_adaptive:
+        if progress.to_do or campaign.replication.goes_on or not stage.is_adaptive:
             break
         stage, _ = following(url, stage, layout, places, count)
     return progress
@@ -206,6 +215,8 @@ def _run_rounds(job: _Job, run_round: Callable[[_Round, list[Cells]], None]) -> 
         is_last = count == replication.at_most and not job.stage.is_adaptive
         if job.part and not is_last and not _others_are_done(job, job.part, current):
             return None
+    if current and (short := list(unanswered(job.url, job.stage, current.layout, current.taken))):
+        job.tell(Event("not answered", {"answers": len(short)}, "; ".join(short)))
     return current
 
 
@@ -213,7 +224,8 @@ def _spare_the_rest(job: _Job, run_round: Callable[[_Round, list[Cells]], None],
     """Write down as not needed what no stage has asked for."""
     layout, places = stored_layout(job.stage, job.url)
     asked = cases_of(job.stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in job.stage.meshes])
-    rest = _Round(layout, asked, [np.zeros_like(mask) for mask in asked], (0, realisations))
+    nothing = [np.zeros_like(mask) for mask in asked]
+    rest = _Round(layout, asked, nothing, (0, realisations), tuple(mask.astype(np.int64) for mask in nothing))
     run_round(rest, [replace(cells, kept=0) for cells in _find(job, rest)])
 
 
@@ -225,7 +237,11 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
         before = last.realisations[1] if last else 0
         needed = asked
         if last:
-            needed = [mask & _still_wide(job.url, t, before) for mask, t in zip(last.needed, layout, strict=True)]
+            narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
+            needed = [
+                mask & _still_wide(job.url, template, before) | cases
+                for mask, template, cases in zip(last.needed, layout, narrow, strict=True)
+            ]
         if any(mask.any() for mask in needed):
             job.tell(Event("laying out", {"realisations": count}))
             layout = _grow(layout, count)
@@ -233,7 +249,9 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
                 store.lay_out(job.url, layout)
             blocks = {template.series.name or "-": list(template.grid) for template in layout}
             job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
-    return _Round(layout, asked, needed, (before, count))
+    earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
+    taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
+    return _Round(layout, asked, needed, (before, count), taken)
 
 
 def _find(job: _Job, current: _Round) -> list[Cells]:

@@ -43,6 +43,8 @@ class Fit:
         of fit, and ``law_holds``; units in attrs.
     apart : bool
         Whether each series of a store is fitted for itself, with a mapping of that one series only.
+    constants : tuple of str
+        Constants with an interval that realisations may go on for (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -50,6 +52,7 @@ class Fit:
     summary: str
     compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset]
     apart: bool = False
+    constants: tuple[str, ...] = ()
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store: one result for each series that has the data for it, or one for all series together.

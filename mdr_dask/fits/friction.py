@@ -188,12 +188,19 @@ def table_of(
     return Table(flat[0], flat[1], tuple(column[:, 0] for column in flat[2:]))
 
 
-def _region_one(rate: FloatArray) -> int | None:
-    """Return where friction begins to go with the velocity: the lowest one, but for the floor of the papers' method."""
-    if rate.size == 1:
+def _region_one(friction: FloatArray, velocity: FloatArray) -> int | None:
+    """Return where friction begins to go with the velocity: the lowest one, but for the floor of the papers' method.
+
+    Neighbours are compared on the lines that both have.
+    """
+    if velocity.size == 1:
         return 0
-    linear = np.flatnonzero(np.abs(rate[1:] / rate[:-1] - 1) < LINEAR)
-    return int(linear[0]) if linear.size else None
+    for k in range(velocity.size - 1):
+        both = friction[k : k + 2, np.isfinite(friction[k : k + 2]).all(axis=0)]
+        low, high = both.mean(axis=1) / velocity[k : k + 2] if both.size else (np.nan, np.nan)
+        if abs(high / low - 1) < LINEAR:
+            return k
+    return None
 
 
 def _zone_one(data: xr.Dataset) -> Variables:
@@ -206,7 +213,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     for load in np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & (rate > 0)]):
         same = np.flatnonzero((force == load) & (rate > 0))
         same = same[np.argsort(velocity[same])]
-        at = _region_one(rate[same])
+        at = _region_one(table.friction[same], velocity[same])
         if at is not None:
             used.append(same[at])
     if len(used) < 3:
@@ -506,6 +513,7 @@ FITS: tuple[Fit, ...] = (
         "alpha and beta of mu / slope = beta (v tau slope / h) (G h L / F_N)^alpha (eq. 3.11)",
         lambda series: each(series, zone_one_axes, _zone_one),
         apart=True,
+        constants=("alpha", "beta"),
     ),
     Fit(
         "plateau",
@@ -513,6 +521,7 @@ FITS: tuple[Fit, ...] = (
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
         lambda series: each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
         apart=True,
+        constants=("plateau",),
     ),
     Fit(
         "interpolation",
@@ -520,6 +529,7 @@ FITS: tuple[Fit, ...] = (
         "alpha and beta of the interpolation law through regions I to III and both zones (eq. 3.18)",
         lambda series: each(series, zone_one_axes, _interpolation),
         apart=True,
+        constants=("alpha", "beta"),
     ),
     Fit(
         "indenter",
@@ -527,5 +537,6 @@ FITS: tuple[Fit, ...] = (
         "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
         lambda series: each(series, _indenter_axes, _indenter),
         apart=True,
+        constants=("exponent",),
     ),
 )

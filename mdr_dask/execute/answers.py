@@ -1,0 +1,104 @@
+"""Stopping at the answer: which cases take part in the next round for the sake of a fitted constant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+
+from mdr_dask import fits, store
+from mdr_dask.arrays import BoolArray, IntArray
+from mdr_dask.campaign import Series
+from mdr_dask.errors import FitError
+from mdr_dask.execute.stages import Places, cases_of
+from mdr_dask.fits.answers import cases_behind, half_widths, is_wide
+from mdr_dask.models.base import Status
+from mdr_dask.plan import Template
+from mdr_dask.refinement import Mesh, Stage
+from mdr_dask.replication import FEWEST
+
+
+def cases_that_narrow(
+    url: str, stage: Stage, layout: Sequence[Template], places: Places, taken: Sequence[IntArray]
+) -> list[BoolArray]:
+    """Return the cases that constants follow from whose intervals are too wide.
+
+    Parameters
+    ----------
+    url, stage, layout, places
+        The store, the campaign, and where its cases lie in the store.
+    taken : sequence of int array
+        Realisations of every case that count, by group; what else the store holds does not matter here.
+    """
+    answers = stage.campaign.replication.answers
+    if not answers:
+        return [np.zeros(each.shape, dtype=bool) for each in taken]
+    if max(int(each.max()) for each in taken) < FEWEST:
+        return cases_of(stage, layout, places, stage.new)
+    groups = _groups(url, stage, layout, taken)
+    known = fits.available(stage.campaign.model)
+    found = {name: xr.zeros_like(data["status"][..., 0], dtype=bool) for name, data in groups.items()}
+    for answer, tolerance in answers.items():
+        fit = known[answer.partition(".")[0]]
+        constant = answer.partition(".")[2]
+        try:
+            results = half_widths(fit, constant, groups)
+        except FitError:
+            continue  # `unanswered` says so at the end
+        for result, (value, half) in results.items():
+            wide = is_wide(value, half, tolerance)
+            for name in [result] if fit.apart else groups:
+                if bool(wide.any()):
+                    found[name] = found[name] | cases_behind(fit, constant, groups, name, wide)
+    cases = [_of_mesh(found[name], mesh) for name, mesh in zip(groups, stage.meshes, strict=True)]
+    return cases_of(stage, layout, places, cases)
+
+
+def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
+    """Yield a sentence for every constant that is not known as well as it should be."""
+    answers = stage.campaign.replication.answers
+    groups = _groups(url, stage, layout, taken) if answers else {}
+    known = fits.available(stage.campaign.model) if answers else {}
+    for answer, tolerance in answers.items():
+        name, _, constant = answer.partition(".")
+        try:
+            results = half_widths(known[name], constant, groups)
+        except FitError as error:
+            yield f"{answer}: {error}"
+            continue
+        for series, (value, half) in results.items():
+            where = f"{series}: " if series else ""
+            wide = half.where(is_wide(value, half, tolerance))
+            if bool(wide.notnull().any()):
+                most = stage.campaign.replication.at_most
+                yield f"{where}{answer}: half of the interval is {float(wide.max()):.2g} after {most} realisations"
+            if bool(half.isnull().any()):
+                yield f"{where}{answer}: no interval, the law does not hold or its end is not reached"
+
+
+def _groups(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> dict[str, xr.Dataset]:
+    """Return the cases of a campaign with the realisations that count, by series; others are NaN."""
+    opened, groups = store.datasets(url), {}
+    for mesh, template, count in zip(stage.meshes, layout, taken, strict=True):
+        name = template.series.name
+        data = opened[name if name in opened else next(iter(opened))]  # without a name it is the first one
+        counts = xr.DataArray(count, dims=template.dims[:-1], coords=_coordinates(template.series))
+        counts = counts.sel({dim: data[dim] for dim in counts.indexes})
+        here = {dim: data[dim].isin(list(own)).to_numpy() for dim, own in _coordinates(mesh.series).items()}
+        first = data.isel({**here, "realisation": slice(0, int(count.max()))}).load()
+        number = xr.DataArray(np.arange(first.sizes["realisation"]), dims="realisation")
+        valid = (first["status"] == Status.DONE) & (number < counts.isel(here).drop_vars(counts.coords))
+        kept = {key: array.where(valid) for key, array in first.data_vars.items() if key != "status"}
+        groups[name] = first.assign(kept)
+    return groups
+
+
+def _coordinates(series: Series) -> dict[str, list[object]]:
+    return {axis.dim: list(axis.labels or axis.values) for axis in series.axes if axis.dim == axis.name}
+
+
+def _of_mesh(cases: xr.DataArray, mesh: Mesh) -> BoolArray:
+    """Return cases over the dimensions of a series, in its own order."""
+    ordered = cases.sel({dim: own for dim, own in _coordinates(mesh.series).items() if dim in cases.indexes})
+    return np.asarray(ordered.transpose(*mesh.series.sizes).to_numpy())

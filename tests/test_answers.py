@@ -1,0 +1,189 @@
+"""Rounds of realisations until a fitted constant is known, spent on the cases that it follows from."""
+
+import dataclasses
+import re
+
+import numpy as np
+import planted
+import pytest
+import xarray as xr
+from test_execute import digests, run
+
+from mdr_dask import bootstrap, execute, fits, store
+from mdr_dask.campaign import Replication, Tolerance, loads
+from mdr_dask.cli import main
+from mdr_dask.errors import CampaignError, FitError
+from mdr_dask.execute import Part, Resources
+from mdr_dask.fits.base import Fit
+
+TEXT = """
+name: answers
+model: sliding_friction
+seed: 5
+realisations: {{at_least: 10, at_most: 40, until: {{{until}}}}}
+parameters:
+  length: 20 mm
+  points: 500
+  hurst: 0.7
+  rms_roughness: 0.5 um
+  shear_modulus: 10 MPa
+  relaxation_time: 1 ms
+  normal_force: [6 mN, 2 mN, 20 mN, 1 N]
+  velocity: [1 nm/s, 10 nm/s, 1 m/s]
+outputs: [friction_coefficient]
+errors: false
+"""
+
+
+def study(until):
+    return loads(TEXT.format(until=until), "a.yaml", ".")
+
+
+def _level(series):
+    """Return the mean height at the positions below 4 m: one constant for each slope."""
+    data = series[""]
+    near = data.height.where(data.position < 4, drop=True)
+    if not near.size:
+        raise FitError("expected positions below 4 m")
+    values = near.transpose("realisation", "slope", "position").to_numpy()
+    stack, count = bootstrap.means(values).mean(axis=-1), int(np.isfinite(values).sum(axis=0).min())
+    low, high = bootstrap.interval(stack, count)
+    names = {"level": stack[0], "level_low": low, "level_high": high}
+    return xr.Dataset({key: ("slope", value) for key, value in names.items()}, {"slope": data.slope})
+
+
+LEVEL = Fit("level", ("toy",), "mean height", _level, apart=True, constants=("level",))
+
+
+@pytest.fixture
+def own(toy, monkeypatch):
+    """Return a study of the toy model, with a fit of one's own, to a tolerance."""
+    monkeypatch.setattr(fits, "available", lambda _: {"level": LEVEL})
+    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: {"level": LEVEL})
+
+    def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0)):
+        rounds = Replication(10, at_most, {}, {"level.level": tolerance})
+        axes = toy.axis("slope", [0.0, 1.0, 9.0]), toy.axis("position", positions)
+        return toy.campaign(*axes, realisations=rounds, noise=0.5)
+
+    return campaign
+
+
+def taken(url):
+    return store.datasets(url)[""].height.notnull().sum("realisation").load()
+
+
+def test_only_rows_and_columns_that_a_constant_follows_from_go_on(own, url):
+    run(own(Tolerance(absolute=0.25, relative=0.2)), url)
+    found = taken(url)
+    assert (found.sel(position=5.0) == 10).all()  # the fit does not use it
+    assert (found.sel(slope=9.0) == 10).all()  # a part of a large constant
+    rest = found.sel(slope=[0.0, 1.0], position=[1.0, 2.0, 3.0])
+    assert (rest > 10).all()
+    assert (rest == rest[:, :1]).all()  # what a fit compares has the same lines
+    result = _level({"": store.datasets(url)[""].load()})
+    half = (result.level_high - result.level_low) / 2
+    assert (half <= np.maximum(0.25, 0.2 * abs(result.level))).all()
+
+
+def test_the_same_bytes_however_often_it_stops_and_whoever_works(own, toy, tmp_path):
+    campaign = own(Tolerance(absolute=0.2))
+    whole, broken, parts = (str(tmp_path / name) for name in ("a.zarr", "b.zarr", "c.zarr"))
+    run(campaign, whole)
+    blocks = 0
+
+    def stop(progress):
+        nonlocal blocks
+        blocks += 1
+        if blocks in (2, 5, 9):
+            raise KeyboardInterrupt
+
+    for _ in range(5):
+        try:
+            execute.run(campaign, broken, Resources(threads=1), stop)
+        except KeyboardInterrupt:
+            continue
+    for _ in range(6):
+        for number in (1, 2):
+            run(campaign, parts, part=Part(number, 2))
+    run(campaign, parts)
+    assert blocks > 9
+    assert digests(whole) == digests(broken) == digests(parts)
+    assert run(campaign, whole).done == 0
+
+
+def test_a_study_in_a_larger_store_is_judged_by_its_own_cases_and_lines(own, toy, tmp_path):
+    small, large = (str(tmp_path / name) for name in ("small.zarr", "large.zarr"))
+    campaign = own(Tolerance(absolute=0.3))
+    run(campaign, small)
+    run(dataclasses.replace(own(Tolerance(absolute=0.3), positions=(5.0, 2.0, 0.5, 1.0, 3.0))), large)
+    run(campaign, large)
+    np.testing.assert_array_equal(taken(small).drop_vars("position"), taken(large).sel(position=[1.0, 2.0, 3.0, 5.0]))
+
+
+def test_what_is_not_answered_is_said(own, tmp_path):
+    for name, campaign, expected in (
+        (
+            "a",
+            own(Tolerance(absolute=1e-3), at_most=20),
+            r"level\.level: half of the interval is .* after 20 realisations",
+        ),
+        ("b", own(Tolerance(absolute=1e-3), positions=(5.0, 6.0)), r"level\.level: expected positions below 4 m"),
+    ):
+        told = []
+        run(campaign, str(tmp_path / f"{name}.zarr"), tell=told.append)
+        (event,) = [event for event in told if event.name == "not answered"]
+        assert re.search(expected, event.sentence)
+    assert int(taken(str(tmp_path / "b.zarr")).max()) == 10
+
+
+def test_zone_one_goes_on_in_region_one_alone_and_ends_narrow_enough(url):
+    run(study("zone_one.alpha: 0.06"), url)
+    data = store.datasets(url)
+    found = fits.available("sliding_friction")["zone_one"].results(data)[""]
+    done = data[""].friction_coefficient.notnull().sum("realisation")
+    assert float(found.alpha_high - found.alpha_low) / 2 <= 0.06
+    assert done.max() > 10
+    assert (done.sel(normal_force=1.0) == 10).all()  # beyond zone 1
+    assert (done.sel(velocity=1.0) == 10).all()  # beyond region I
+    assert float(found.loads) == 3
+
+
+def test_what_is_no_output_is_a_constant_of_a_fit():
+    wanted = study("friction_coefficient: 1 %, zone_one.alpha: 0.01, plateau: 2 %").replication
+    assert wanted.until == {"friction_coefficient": Tolerance(relative=0.01)}
+    assert wanted.answers == {"zone_one.alpha": Tolerance(absolute=0.01), "plateau.plateau": Tolerance(relative=0.02)}
+
+
+@pytest.mark.parametrize(
+    ("until", "expected"),
+    [
+        ("zone_two.alpha: 0.01", "until.zone_two.alpha: neither an output nor a fit of .*did you mean 'zone_one'"),
+        (
+            "zone_one.gamma: 0.01",
+            r"expected a constant with an interval of the fit zone_one \(alpha, beta\), got 'gamma'",
+        ),
+        ("calibration.tau: 1 %", r"of the fit calibration \(none\), got 'tau'"),
+    ],
+)
+def test_what_is_neither_is_refused_before_anything_is_written(url, tmp_path, capsys, until, expected):
+    with pytest.raises(CampaignError, match=expected):
+        run(study(until), url)
+    (tmp_path / "a.yaml").write_text(TEXT.format(until=until))
+    assert main(["check", str(tmp_path / "a.yaml")]) == 2
+    assert re.search(expected, capsys.readouterr().err)
+    (tmp_path / "a.yaml").unlink()
+    assert not list(tmp_path.iterdir())
+
+
+def test_fits_have_the_constants_that_they_declare(tmp_path):
+    text = "model" + TEXT.partition("model")[2].replace("points: 500", "points: 400").replace(
+        "1 m/s]", "1 mm/s, 1 m/s, 1 km/s]"
+    )
+    text = "\n".join(line for line in text.splitlines() if not line.startswith(("seed", "realisations")))
+    data = planted.make(tmp_path, text.replace("[friction_coefficient]", "[friction_coefficient, rms_slope]"))
+    for name in ("zone_one", "plateau", "interpolation"):
+        law = fits.available("sliding_friction")[name]
+        (result,) = law.results(data).values()
+        assert law.constants
+        assert {f"{constant}{end}" for constant in law.constants for end in ("", "_low", "_high")} <= set(result)
