@@ -332,7 +332,7 @@ def _errors(name: str, data: xr.Dataset) -> Iterator[Table]:
     ]
     note = (
         "Standard error of the mean over realisations (lines) and estimated discretisation error (grid), relative to "
-        "the mean of each case. A dash: not known."
+        "the mean of each case. A dash: not known. Over 100 %: the mean is zero within its error."
     )
     if rows:
         yield Table(f"Errors{' of ' + name if name else ''}", headings, rows, note)
@@ -343,6 +343,8 @@ def _percent(values: Any, at: float) -> str:
     if not known.size:
         return "-"
     percent = 100 * float(np.quantile(known, at))
+    if percent > 100:
+        return "over 100 %"
     return f"{percent:.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
