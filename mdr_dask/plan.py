@@ -33,8 +33,6 @@ REPEATED_WORK = 1.15
 RECORDS_TOGETHER = 1000
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
-#: Most values of an axis that are asked for notes.
-NOTED = 64
 #: More cases than this are a mistake in the file, not a study.
 MOST_CASES = 10**9
 
@@ -96,7 +94,7 @@ class Template:
     def notes(self) -> tuple[str, ...]:
         """What parts and model say of the parameters, each sentence once, every axis by itself."""
         base = self.series.parameters
-        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in _noted(axis))]
+        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         told = [note for parameters in sets for note in notes_of(parameters)]
         return tuple(dict.fromkeys((*told, *models.load(self.campaign.model).notes(sets))))
 
@@ -180,12 +178,6 @@ class Template:
             start = round(position * (size - chunks[dim]))
             region[dim] = slice(start, start + chunks[dim])
         return self._block(region)
-
-
-def _noted(axis: Axis) -> list[Any]:
-    """Return some values of an axis, the first and the last among them."""
-    places = np.linspace(0, len(axis.values) - 1, min(len(axis.values), NOTED)).round().astype(int)
-    return [axis.values[place] for place in places]
 
 
 def _numbers(tree: Mapping[str, Any]) -> int:
