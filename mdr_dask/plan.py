@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models
-from mdr_dask.campaign import Axis, Campaign, Series
+from mdr_dask.campaign import Axis, Campaign, Series, measured
 from mdr_dask.errors import CampaignError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, replaced
 
@@ -385,7 +385,7 @@ def estimate(campaign: Campaign) -> Estimate:
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
         files=1 + sum(part.files for part in parts),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
         compiling=model.compiling,
         growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
     )

@@ -111,7 +111,7 @@ class _Expansion:
             return
         first, *others = (model.coordinates(replaced(base, axis.path, value)) for value in axis.some)
         for output in wanted:
-            for dim in output.dims:
+            for dim in first.keys() & set(output.dims):
                 if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):
                     what = f"expected one value, for it sets at which {dim} {output.name} is stored"
                     self._complain(origin, f"{what} (give each value a series of its own)")

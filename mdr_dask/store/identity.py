@@ -237,5 +237,5 @@ def _restore(series: Series, path: str, plain: Any) -> Any:
         return plain
     *above, last = path.split(".")
     info = type(reduce(getattr, above, series.parameters)).model_fields[last]
-    restored: Any = TypeAdapter(Annotated[info.annotation, info]).validate_json(json.dumps(plain))
-    return restored
+    kind: Any = Annotated[info.annotation, info]
+    return TypeAdapter(kind).validate_json(json.dumps(plain))
