@@ -96,8 +96,11 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
 
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
     """Return the axes of a campaign that its table of measurements does not name; none where it has no table."""
-    table, found = campaign.measured, []
-    for one in campaign.series if table else ():
+    table = campaign.measured
+    if table is None:
+        return ()
+    found: list[str] = []
+    for one in campaign.series:
         try:
             measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
         except DataError:

@@ -75,7 +75,8 @@ def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr
 
 
 def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
-    return np.maximum(tolerance.absolute, tolerance.relative * abs(value))
+    relative = tolerance.relative * abs(value)
+    return relative.where(relative > tolerance.absolute, tolerance.absolute)
 
 
 def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
@@ -92,7 +93,7 @@ def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -
         return {name: (half - scale * now[name][1]) / (1 - scale) for name, (_, half) in found.items()}
 
     more = left(1 + LESS)
-    return {name: np.minimum(less, more[name]) for name, less in left(1 - LESS).items()}
+    return {name: less.where(less < more[name], more[name]) for name, less in left(1 - LESS).items()}
 
 
 def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
