@@ -22,7 +22,18 @@ from pathlib import Path
 from typing import Any
 
 from mdr_dask.errors import StoreBusyError, StoreError
-from mdr_dask.store.files import CLAIMS, conditional, create, guarded, listed, local, read_json, remove, write_bytes
+from mdr_dask.store.files import (
+    CLAIMS,
+    conditional,
+    create,
+    guarded,
+    listed,
+    local,
+    read_bytes,
+    read_json,
+    remove,
+    write_bytes,
+)
 
 try:
     import fcntl
@@ -32,6 +43,8 @@ except ImportError:  # a system without it: claims are held instead
 #: Seconds between two signs of life of the owner of a claim, and after which a silent one counts as gone.
 BEAT = 10.0
 SILENCE = 60.0
+#: How often claims are listed again when the last one is gone before it is read.
+LISTINGS = 10
 #: What a file system without locks answers.
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP)
 
@@ -270,7 +283,11 @@ def _claimed(url: str, name: str) -> Iterator[Hold]:
 
 def _stake(url: str, name: str, owner: str) -> int:
     """Make the next claim, unless the owner of the last one is alive; return its number."""
-    standing = [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
+    standing = _numbers(url, name)
+    for _ in range(LISTINGS):
+        if not standing or read_bytes(url, _claim(name, max(standing))) is not None:
+            break
+        standing = _numbers(url, name)  # its owner has just left
     number = max(standing, default=0) + 1
     if standing:
         _require_silence(url, name, number - 1)
@@ -283,6 +300,10 @@ def _stake(url: str, name: str, owner: str) -> int:
         log.warning("%s: nothing here keeps two runs apart (no conditional write): start one at a time", url)
     remove(url, [old for n in standing for old in (_claim(name, n), _life(name, n))])
     return number
+
+
+def _numbers(url: str, name: str) -> list[int]:
+    return [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
 
 
 def _require_silence(url: str, name: str, number: int) -> None:
