@@ -305,7 +305,7 @@ def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> Flo
     return np.where(length > 0, np.asarray(resistivity) / safe, np.inf)
 
 
-class Interval(NamedTuple):
+class Proportion(NamedTuple):
     """A probability with its standard error and the ends of its interval."""
 
     mean: float
@@ -314,7 +314,7 @@ class Interval(NamedTuple):
     high: float
 
 
-def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence: float = 0.95) -> Interval:
+def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence: float = 0.95) -> Proportion:
     """Return the probability of contact of one turn with an interval from its batches.
 
     Parameters
@@ -328,7 +328,7 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
 
     Returns
     -------
-    Interval
+    Proportion
         From the means of batches at least five windows long (40 at most), with Student's t, cut to [0, 1]; NaN for all
         but the mean if the trace is too short for two batches.
     """
@@ -337,9 +337,9 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
     mean = float(in_contact.mean())
     batches = min(40, in_contact.size // (5 * window))
     if batches < 2:
-        return Interval(mean, np.nan, np.nan, np.nan)
+        return Proportion(mean, np.nan, np.nan, np.nan)
     size = in_contact.size // batches
     means = in_contact[: batches * size].reshape(batches, size).mean(axis=1)
     error = float(means.std(ddof=1) / np.sqrt(batches))
     reach = float(stdtrit(batches - 1, (1 + confidence) / 2)) * error
-    return Interval(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))
+    return Proportion(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))

@@ -181,7 +181,7 @@ def line_contact(
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
 
-class Estimate(NamedTuple):
+class Limit(NamedTuple):
     """What values on nested grids tend to, its estimated absolute error, and the order of convergence observed.
 
     Each is a number or an array; the order is NaN where the values do not approach anything steadily.
@@ -191,12 +191,12 @@ class Estimate(NamedTuple):
     error: FloatArray
     order: FloatArray
 
-    def scaled(self, factor: float) -> Estimate:
+    def scaled(self, factor: float) -> Limit:
         """Return the estimate in another unit."""
-        return Estimate(self.value * factor, self.error * factor, self.order)
+        return Limit(self.value * factor, self.error * factor, self.order)
 
 
-def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
+def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Limit:
     """Return what values on grids of halved spacing tend to.
 
     Where the changes from grid to grid shrink at about second order, the limit is Richardson's, to third order, and the
@@ -212,7 +212,7 @@ def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
 
     Returns
     -------
-    Estimate
+    Limit
         Elementwise; an error is infinite where a coarser grid has no value.
     """
     coarse, middle, fine = np.asarray(values[-3:], dtype=np.float64)
@@ -226,7 +226,7 @@ def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
     is_trusted = (order >= settings.lowest_order) & (order <= settings.highest_order)
     value = np.where(is_trusted, limit + (limit - earlier) / 7, fine)
     error = np.where(is_trusted, trusted, np.abs(last) * np.maximum(1.0, 1 / (slow - 1)))
-    return Estimate(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
+    return Limit(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class LineSolution:
         One sentence if no film was found, else empty.
     grids : tuple of GridSolution
         The last three grids, the finest last; empty if no film was found.
-    central_film, minimum_film : Estimate
+    central_film, minimum_film : Limit
         In ``a^2/R``; NaN if no film was found.
     steps : int
         Newton steps on all grids together.
@@ -253,8 +253,8 @@ class LineSolution:
     outcome: Outcome
     reason: str
     grids: tuple[GridSolution, ...]
-    central_film: Estimate
-    minimum_film: Estimate
+    central_film: Limit
+    minimum_film: Limit
     steps: int
 
     @property
@@ -272,7 +272,7 @@ class LineSolution:
         """Relative deviation of the pressure's integral from the load."""
         return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
-    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Estimate:
+    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Limit:
         """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
         return extrapolate(np.array([reading(grid) for grid in self.grids]))
 
@@ -343,7 +343,7 @@ def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, G
     return outcome, state, steps
 
 
-def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
+def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
     """Return the film and pressure of a lubricated line contact.
 
     Parameters
@@ -363,7 +363,7 @@ def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTIN
 
     Examples
     --------
-    >>> found = solve(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
+    >>> found = solve_film(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
     >>> central = found.central_film.scaled(8 * 2e-5 / np.pi)  # a^2/R^2
     >>> print(f"h_c/R = {central.value:.3e}")
     h_c/R = 2.546e-05
@@ -398,7 +398,7 @@ def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> Line
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution, steps: int) -> LineSolution:
     """Return a solution without a film, and why there is none."""
-    none = Estimate(*(np.array(np.nan),) * 3)
+    none = Limit(*(np.array(np.nan),) * 3)
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"
     return LineSolution(case, outcome, reason, (), none, none, steps)
