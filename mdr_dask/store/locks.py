@@ -283,14 +283,13 @@ def _claimed(url: str, name: str) -> Iterator[Hold]:
 
 def _stake(url: str, name: str, owner: str) -> int:
     """Make the next claim, unless the owner of the last one is alive; return its number."""
-    standing = _numbers(url, name)
     for _ in range(LISTINGS):
-        if not standing or read_bytes(url, _claim(name, max(standing))) is not None:
+        standing = _numbers(url, name)
+        if not standing or _is_silent(url, name, max(standing)):
             break
-        standing = _numbers(url, name)  # its owner has just left
+    else:
+        raise _busy(url, "another process")
     number = max(standing, default=0) + 1
-    if standing:
-        _require_silence(url, name, number - 1)
     content = json.dumps({"owner": owner, "who": _me(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
         held = _told(url, _claim(name, number))
@@ -306,15 +305,20 @@ def _numbers(url: str, name: str) -> list[int]:
     return [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
 
 
-def _require_silence(url: str, name: str, number: int) -> None:
-    """Refuse if the owner of a claim has given a sign of life, by its own clock or while we wait for one."""
+def _is_silent(url: str, name: str, number: int) -> bool:
+    """Refuse if the owner of a claim has given a sign of life, by its own clock or while we wait for one.
+
+    False if the claim is gone: its owner has just left, and somebody else may have come.
+    """
     claim = _told(url, _claim(name, number))
+    if not claim and read_bytes(url, _claim(name, number)) is None:
+        return False
     last = _told(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) > SILENCE:
         log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
         time.sleep(2 * BEAT)
         if (_told(url, _life(name, number)) or claim) == last:
-            return
+            return True
     raise _busy(url, claim.get("who", "another process"))
 
 
