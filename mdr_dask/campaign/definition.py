@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import DataFile, Parameters
+from mdr_dask.models.base import Parameters
+from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
 

@@ -15,7 +15,7 @@ from mdr_dask.physics.superposition.least_squares import (
     restricted,
     rows,
 )
-from mdr_dask.physics.superposition.problem import Problem
+from mdr_dask.physics.superposition.problem import ShiftProblem
 from mdr_dask.physics.superposition.steps import likelihoods
 
 STEP, WEIGHT = 0.25, 0.3
@@ -24,7 +24,7 @@ STEP, WEIGHT = 0.25, 0.3
 def data(curves=3, points=9, noise=0.01):
     random, x = np.random.default_rng(0), np.linspace(-1, 1, points)
     pieces = [(x, np.tanh(x + 0.4 * k) + noise * random.standard_normal(points)) for k in range(curves)]
-    return Problem.of(pieces)
+    return ShiftProblem.of(pieces)
 
 
 def dense(points, across):

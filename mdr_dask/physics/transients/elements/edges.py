@@ -13,14 +13,7 @@ import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
-
-
-class Line(NamedTuple):
-    """Heights and slopes at n + 1 nodes of a line of unit length, and whether it closes."""
-
-    height: FloatArray
-    slope: FloatArray
-    periodic: bool
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
 class Edges(NamedTuple):
@@ -31,19 +24,20 @@ class Edges(NamedTuple):
 
 
 @njit(nogil=True, cache=True)
-def under_elements(line: Line, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope over every element after a travel, from cubic cells; return the whole cells of it."""
+def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
+    """Write height and slope (over the line's length) above every element after a travel; return its whole cells."""
     n = under.size
     cells = travel * n
     shift = int(np.floor(cells))
     y = cells - shift
     a0, a1 = (1 + 2 * y) * (1 - y) ** 2, y * y * (3 - 2 * y)
-    b0, b1 = y * (1 - y) ** 2 / n, y * y * (y - 1) / n
-    g0, k0, k1 = 6 * y * (y - 1) * n, (1 - y) * (1 - 3 * y), y * (3 * y - 2)
+    b0, b1 = y * (1 - y) ** 2, y * y * (y - 1)
+    g0, k0, k1 = 6 * y * (y - 1), (1 - y) * (1 - 3 * y), y * (3 * y - 2)
     i = shift % n
     for j in range(n):
-        under[j] = a0 * line.height[i] + a1 * line.height[i + 1] + b0 * line.slope[i] + b1 * line.slope[i + 1]
-        slope_under[j] = g0 * (line.height[i] - line.height[i + 1]) + k0 * line.slope[i] + k1 * line.slope[i + 1]
+        before, after, enter, leave = line.height[i], line.height[i + 1], line.enter[i], line.leave[i]
+        under[j] = a0 * before + a1 * after + b0 * enter + b1 * leave
+        slope_under[j] = n * (g0 * (before - after) + k0 * enter + k1 * leave)
         i = i + 1 if i + 1 < n else 0
     return shift
 

@@ -12,7 +12,8 @@ from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.elements.edges import Edges, Line, carrying_rate, depth_for, under_elements
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
+from mdr_dask.physics.transients.elements.edges import Edges, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Scratch,
@@ -370,7 +371,7 @@ def forces_now(
 @njit(nogil=True, cache=True)
 def follow_elements(
     solid: Foundation,
-    line: Line,
+    line: CubicLine,
     schedule: Schedule,
     state: State,
     depth: float,
@@ -414,56 +415,7 @@ def follow_elements(
 
 
 @njit(nogil=True, cache=True)
-def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
-    """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
-
-    The line may have a multiple of the nodes that there are elements.
-
-    Return whether it did, and its displacement at the end.
-    """
-    n, scratch = line.height.size - 1, scratch_for(solid)
-    every = n // state.displacement.size
-    step = 1 / (n * deborah)
-    decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
-    fading(solid, step, decay, fades)
-    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
-    top = int(np.argmax(line.height[:n])) if line.periodic else 0
-    w0 = depth + line.height[top]
-    u, touching = max(w0, 0.0), w0 > 0
-    free = 0.0
-    for _ in range(turns if line.periodic else 1):
-        last[:] = arms[0]
-        before = u
-        for cell in range(n):
-            i = (top + cell) % n
-            if not touching:
-                free = u
-                free_arms[0, :] = arms[0]
-            if i % every == 0:
-                j = i // every
-                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.arms[j, :] = arms[0]
-                state.free_arms[j, :] = free_arms[0]
-            w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            rise0, rise1 = deborah * line.slope[i], deborah * line.slope[i + 1]
-            part, leaves = 0.0, u
-            if touching:
-                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
-            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
-            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
-            u, touching, _, _ = advance(
-                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
-            )
-        change = abs(u - before)
-        for m in range(arms.size):
-            change = max(change, abs(arms[0, m] - last[m]))
-        if line.periodic and change <= 1e-13 * abs(u):
-            return True, u
-    return not line.periodic, u
-
-
-@njit(nogil=True, cache=True)
-def note_edges(solid: Foundation, line: Line, state: State, depth: float, deborah: float, load: float) -> None:
+def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
     under_elements(line, 0.0, workspace.under, workspace.slope)
