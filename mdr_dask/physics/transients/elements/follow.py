@@ -20,7 +20,7 @@ from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Lapse,
     Release,
-    Track,
+    Rise,
     advance,
     fading,
     flight,
@@ -201,8 +201,8 @@ def _orbit(
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             part, leaves = 0.0, u
             if touching:
-                track = Track(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
-                part, leaves = release(solid, lapse, track, arms, 0)
+                rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
+                part, leaves = release(solid, lapse, rise, arms, 0)
             after = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
             free = fly(solid, free, free_arms, 0, lapse.decay, lapse.scratch.modes)
             u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), arms, 0)

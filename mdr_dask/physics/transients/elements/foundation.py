@@ -102,7 +102,7 @@ class Lapse(NamedTuple):
     scratch: Scratch
 
 
-class Track(NamedTuple):
+class Rise(NamedTuple):
     """The line over one element while a time passes: where it begins and ends, and its rates there."""
 
     w0: float
@@ -206,24 +206,24 @@ def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
 
 
 @inlined
-def release(solid: Foundation, lapse: Lapse, track: Track, arms: FloatArray, i: int) -> tuple[float, float]:
-    """Return the part of a time after which an element pressed to its track is let go, and where; 1 if it is not.
+def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: int) -> tuple[float, float]:
+    """Return the part of a time after which an element pressed to its rise is let go, and where; 1 if it is not.
 
-    The force is taken as linear in time, the track as cubic.
+    The force is taken as linear in time, the rise as cubic.
     """
-    begin = pull(solid, track.w0, arms, i) + solid.viscosity * track.rise0
+    begin = pull(solid, rise.w0, arms, i) + solid.viscosity * rise.rise0
     if begin <= 0:
-        return 0.0, track.w0
+        return 0.0, rise.w0
     strains = lapse.scratch.arms
     for m in range(solid.times.size):
         strains[0, m] = arms[i, m]
-    press(solid, track.w0, track.w1, strains, 0, lapse.time, lapse.fades)
-    end = pull(solid, track.w1, strains, 0) + solid.viscosity * track.rise1
+    press(solid, rise.w0, rise.w1, strains, 0, lapse.time, lapse.fades)
+    end = pull(solid, rise.w1, strains, 0) + solid.viscosity * rise.rise1
     if end >= 0:
-        return 1.0, track.w1
-    part, change = begin / (begin - end), track.w1 - track.w0
-    bend = (1 - part) * (track.rise0 * lapse.time - change) - part * (track.rise1 * lapse.time - change)
-    return part, track.w0 + part * change + part * (1 - part) * bend
+        return 1.0, rise.w1
+    part, change = begin / (begin - end), rise.w1 - rise.w0
+    bend = (1 - part) * (rise.rise0 * lapse.time - change) - part * (rise.rise1 * lapse.time - change)
+    return part, rise.w0 + part * change + part * (1 - part) * bend
 
 
 @inlined

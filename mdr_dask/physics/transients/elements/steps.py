@@ -19,8 +19,8 @@ from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
     Lapse,
     Release,
+    Rise,
     Scratch,
-    Track,
     advance,
     at_rest,
     fading,
@@ -209,7 +209,7 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
-        part, leaves = release(solid, lapse, Track(u, w1, rise0, rise1), state.arms, j)
+        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.arms, j)
         if part < 1 or workspace.parts[j] < 1:
             workspace.after[j] = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
         workspace.parts[j], workspace.leaves[j] = part, leaves
