@@ -11,9 +11,9 @@ from math import erf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.superposition.least_squares import (
     DEGREE,
     Grid,
@@ -81,7 +81,7 @@ class Steps(NamedTuple):
     common: Common
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no cover
     """Return the trace of the squared second differences times the inverse of a factorised band.
 
@@ -101,7 +101,7 @@ def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def likelihoods(
     points: Points, ways: FloatArray, step: float, weight: float, variance: float
 ) -> FloatArray:  # pragma: no cover
@@ -134,7 +134,7 @@ def likelihoods(
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _given(
     places: FloatArray, shares: FloatArray, window: FloatArray, means: FloatArray, scatters: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
@@ -193,7 +193,7 @@ def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
     return Steps(mean, own, (apart * share.ravel()) @ apart.T, told, common)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, variance: float) -> float:  # pragma: no cover
     """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)

@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.rules import THESIS_XI, limit_radius
@@ -112,14 +112,14 @@ def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tu
     return step, stages, load
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _rate(y):  # type: ignore[no-untyped-def]
     if y >= 1.0:
         return 1.0 - y
     return max(y, 0.0) * (1.0 - y)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _growth(y, weights):  # type: ignore[no-untyped-def]
     total = 0.0
     for k in range(y.size):
@@ -128,7 +128,7 @@ def _growth(y, weights):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
     """Advance y at the places by the classical Runge-Kutta rule; keep the four rates of the depth of every step."""
     middle, slopes = np.empty_like(y), np.empty((4, y.size))
@@ -147,7 +147,7 @@ def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
         s[4] = step / 6.0 * (s[0] + 2.0 * (s[1] + s[2]) + s[3])
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _follow(stages, step, y):  # type: ignore[no-untyped-def]
     """Advance y at any places under the depths found."""
     for number in range(stages.shape[0]):

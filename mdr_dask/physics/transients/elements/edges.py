@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.physics.compiling import compiled
 
 
 class Line(NamedTuple):
@@ -30,7 +30,7 @@ class Edges(NamedTuple):
     gap: FloatArray
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def under_elements(line: Line, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
     """Write height and slope over every element after a travel, from cubic cells; return the whole cells of it."""
     n = under.size
@@ -48,7 +48,7 @@ def under_elements(line: Line, travel: float, under: FloatArray, slope_under: Fl
     return shift
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
     """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
     n = under.size
@@ -76,14 +76,14 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     return depth, False
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _whole(values: FloatArray, j: int) -> float:
     """Return the integral over the cell before node j of the cubic through four nodes."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     """Return the part of a cell up to the edge, seen from the element in contact."""
     if place < 0:
@@ -92,7 +92,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     return place + (1 - place) * np.sqrt(max(1 - outer / gap, 0.0)) if gap < 0 else place
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
@@ -119,7 +119,7 @@ def _cell(
     return low, high
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _forces(
     gaps: FloatArray,
     force: FloatArray,
@@ -156,7 +156,7 @@ def _forces(
     return load / n, drag / n, length / n
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def carrying_rate(
     weight: float,
     gaps: FloatArray,

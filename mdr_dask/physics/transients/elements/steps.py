@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.elements.edges import Edges, Line, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
@@ -54,7 +54,7 @@ class State(NamedTuple):
     edges: Edges
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
     """Return the mean displacement that the course of the load decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
@@ -85,7 +85,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     return (next_load + total) / glass
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
@@ -105,7 +105,7 @@ def _instant(
     return depth, work / n, good
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
     n, lost = state.displacement.size, 0.0
@@ -169,7 +169,7 @@ class StepWorkspace(NamedTuple):
     scratch: Scratch
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     rows = np.empty((11, n))
     return StepWorkspace(
@@ -191,7 +191,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     )
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
@@ -211,7 +211,7 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
@@ -265,7 +265,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
     return work / n, lost / n
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _step(
     solid: Foundation,
     state: State,
@@ -299,7 +299,7 @@ def _step(
     return depth, work, lost, True
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _state_energy(solid: Foundation, state: State) -> float:
     energy, n = 0.0, state.displacement.size
     if solid.times.size == 0:
@@ -311,7 +311,7 @@ def _state_energy(solid: Foundation, state: State) -> float:
     return energy
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def forces_now(
     solid: Foundation,
     state: State,
@@ -367,7 +367,7 @@ def forces_now(
     return depth + more, rate, drag, length
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def follow_elements(
     solid: Foundation,
     line: Line,
@@ -389,8 +389,8 @@ def follow_elements(
     for now in range(moments.size):
         if now > 0:
             time = moments[now] - moments[now - 1]
-            workspace.old_under[:] = workspace.under
-            workspace.old_slope[:] = workspace.slope
+            copy_into(workspace.old_under, workspace.under)
+            copy_into(workspace.old_slope, workspace.slope)
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
@@ -413,7 +413,7 @@ def follow_elements(
     return Outcome.CONVERGED
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
     """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
 
@@ -432,18 +432,18 @@ def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: St
     u, touching = max(w0, 0.0), w0 > 0
     free = 0.0
     for _ in range(turns if line.periodic else 1):
-        last[:] = arms[0]
+        copy_into(last, arms[0])
         before = u
         for cell in range(n):
             i = (top + cell) % n
             if not touching:
                 free = u
-                free_arms[0, :] = arms[0]
+                copy_into(free_arms[0], arms[0])
             if i % every == 0:
                 j = i // every
                 state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.arms[j, :] = arms[0]
-                state.free_arms[j, :] = free_arms[0]
+                copy_into(state.arms[j], arms[0])
+                copy_into(state.free_arms[j], free_arms[0])
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             rise0, rise1 = deborah * line.slope[i], deborah * line.slope[i + 1]
             part, leaves = 0.0, u
@@ -462,7 +462,7 @@ def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: St
     return not line.periodic, u
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def note_edges(solid: Foundation, line: Line, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
