@@ -462,7 +462,7 @@ def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: St
     return not line.periodic, u
 
 
-@compiled
+@kernel
 def note_edges(solid: Foundation, line: Line, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
