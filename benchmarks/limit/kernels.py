@@ -312,4 +312,3 @@ KERNELS = (
     Kernel("slope from waves", "wave", rms_slope, is_wide=True),
     Kernel("image to body", "node and node", transform, is_wide=True),
 )
-

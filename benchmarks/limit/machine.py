@@ -1,4 +1,4 @@
-"""What this processor does at most: measured throughputs and latencies of operations, and the bandwidth of its memory."""
+"""What this processor does at most: measured throughputs and latencies of operations, and of its memory."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _vector_roots(n, x, y):
 
 @njit
 def _guessed(n, bit, x, y):
-    """Write to one array or the other, as a random bit says, which no processor foresees; to the same one with no bit."""
+    """Write to one array or the other, as a random bit says, which no processor foresees; with no bit to one."""
     state = np.uint64(88172645463325252)
     for i in range(n):
         state ^= state << np.uint64(13)

@@ -26,7 +26,7 @@ FUNCTIONS = {"sqrt": "root", "pow": "power"} | dict.fromkeys(
 
 def _size(*values: Any) -> int:
     """Return how many floating-point numbers an operation on some values makes."""
-    sizes = [np.size(value) for value in values if isinstance(value, float) or getattr(value, "dtype", None) == float]
+    sizes = [np.size(value) for value in values if isinstance(value, float) or np.asarray(value).dtype.kind == "f"]
     return max(sizes, default=0)
 
 

@@ -1,9 +1,9 @@
 """Measured time of every hot kernel beside the least that this processor allows: ``python -m benchmarks limit roofs``.
 
 Operations are counted by running each kernel as plain Python with every operation counted, in a process of its own.
-The roof of a kernel is the time of its busiest part: additions and comparisons, multiplications, divisions and roots, or
-loads and stores, each at the measured throughput, of vector instructions where its loops are such; elementary functions
-come on top. Where operations wait for one another, or the case itself makes branches random, that is a roof as well.
+The roof of a kernel is the time of its busiest part: additions and comparisons, multiplications, divisions and roots,
+or loads and stores, each at the measured throughput, of vector instructions where its loops are such; elementary
+functions come on top. Where operations wait for one another, or the case makes branches random, that is a roof too.
 
     python -m benchmarks limit roofs [PART OF A NAME]
 """
@@ -16,7 +16,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 
-from benchmarks.limit.kernels import KERNELS, Kernel
+from benchmarks.limit.kernels import KERNELS, Kernel, Work
 from benchmarks.limit.machine import roofs
 from benchmarks.measures import print_table, timed
 
@@ -70,6 +70,18 @@ def roof(kernel: Kernel, work: Mapping[str, float], machine: Mapping[str, float]
     return bounds[what], what
 
 
+def _seconds(work: Work) -> float:
+    """Return the time of a unit."""
+    work.call()
+    calls = max(int(2e-3 / max(timed(work.call)[1], 1e-6)), 1)
+
+    def often() -> None:
+        for _ in range(calls):
+            work.call()
+
+    return timed(often, calls=9)[1] / calls / work.units
+
+
 def main(part: str = "") -> None:
     """Print what the processor does, and the table of kernels."""
     machine, work = roofs(), counts(part)
@@ -79,10 +91,7 @@ def main(part: str = "") -> None:
     for kernel in KERNELS:
         if kernel.name not in work:
             continue
-        ready, counted = kernel.prepare(), work[kernel.name]
-        ready.call()
-        calls = max(int(2e-3 / max(timed(ready.call)[1], 1e-6)), 1)
-        measured = timed(lambda: [ready.call() for _ in range(calls)], calls=9)[1] / calls / ready.units
+        measured, counted = _seconds(kernel.prepare()), work[kernel.name]
         least, what = roof(kernel, counted, machine)
         numbers = [sum(counted.get(kind, 0.0) for kind in kinds) for kinds in COLUMNS.values()]
         cells = [f"{number:.3g}" for number in (*numbers, 1e9 * measured, 1e9 * least)]

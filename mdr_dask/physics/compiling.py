@@ -39,9 +39,10 @@ def _compiled(function: Kernel, **options: object) -> Kernel:
     compile_it = numba.njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)  # type: ignore[call-overload]
     kernel: Any = compile_it(function)
     if hasattr(kernel, "get_call_template"):
-        template = kernel.get_call_template
+        template: Any = kernel.get_call_template
+        plain: Callable[[Any], Any] = unliteral
         kernel.get_call_template = lambda types, named: template(
-            [unliteral(each) for each in types], {name: unliteral(each) for name, each in named.items()}
+            [plain(each) for each in types], {name: plain(each) for name, each in named.items()}
         )
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     if kept is not None:  # numba reads all of an index of its own version, types that are no more included

@@ -113,14 +113,14 @@ def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tu
 
 
 @compiled
-def _rate(y):  # type: ignore[no-untyped-def]
+def _rate(y: float) -> float:
     if y >= 1.0:
         return 1.0 - y
     return max(y, 0.0) * (1.0 - y)
 
 
 @compiled
-def _growth(y, weights):  # type: ignore[no-untyped-def]
+def _growth(y: FloatArray, weights: FloatArray) -> float:
     total = 0.0
     for k in range(y.size):
         if y[k] < 1.0:
@@ -129,7 +129,7 @@ def _growth(y, weights):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
+def _advance(y: FloatArray, weights: FloatArray, step: float, stages: FloatArray) -> None:
     """Advance y at the places by the classical Runge-Kutta rule; keep the four rates of the depth of every step."""
     middle, slopes = np.empty_like(y), np.empty((4, y.size))
     for number in range(stages.shape[0]):
@@ -148,7 +148,7 @@ def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _follow(stages, step, y):  # type: ignore[no-untyped-def]
+def _follow(stages: FloatArray, step: float, y: FloatArray) -> None:
     """Advance y at any places under the depths found."""
     for number in range(stages.shape[0]):
         s = stages[number]
