@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.least_squares import Prior, Shifts, changes_of, fit
-from mdr_dask.physics.superposition.problem import RATIOS, Common, Problem, differences
+from mdr_dask.physics.superposition.problem import RATIOS, Common, ShiftProblem, differences
 from mdr_dask.physics.superposition.steps import Steps, scan, scan_pairs, together
 
 
@@ -64,7 +64,7 @@ class Found(NamedTuple):
     rising: float = 0.0
 
 
-def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
+def find_horizontal(problem: ShiftProblem, least: float = 0.0) -> Found:
     """Find horizontal shifts.
 
     A first fit knows smoothing and scatter. Scans of all pairs of neighbours then tell what steps have in common, a
@@ -98,7 +98,7 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
     return Found(_chained(steps.mean), covariance, weight, variance, prior, steps.told, steps.common)
 
 
-def find_both(problem: Problem) -> Found:
+def find_both(problem: ShiftProblem) -> Found:
     """Find vertical shifts beside horizontal ones.
 
     Vertical shifts enter linearly, so that the problem is linear about good horizontal ones. On a plateau it is not:
@@ -118,7 +118,7 @@ def find_both(problem: Problem) -> Found:
     return _joined(problem, found, steps, spread)
 
 
-def _joined(problem: Problem, found: Found, steps: Steps, spread: FloatArray) -> Found:
+def _joined(problem: ShiftProblem, found: Found, steps: Steps, spread: FloatArray) -> Found:
     """Return shifts of the linearised problem and of scans together; `spread` is the covariance of the former's steps.
 
     A scan counts for the place as far as it is the wider of the two, and for the width where the curves do not tell.
@@ -135,7 +135,7 @@ def _joined(problem: Problem, found: Found, steps: Steps, spread: FloatArray) ->
     return _followed(found, sums @ (place - linear), covariance)._replace(told=told, common=steps.common)
 
 
-def _scanned(problem: Problem, found: Found, spread: FloatArray) -> Steps:
+def _scanned(problem: ShiftProblem, found: Found, spread: FloatArray) -> Steps:
     """Return what scans tell of steps where vertical shifts are free, about their mean step."""
     usual = found.shifts.along[-1] / (problem.curves - 1) * np.arange(problem.curves)
     level, smoothing = problem.lifted(usual), (found.weight, found.variance)
@@ -156,14 +156,14 @@ def _followed(found: Found, moved: FloatArray, covariance: FloatArray) -> Found:
     return found._replace(shifts=shifts, covariance=whole)
 
 
-def _likeliest(problem: Problem, starts: list[Found]) -> Found:
+def _likeliest(problem: ShiftProblem, starts: list[Found]) -> Found:
     """Return both kinds of shifts from the start of most evidence."""
     priors = problem.priors(float(np.mean([start.common.mean for start in starts])))
     found, _ = max((_linear(problem, start, priors) for start in starts), key=lambda pair: pair[1])
     return _along_the_loosest(problem, found, priors)
 
 
-def _linear(problem: Problem, start: Found, priors: list[Prior]) -> tuple[Found, float]:
+def _linear(problem: ShiftProblem, start: Found, priors: list[Prior]) -> tuple[Found, float]:
     """Return both kinds of shifts as the linearised problem has them, and the logarithm of their evidence."""
     size, best, (shifts, _, weight, variance, *_) = problem.curves - 1, RATIOS.size // 2, start
     for _ in range(SETTINGS.vertical_rounds):
@@ -183,7 +183,7 @@ def _linear(problem: Problem, start: Found, priors: list[Prior]) -> tuple[Found,
     ), log
 
 
-def _along_the_loosest(problem: Problem, found: Found, priors: list[Prior]) -> Found:
+def _along_the_loosest(problem: ShiftProblem, found: Found, priors: list[Prior]) -> Found:
     """Return mean and covariance of shifts over places along their loosest combination, by their evidence.
 
     A straight piece may slide along itself by horizontal and vertical shifts together, so far that the problem is not

@@ -16,7 +16,7 @@ from numba import njit
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.least_squares import (
     DEGREE,
-    Grid,
+    Knots,
     Normal,
     Points,
     Shifts,
@@ -27,7 +27,7 @@ from mdr_dask.physics.superposition.least_squares import (
     workspace,
 )
 from mdr_dask.physics.superposition.least_squares import SETTINGS as FIT
-from mdr_dask.physics.superposition.problem import Common, Problem
+from mdr_dask.physics.superposition.problem import Common, ShiftProblem
 
 
 class Settings(NamedTuple):
@@ -201,7 +201,7 @@ def _given(
     return evidence, centre, spread
 
 
-def together(scan: Scan, problem: Problem) -> Steps:
+def together(scan: Scan, problem: ShiftProblem) -> Steps:
     """Return what all steps are if they scatter about a common mean, by an amount that they tell.
 
     Where a step is hardly told, its likelihood is little but noise, and counts for less.
@@ -210,7 +210,7 @@ def together(scan: Scan, problem: Problem) -> Steps:
     return _averaged(scan, problem, SETTINGS.noisy + (1 - SETTINGS.noisy) * steps.told)
 
 
-def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
+def _averaged(scan: Scan, problem: ShiftProblem, powers: FloatArray) -> Steps:
     """Return mean and covariance of steps over their common mean and scatter, the likelihoods raised to powers."""
     shares = []
     for place, log, power in zip(*scan, powers, strict=True):
@@ -234,7 +234,7 @@ def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, variance: float) -> float:  # pragma: no cover
+def _smoothing(points: Points, shifts: Shifts, grid: Knots, usual: float, variance: float) -> float:  # pragma: no cover
     """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)
     curve, nothing = workspace(splines, 0), np.empty(0)
@@ -250,7 +250,7 @@ def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, varianc
     return best
 
 
-def scan_pairs(problem: Problem, weight: float, variance: float, rising: float = 0.0) -> Scan:
+def scan_pairs(problem: ShiftProblem, weight: float, variance: float, rising: float = 0.0) -> Scan:
     """Scan each step with its two curves alone, from one end of their overlap to the other; `rising` as of `scan`."""
     found = Scan([], [])
     for k, window in enumerate(problem.windows):
@@ -263,7 +263,7 @@ def scan_pairs(problem: Problem, weight: float, variance: float, rising: float =
 
 
 def scan(
-    problem: Problem,
+    problem: ShiftProblem,
     shifts: Shifts,
     spread: FloatArray,
     smoothing: tuple[float, float],
@@ -275,7 +275,7 @@ def scan(
 
     Parameters
     ----------
-    problem : Problem
+    problem : ShiftProblem
     shifts : Shifts
         Found.
     spread : array, shape (steps, steps)
@@ -313,7 +313,7 @@ def scan(
     return found
 
 
-def _overlapping(problem: Problem, across: FloatArray, k: int) -> tuple[int, int]:
+def _overlapping(problem: ShiftProblem, across: FloatArray, k: int) -> tuple[int, int]:
     """Return first and last curve of those that overlap across step k, and of those beside its own two."""
     member = problem.points.member
     ends = (

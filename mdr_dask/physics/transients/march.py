@@ -143,7 +143,7 @@ def _weights(found: Trajectory, now: int) -> tuple[float, float]:
 
 
 @njit(nogil=True, cache=True)
-def march(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
+def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three.
 
     Parameters
@@ -203,7 +203,7 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     Parameters
     ----------
     marching, work
-        As in `march`.
+        As in `march_depth`.
     depths : array, shape (moments,)
         Depths on another grid, from whose course those found depart slowly.
     found : Trajectory

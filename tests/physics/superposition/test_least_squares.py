@@ -16,7 +16,7 @@ from mdr_dask.physics.superposition.least_squares import (
     restricted,
     rows,
 )
-from mdr_dask.physics.superposition.problem import Problem
+from mdr_dask.physics.superposition.problem import ShiftProblem
 from mdr_dask.physics.superposition.steps import likelihoods
 
 STEP, WEIGHT = 0.25, 0.3
@@ -26,7 +26,7 @@ NONE = np.empty((0, 0))
 def data(curves=3, points=9, noise=0.01):
     random, x = np.random.default_rng(0), np.linspace(-1, 1, points)
     pieces = [(x, np.tanh(x + 0.4 * k) + noise * random.standard_normal(points)) for k in range(curves)]
-    return Problem.of(pieces)
+    return ShiftProblem.of(pieces)
 
 
 def dense(points, across):
