@@ -110,6 +110,14 @@ def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, buc
             pass
 
 
+def test_a_claim_that_goes_between_two_looks_is_not_waited_for(bucket, monkeypatch):
+    listings = iter([[".claims/entrance/000007.json"]])
+    monkeypatch.setattr(locks, "_standing", lambda *_: next(listings, []))
+    monkeypatch.setattr(locks.time, "sleep", lambda _: pytest.fail("it waits"))
+    with store.lock(bucket, "entrance") as hold:
+        assert hold.claim == 1
+
+
 def test_a_server_that_only_looks_before_it_writes_is_named(toy, bucket, monkeypatch, caplog):
     from fsspec import AbstractFileSystem
     from fsspec.implementations.memory import MemoryFileSystem

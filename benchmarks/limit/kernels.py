@@ -98,7 +98,7 @@ def node_to_node() -> Work:
 
 
 def _sweep(load: float) -> Work:
-    from mdr_dask.physics.sliding.kelvin import BLOCK, SUMS, blocks_of, sweep
+    from mdr_dask.physics.sliding.kelvin import BLOCK, SUMS, blocks_of, sweep_cells
     from mdr_dask.physics.sliding.steady import steady_on_cells
 
     cells = cut(periodic_line(*_nodes(4)))
@@ -108,7 +108,7 @@ def _sweep(load: float) -> Work:
     nothing = np.empty(0)
 
     def call() -> None:
-        sweep(cells, blocks, barriers, of_blocks, deborah * n, depth, sums, nothing, nothing)
+        sweep_cells(cells, blocks, barriers, of_blocks, deborah * n, depth, sums, nothing, nothing)
 
     call()
     return Work(call, n)

@@ -75,7 +75,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 def _copy(url: str, template: Template, study: Mapping[str, Any]) -> Copy:
     series, own = template.series.name, _series_attributes(template)
     path = group_name(series, "zarr.json").removesuffix("zarr.json")
-    files = _arrays_in_memory(template)
+    files = laid_out_files(template)
     if series:
         arrays = {file.removesuffix("/zarr.json"): json.loads(files[file]) for file in files if "zarr.json" in file}
         files["zarr.json"] = group_document(arrays, {**study, **own})
@@ -98,7 +98,7 @@ def _is_laid_out(url: str, template: Template) -> bool:
     return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
 
-def _arrays_in_memory(template: Template) -> dict[str, bytes]:
+def laid_out_files(template: Template) -> dict[str, bytes]:
     """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
     files: dict[str, Any] = {}
     group = zarr.create_group(zarr.storage.MemoryStore(files))

@@ -101,7 +101,7 @@ class Liquid(NamedTuple):
 
 
 @compiled
-def log_viscosity(P: float, liquid: Liquid) -> tuple[float, float]:
+def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
     """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
@@ -115,7 +115,7 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
     result = np.empty_like(pressure)
     for i in range(pressure.size):
-        result[i] = log_viscosity(pressure[i], liquid)[0]
+        result[i] = log_viscosity_at(pressure[i], liquid)[0]
     return result
 
 
@@ -166,7 +166,7 @@ def balance(
     for i in range(P.size):
         rho[i] = 1.0 + liquid.density_rise * P[i] / (1.0 + liquid.density_saturation * P[i])
         rho_slope[i] = liquid.density_rise / (1.0 + liquid.density_saturation * P[i]) ** 2
-        viscosity[i], viscosity_slope[i] = log_viscosity(P[i], liquid)
+        viscosity[i], viscosity_slope[i] = log_viscosity_at(P[i], liquid)
     R[:] = 0.0
     by_pressure[:] = 0.0
     by_film[:] = 0.0

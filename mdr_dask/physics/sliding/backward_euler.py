@@ -290,7 +290,7 @@ def contact(
         slope[k] = np.sqrt(square / max(count, 1))
 
 
-def solve(
+def steady_by_steps(
     height: FloatArray, periodic: bool, deborah: FloatArray, loads: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
     """Return the depth of the highest node, F_x / (4 G) and whether the contact leaves the line, for every case.

@@ -211,7 +211,7 @@ def _flown_over(
 
 
 @compiled
-def sweep(
+def sweep_cells(
     cells: Cells,
     every: Blocks,
     barriers: FloatArray,
@@ -348,11 +348,11 @@ def patches_at(
     depth: float,
     sums: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where each patch of the stationary state at a depth begins and ends, and write its sums; see `sweep`."""
+    """Return where each patch of the steady state at a depth begins and ends; sums are as in `sweep_cells`."""
     n = cells.mean.size - 1
     touches, leaves = np.empty(n // 8 + 2), np.empty(n // 8 + 2)
-    count = sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+    count = sweep_cells(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
     if count > touches.size:
         touches, leaves = np.empty(count), np.empty(count)
-        sweep(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
+        sweep_cells(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
     return touches[:count], leaves[:count]

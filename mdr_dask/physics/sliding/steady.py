@@ -26,7 +26,7 @@ from mdr_dask.physics.sliding.kelvin import (
     SUMS,
     Blocks,
     blocks_of,
-    sweep,
+    sweep_cells,
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
@@ -146,7 +146,7 @@ def _solve(
     depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
+        sweep_cells(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
@@ -205,7 +205,7 @@ def _states(
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
-                sweep(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
+                sweep_cells(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
         if not converged:
             depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
@@ -347,7 +347,7 @@ def _stepped(
     top = nodes[highest]
     below = (np.roll(nodes, -1 - highest) if line.periodic else nodes) - top
     results = np.full((4, loads.size), np.nan)
-    depths, results[0], outside = backward_euler.solve(below, line.periodic, deborah, loads)
+    depths, results[0], outside = backward_euler.steady_by_steps(below, line.periodic, deborah, loads)
     results[1] = depths - top
     if contact:
         backward_euler.contact(below, line.periodic, deborah, depths, results[2], results[3])

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, copy_into, kernel
-from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Travelling, multiply, sweep
+from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
 """Largest step back of the depth on a line that elements enter undeformed, relative to it."""
@@ -25,7 +25,7 @@ class Swept(NamedTuple):
     decayed : array, shape (pieces, arms)
         1 - exp(-length / time) of every mode in flight and of every arm in contact.
     lengths : array, shape (pieces,)
-        See `sweep`.
+        See `sweep_arms`.
     solid : Travelling
         The solid.
     """
@@ -262,7 +262,7 @@ def solve_sliding(
     unknown : array, shape (arms + 1,), input and output
         Start and solution: e_m at the first node, then the depth.
     totals : array, shape (6,), output
-        See `sweep`.
+        See `sweep_arms`.
 
     Returns
     -------
@@ -287,7 +287,7 @@ def solve_sliding(
         for i in range(nodes):
             penetration[i] = unknown[arms] + profile[i]
         start = unknown[:arms]
-        pieces, end = sweep(penetration, start, solid, not periodic, lengths, imbalance, totals, room)
+        pieces, end = sweep_arms(penetration, start, solid, not periodic, lengths, imbalance, totals, room)
         found = lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:

@@ -168,7 +168,7 @@ def _fly(
 
 
 @compiled
-def sweep(
+def sweep_arms(
     penetration: FloatArray,
     start: FloatArray,
     solid: Travelling,
@@ -254,7 +254,7 @@ def _contact(
     totals: FloatArray,
     workspace: FloatArray,
 ) -> tuple[float, float, float, bool]:  # pragma: no cover
-    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep` for the arrays.
+    """Follow the profile from `begin` until the stress falls to zero or the line ends; see `sweep_arms` for the arrays.
 
     Returns
     -------

@@ -53,7 +53,7 @@ class Shifts(NamedTuple):
     along: FloatArray
 
 
-class Grid(NamedTuple):
+class Knots(NamedTuple):
     """Cells of the spline, and the weights of its squared second differences that are tried, ascending."""
 
     step: float
@@ -356,7 +356,7 @@ def _moved(shifts: Shifts, changes: FloatArray, share: float) -> Shifts:  # prag
 def fit(
     points: Points,
     shifts: Shifts,
-    grid: Grid,
+    grid: Knots,
     prior: Prior,
     smoothing: tuple[float, float],
     iterations: int,
@@ -368,7 +368,7 @@ def fit(
     points : Points
     shifts : Shifts
         First guess.
-    grid : Grid
+    grid : Knots
     prior : Prior
         Of the horizontal shifts, or of both kinds: as many shifts are found as it has.
     smoothing : tuple of float
@@ -412,7 +412,7 @@ def rows(points: Points, across: FloatArray, low: float, step: float, splines: i
 
 
 def changes_of(
-    points: Points, shifts: Shifts, grid: Grid, weight: float, variance: float, priors: Sequence[Prior]
+    points: Points, shifts: Shifts, grid: Knots, weight: float, variance: float, priors: Sequence[Prior]
 ) -> tuple[FloatArray, FloatArray, int, float]:
     """Return mean and covariance of the free shifts' changes where the problem is linear about given shifts.
 

@@ -78,6 +78,12 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
     return CubicLine(height, enter / n, leave / n, False, False)
 
 
+def without_kinks(line: CubicLine) -> CubicLine:
+    """Return the line with the mean of both slopes at every inner node: a kink is rounded over the cells beside it."""
+    slope = 0.5 * (line.leave[:-1] + line.enter[1:])
+    return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
+
+
 class Cells(NamedTuple):
     """The n cells of a line, a periodic one from its highest point on, with one more at the end that repeats the first.
 

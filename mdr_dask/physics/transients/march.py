@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
 from mdr_dask.physics.transients.free_flight import Instant
@@ -141,8 +141,8 @@ def _weights(found: Trajectory, now: int) -> tuple[float, float]:
     return 2 / taken, -2 * found.depth[0] / taken - found.rate[0]
 
 
-@compiled
-def march(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
+@kernel
+def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three.
 
     Parameters
@@ -202,7 +202,7 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     Parameters
     ----------
     marching, work
-        As in `march`.
+        As in `march_depth`.
     depths : array, shape (moments,)
         Depths on another grid, from whose course those found depart slowly.
     found : Trajectory
