@@ -1,5 +1,6 @@
 import hypothesis
 import pytest
+import threadpoolctl
 import toy as toy_model
 
 # the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
@@ -13,6 +14,13 @@ def disk_is_not_waited_for():
     """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mdr_dask.store.files.flush", lambda path: None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread_of_linear_algebra():
+    """The workers of pytest have the cores; more threads would wait for each other, and count as work."""
+    with threadpoolctl.threadpool_limits(1, "blas"):
         yield
 
 

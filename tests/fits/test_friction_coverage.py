@@ -8,14 +8,14 @@ from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit for fit in FITS}
-STUDIES = 200
-LEAST = 0.92
+STUDIES = 100
+LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of so many studies
 G, RMS, LENGTH, TAU, SLOPE = 1e7, 5e-7, 0.02, 1e-3, 0.1
-LINES = pytest.mark.parametrize("lines", [5, 10, 30])
+LINES = pytest.mark.parametrize("lines", [5, 30])
 # scatter that all cases of a line share, and scatter of every case for itself
-SCATTER = pytest.mark.parametrize("scatter", [(0.1, 0.02), (0.05, 0.1)])
-# what takes longer: with many lines and with few, scatter of the one kind and of the other
-BOTH = pytest.mark.parametrize(("lines", "scatter"), [(5, (0.05, 0.1)), (10, (0.1, 0.02)), (30, (0.05, 0.1))])
+SHARED, OWN = (0.1, 0.02), (0.05, 0.1)
+# with many lines and with few, scatter of the one kind and of the other
+BOTH = pytest.mark.parametrize(("lines", "scatter"), [(5, OWN), (10, SHARED), (30, OWN)])
 
 
 def planted(law, axes, lines, scatter, studies=STUDIES, grid=0.0, **fixed):
@@ -59,8 +59,7 @@ def zone(force, velocity):
     return laws.zone_one(force, velocity, 0.35, 1.5)
 
 
-@LINES
-@SCATTER
+@BOTH
 def test_zone_one(lines, scatter):
     found = FIT["zone_one"].compute({"": planted(zone, ZONE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
@@ -83,11 +82,19 @@ def saturating(_, velocity):
     return np.sqrt(2) * (1 + (velocity / 0.05) ** -2) ** -0.5
 
 
-@LINES
-@SCATTER
-@pytest.mark.parametrize("law", [broad, skew, saturating])
-def test_plateau(lines, scatter, law):
-    found = FIT["plateau"].compute({"": planted(law, TOP, lines, scatter, studies=150)})
+@pytest.mark.parametrize(
+    ("law", "lines", "scatter"),
+    [
+        (broad, 5, OWN),
+        (broad, 30, SHARED),
+        (skew, 5, SHARED),
+        (skew, 30, OWN),
+        (saturating, 5, OWN),
+        (saturating, 10, SHARED),
+    ],
+)
+def test_plateau(law, lines, scatter):
+    found = FIT["plateau"].compute({"": planted(law, TOP, lines, scatter)})
     truth = float(law(None, np.geomspace(1e-3, 1e4, 20001)).max())
     assert coverage(found, "plateau", truth) >= LEAST
     # no bias from taking a maximum: the largest of noisy means is up to 7 % too high here
@@ -104,7 +111,7 @@ def interpolated(force, velocity):
 
 @BOTH
 def test_interpolation(lines, scatter):
-    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter, studies=200)})
+    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
     assert coverage(found, "beta", 1.5) >= LEAST
     assert judged(found, "yes") >= LEAST
