@@ -110,10 +110,11 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How small an error has to be: both parts zero means nothing is enough."""
+    """How small an error has to be: both parts zero means nothing is enough; where it stands in its file."""
 
     relative: float = 0.0
     absolute: float = 0.0
+    place: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.definition import Series
+from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import Column, read_sheet, read_table
@@ -92,6 +92,21 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
             reasons.append(error)
     if len(reasons) == len(series):
         raise reasons[0]
+
+
+def unknowns(campaign: Campaign) -> tuple[str, ...]:
+    """Return the axes of a campaign that its table of measurements does not name; none where it has no table."""
+    table = campaign.measured
+    if table is None:
+        return ()
+    found: list[str] = []
+    for one in campaign.series:
+        try:
+            measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
+        except DataError:
+            continue  # it is of another series
+        found += [axis.name for axis in one.axes if axis.unit is not None and axis.name not in measured.conditions]
+    return tuple(dict.fromkeys(found))
 
 
 def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str]]:

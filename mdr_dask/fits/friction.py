@@ -383,8 +383,10 @@ def _interpolation(data: xr.Dataset) -> Variables:
     table = table_of(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
     force, velocity = table.columns
     mean = np.nan_to_num(table.mean())
-    peak = {load: peak_velocity(velocity[force == load], mean[force == load]) for load in np.unique(force)}
-    used = (force >= LAW_FROM) & (velocity <= np.array([peak[load] for load in force])) & (mean > 0)
+    used = (force >= LAW_FROM) & (mean > 0)
+    for load in np.unique(force[used]):
+        same = used & (force == load)
+        used[same] = velocity[same] <= peak_velocity(velocity[same], mean[same])
     if np.count_nonzero(used) < 5:
         raise FitError(
             f"expected five cases with F_N / (G h L) above {LAW_FROM} below region IV, got {int(used.sum())}"

@@ -18,6 +18,9 @@ from mdr_dask.physics.transients.elements.edges import Edges, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     KELVIN,
     Foundation,
+    Lapse,
+    Release,
+    Rise,
     advance,
     fading,
     flight,
@@ -173,11 +176,10 @@ def _orbit(
 
     Return whether it did, and its displacement at the end.
     """
-    n, scratch = line.height.size - 1, scratch_for(solid)
-    every = n // state.displacement.size
-    step = 1 / (n * deborah)
-    decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
-    fading(solid, step, decay, fades)
+    n = line.height.size - 1
+    every, step = n // state.displacement.size, 1 / (n * deborah)
+    lapse = Lapse(step, np.empty(solid.rates.size), np.empty(solid.times.size), scratch_for(solid))
+    fading(solid, step, lapse.decay, lapse.fades)
     arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
     w0 = depth + line.height[top]
@@ -197,15 +199,13 @@ def _orbit(
                 state.arms[j, :] = arms[0]
                 state.free_arms[j, :] = free_arms[0]
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            rise0, rise1 = deborah * n * line.enter[i], deborah * n * line.leave[i]
             part, leaves = 0.0, u
             if touching:
-                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
-            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
-            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
-            u, touching, _, _ = advance(
-                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
-            )
+                rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
+                part, leaves = release(solid, lapse, rise, arms, 0)
+            after = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
+            free = fly(solid, free, free_arms, 0, lapse.decay, lapse.scratch.modes)
+            u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), arms, 0)
         change = abs(u - before)
         for m in range(arms.size):
             change = max(change, abs(arms[0, m] - last[m]))

@@ -11,11 +11,15 @@ import numpy as np
 from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
-from mdr_dask.physics.transients.elements.edges import Edges, carrying_rate, depth_for, under_elements
+from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
+    Lapse,
+    Release,
+    Rise,
     Scratch,
     advance,
     at_rest,
@@ -55,7 +59,7 @@ class State(NamedTuple):
     edges: Edges
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
     """Return the mean displacement that the course of the load decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
@@ -86,7 +90,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     return (next_load + total) / glass
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
@@ -106,7 +110,7 @@ def _instant(
     return depth, work / n, good
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
     n, lost = state.displacement.size, 0.0
@@ -192,10 +196,11 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     )
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
     for j in range(workspace.under.size):
         if not state.touching[j]:
             continue
@@ -204,19 +209,18 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
-        arms, scratch = state.arms, workspace.scratch
-        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step.time, workspace.fades, scratch.arms)
+        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.arms, j)
         if part < 1 or workspace.parts[j] < 1:
-            pressed = part if part < 1 else 0.0
-            workspace.after[j] = flight(solid, u, arms, j, pressed, leaves, step.time, workspace.decay, scratch)
+            workspace.after[j] = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
     work, lost = 0.0, 0.0
     for j in range(n):
         w0, w1, was = step.depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
@@ -243,22 +247,8 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
             lost += gone
             u[j] = w1
             continue
-        u[j], touching[j], done, gone = advance(
-            solid,
-            u[j],
-            state.arms,
-            j,
-            was,
-            workspace.parts[j],
-            workspace.leaves[j],
-            after[j],
-            w0,
-            w1,
-            step.time,
-            workspace.decay,
-            workspace.fades,
-            workspace.scratch,
-        )
+        let_go = Release(workspace.parts[j], workspace.leaves[j], after[j])
+        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), let_go, state.arms, j)
         if not touching[j]:
             state.free[j] = u[j]
         work += done
@@ -266,7 +256,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
     return work / n, lost / n
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _step(
     solid: Foundation,
     state: State,
@@ -300,7 +290,7 @@ def _step(
     return depth, work, lost, True
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _state_energy(solid: Foundation, state: State) -> float:
     energy, n = 0.0, state.displacement.size
     if solid.times.size == 0:
@@ -312,16 +302,9 @@ def _state_energy(solid: Foundation, state: State) -> float:
     return energy
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def forces_now(
-    solid: Foundation,
-    state: State,
-    workspace: StepWorkspace,
-    depth: float,
-    rate: float,
-    deborah: float,
-    load: float,
-    first: int,
+    solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
     """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
 
@@ -333,38 +316,20 @@ def forces_now(
         w = depth + workspace.under[j]
         workspace.pulls[j] = w if plain else pull(solid, w, state.arms, j)
         workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
-    edges, force, power = state.edges, workspace.force, workspace.power
-    if solid.viscosity > 0:
-        rate, drag, length = carrying_rate(
-            solid.viscosity,
-            workspace.gaps,
-            workspace.pulls,
-            workspace.slope,
-            state.touching,
-            edges,
-            rate,
-            deborah,
-            load,
-            first,
-            force,
-            power,
-        )
-        return depth, rate, drag, length
-    glass = 1 + solid.moduli.sum()
-    more, drag, length = carrying_rate(
-        glass,
+    contact = Contact(
         workspace.gaps,
         workspace.pulls,
         workspace.slope,
+        workspace.force,
+        workspace.power,
         state.touching,
-        edges,
-        0.0,
-        0.0,
-        load,
-        first,
-        force,
-        power,
+        state.edges,
     )
+    if solid.viscosity > 0:
+        rate, drag, length = carrying_rate(contact, solid.viscosity, rate, drive)
+        return depth, rate, drag, length
+    still = Drive(0.0, drive.load, drive.first)
+    more, drag, length = carrying_rate(contact, 1 + solid.moduli.sum(), 0.0, still)
     return depth + more, rate, drag, length
 
 
@@ -408,7 +373,8 @@ def follow_elements(
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return Outcome.OUTSIDE_LINE
-        exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, deborahs[now], loads[now], first)
+        drive = Drive(deborahs[now], loads[now], first)
+        exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
     return Outcome.CONVERGED
@@ -419,4 +385,4 @@ def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, d
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
     under_elements(line, 0.0, workspace.under, workspace.slope)
-    forces_now(solid, state, workspace, depth, 0.0, deborah, load, -1 if line.periodic else 0)
+    forces_now(solid, state, workspace, depth, 0.0, Drive(deborah, load, -1 if line.periodic else 0))
