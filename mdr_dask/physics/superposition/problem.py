@@ -99,6 +99,13 @@ class ShiftProblem:
         steps = [about / ratio**2 + np.eye(size) for ratio in RATIOS]
         return [Prior(usual, np.kron(scales, rows.T @ inner @ rows)) for inner in steps]
 
+    def rises(self, scatter: float, curves: int) -> FloatArray:
+        """Return the precision of the vertical shifts of some neighbours but the first, whose steps scatter; none
+        where they do not.
+        """
+        rows = differences(curves - 1)
+        return np.asarray(rows.T @ rows / scatter**2, dtype=np.float64) if scatter else np.empty((0, 0))
+
 
 def differences(size: int) -> FloatArray:
     """Return the matrix that makes steps of shifts."""
