@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.superposition.least_squares import SETTINGS, Knots, Points, Prior
 
 RATIOS = np.geomspace(0.03, 2.0, 12)
@@ -99,13 +99,20 @@ class ShiftProblem:
         steps = [about / ratio**2 + np.eye(size) for ratio in RATIOS]
         return [Prior(usual, np.kron(scales, rows.T @ inner @ rows)) for inner in steps]
 
+    def rises(self, scatter: float, curves: int) -> FloatArray:
+        """Return the precision of the vertical shifts of some neighbours but the first, whose steps scatter; none
+        where they do not.
+        """
+        rows = differences(curves - 1)
+        return np.asarray(rows.T @ rows / scatter**2, dtype=np.float64) if scatter else np.empty((0, 0))
+
 
 def differences(size: int) -> FloatArray:
     """Return the matrix that makes steps of shifts."""
     return np.eye(size) - np.eye(size, k=-1)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:  # pragma: no cover
     """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
     more.
