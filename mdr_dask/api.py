@@ -46,7 +46,7 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
         ("mdr_dask.physics.wear.worn", ("Worn",)),
     ),
     "Lubricated line contact": (
-        ("mdr_dask.physics.lubrication.line_contact", ("line_contact", "solve")),
+        ("mdr_dask.physics.lubrication.line_contact", ("line_contact", "solve_film")),
         ("mdr_dask.physics.lubrication.film_formulas", ("hertz_line", "dimensionless_groups", "moes_parameters")),
     ),
     "Oils": (

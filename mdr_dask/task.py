@@ -81,6 +81,11 @@ class Outcome:
     write_seconds: float
     compile_seconds: float = 0.0
 
+    @property
+    def seconds(self) -> float:
+        """Time that the block kept its worker busy, compiling left out."""
+        return self.compute_seconds + self.write_seconds - min(self.compile_seconds, self.compute_seconds)
+
 
 def versions(model: str) -> tuple[str, int]:
     """Return what decides the numbers of a model: the versions of the program and of the model."""

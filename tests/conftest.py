@@ -1,5 +1,6 @@
 import hypothesis
 import pytest
+import threadpoolctl
 import toy as toy_model
 
 # the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
@@ -8,11 +9,23 @@ hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("repeatable")
 
 
+def pytest_collection_modifyitems(items):
+    """What waits or takes long begins first: other workers have the cores meanwhile, and none is idle in the end."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 @pytest.fixture(autouse=True, scope="session")
 def disk_is_not_waited_for():
     """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mdr_dask.store.files.flush", lambda path: None)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def one_thread_of_linear_algebra():
+    """The workers of pytest have the cores; more threads would wait for each other, and count as work."""
+    with threadpoolctl.threadpool_limits(1, "blas"):
         yield
 
 

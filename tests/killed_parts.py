@@ -5,16 +5,21 @@ from __future__ import annotations
 import multiprocessing
 import random
 import time
+from contextlib import suppress
 from dataclasses import replace
 
 import toy
 
 from mdr_dask import execute, models
+from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.store import files, locks
 
 #: Processes are copies of one that has loaded everything, and runs nothing.
 PROCESSES = multiprocessing.get_context("forkserver")
 PROCESSES.set_forkserver_preload(["toy", "killed_parts", "zarr", "dask", "filelock", "mdr_dask.execute.rounds"])
+#: Seconds between signs of life in a bucket, and of silence after which a part counts as killed: less than users wait.
+BEAT, SILENCE = 0.5, 8.0
 
 
 def study(blocks: int):
@@ -25,7 +30,14 @@ def study(blocks: int):
 def run_part(url: str, part: Part, blocks: int, pause: float) -> None:
     toy.install(pause)
     assert "toy" in models.NAMES
-    execute.run(study(blocks), url, Resources(threads=1), lambda _: None, part=part)
+    if files.local(url) is None:
+        locks.BEAT, locks.SILENCE = BEAT, SILENCE
+    while True:
+        with suppress(StoreBusyError):
+            execute.run(study(blocks), url, Resources(threads=1), lambda _: None, part=part)
+            return
+        assert files.local(url) is None, "a lock outlives who held it"
+        time.sleep(BEAT)  # the claim of the one that was killed stands until its silence is noticed
 
 
 def run_with_kills(url: str, parts: int, kills: int, blocks: int, pause: float, seed: int = 1) -> int:

@@ -1,18 +1,21 @@
 """Axes whose values a study chooses: enough of them and not too many, and the same however the run went."""
 
 import threading
+from contextlib import suppress
 
 import curves
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from test_execute import digests, run
 
-from mdr_dask import execute, store
+from mdr_dask import bootstrap, execute, store
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
 from mdr_dask.questions.table import Question, table
@@ -73,6 +76,17 @@ def test_what_jumps_or_bends_ends_and_starves_no_other_curve(study, url, shape, 
     assert ("misses its tolerance" in last.sentence) == (shape == "jump")
 
 
+def test_the_spaces_beside_a_top_are_alike(study, url):
+    """Where the top lies is known as well as the widest space beside it allows, down to a 16th of the axis."""
+    run(study("shape: bump, shift: [-0.6, 0.9]", AXIS.replace("1 %", "30 %")), url)
+    x, curves_ = means(url)
+    for curve in curves_:
+        known = np.isfinite(curve)
+        place, top = np.log10(x[known]), int(np.argmax(curve[known]))
+        near = np.diff(place)[max(top - 2, 0) : top + 2]
+        assert near.max() <= max(near.min(), 6 / 16) * (1 + 1e-9)
+
+
 def test_scatter_is_not_chased(study, url):
     run(study("shape: flat, noise: 0.05", more="realisations: 10"), url)
     assert means(url)[0].size <= 12
@@ -124,6 +138,48 @@ def test_the_same_bytes_however_often_it_is_stopped_and_whoever_runs_it(study, t
     run(campaign, parts)
     assert min(done) > 0
     assert digests(parts) == digests(whole)
+
+
+def _mean(series):
+    """Return the mean of each curve over what is known of it."""
+    data = series[""]
+    values = data.y.transpose("realisation", "shift", "x").to_numpy()
+    stack = np.nanmean(bootstrap.means(values), axis=-1)
+    low, high = bootstrap.interval(stack, int(np.isfinite(values).sum(axis=0).max()))
+    names = {"mean": stack[0], "mean_low": low, "mean_high": high}
+    return xr.Dataset({key: ("shift", value) for key, value in names.items()}, {"shift": data["shift"]})
+
+
+def test_constants_are_fitted_to_the_values_that_an_axis_ends_with(study, tmp_path, monkeypatch):
+    """First the axis by the first realisations, then more of them: the same bytes however often it is stopped."""
+    known = {"mean": Fit("mean", ("curves",), "mean", _mean, apart=True, constants=("mean",))}
+    monkeypatch.setattr("mdr_dask.fits.available", lambda _: known)
+    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: known)
+    rounds = "realisations: {at_least: 10, at_most: 90, until: {mean.mean: 0.004}}"
+    campaign = study("noise: 0.04, shift: [-1, 0.5]", AXIS.replace("60", "14"), rounds)
+    whole, stopped, plain = (str(tmp_path / name) for name in ("whole.zarr", "stopped.zarr", "plain.zarr"))
+    run(campaign, whole)
+    data = store.datasets(whole)[""]
+    run(study("noise: 0.04, shift: [-1, 0.5]", AXIS.replace("60", "14"), "realisations: 10"), plain)
+    np.testing.assert_array_equal(data.x, store.datasets(plain)[""].x)
+    assert (data.status == Status.NOT_NEEDED).any()
+    assert data.sizes["realisation"] > 10
+    found = _mean({"": data})
+    assert float((found.mean_high - found.mean_low).max()) / 2 <= 0.004
+
+    def stop_after(blocks):
+        def report(progress):
+            if progress.blocks >= blocks:
+                raise KeyboardInterrupt
+
+        return report
+
+    for blocks in (2, 5, 3, 2):
+        with suppress(KeyboardInterrupt):
+            execute.run(campaign, stopped, Resources(threads=1), stop_after(blocks))
+    run(campaign, stopped)
+    assert digests(stopped) == digests(whole)
+    assert run(campaign, whole).done == 0
 
 
 def test_values_that_are_there_are_used_and_more_go_behind_them(study, url):

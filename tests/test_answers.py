@@ -52,17 +52,25 @@ def _level(series):
     return xr.Dataset({key: ("slope", value) for key, value in names.items()}, {"slope": data.slope})
 
 
+def _missed(series):
+    """Return the mean height with an interval that holds half a metre which no more realisations narrow."""
+    found = _level(series)
+    return found.assign(level_low=found.level_low - 0.5, level_high=found.level_high + 0.5)
+
+
 LEVEL = Fit("level", ("toy",), "mean height", _level, apart=True, constants=("level",))
+MISSED = Fit("missed", ("toy",), "mean height by a law that misses it", _missed, apart=True, constants=("level",))
 
 
 @pytest.fixture
 def own(toy, monkeypatch):
     """Return a study of the toy model, with a fit of one's own, to a tolerance."""
-    monkeypatch.setattr(fits, "available", lambda _: {"level": LEVEL})
-    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: {"level": LEVEL})
+    known = {"level": LEVEL, "missed": MISSED}
+    monkeypatch.setattr(fits, "available", lambda _: known)
+    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: known)
 
-    def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0)):
-        rounds = Replication(10, at_most, {}, {"level.level": tolerance})
+    def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0), answer="level.level"):
+        rounds = Replication(10, at_most, {}, {answer: tolerance})
         axes = toy.axis("slope", [0.0, 1.0, 9.0]), toy.axis("position", positions)
         return toy.campaign(*axes, realisations=rounds, noise=0.5)
 
@@ -137,6 +145,18 @@ def test_what_is_not_answered_is_said(own, tmp_path):
     assert int(taken(str(tmp_path / "b.zarr")).max()) == 10
 
 
+def test_what_more_realisations_cannot_narrow_ends_the_rounds(own, url):
+    """Half of the interval is 0.5 m and what scatter adds: 0.4 m is out of reach, 0.8 m takes a few more lines."""
+    told = []
+    run(own(Tolerance(absolute=0.4), at_most=2000, answer="missed.level"), url, tell=told.append)
+    assert int(taken(url).max()) < 500
+    (event,) = [event for event in told if event.name == "not answered"]
+    assert re.search(r"after \d+ realisations; 0\.5 of it is what the law misses", event.sentence)
+    told.clear()
+    run(own(Tolerance(absolute=0.8), at_most=2000, answer="missed.level"), url + "2", tell=told.append)
+    assert not [event for event in told if event.name == "not answered"]
+
+
 def test_zone_one_goes_on_in_region_one_alone_and_ends_narrow_enough(url):
     run(study("zone_one.alpha: 0.06"), url)
     data = store.datasets(url)
@@ -158,7 +178,10 @@ def test_what_is_no_output_is_a_constant_of_a_fit():
 @pytest.mark.parametrize(
     ("until", "expected"),
     [
-        ("zone_two.alpha: 0.01", "until.zone_two.alpha: neither an output nor a fit of .*did you mean 'zone_one'"),
+        (
+            "zone_two.alpha: 0.01",
+            r"a.yaml:5:51: realisations.until.zone_two.alpha: neither an output nor a fit of .*did you mean 'zone_one'",
+        ),
         (
             "zone_one.gamma: 0.01",
             r"expected a constant with an interval of the fit zone_one \(alpha, beta\), got 'gamma'",
@@ -176,14 +199,51 @@ def test_what_is_neither_is_refused_before_anything_is_written(url, tmp_path, ca
     assert not list(tmp_path.iterdir())
 
 
+JUMPS = """model: velocity_jump
+parameters:
+  {length: 20 mm, points: 400, hurst: 0.7, rms_roughness: 0.5 um, shear_modulus: 10 MPa, relaxation_time: 1 ms,
+   normal_force: 1 N, velocity_change: [0.1, 0.2, 0.4], velocity: {geometric: [0.01 mm/s, 10 m/s, 7]}}
+"""
+
+
 def test_fits_have_the_constants_that_they_declare(tmp_path):
     text = "model" + TEXT.partition("model")[2].replace("points: 500", "points: 400").replace(
         "1 m/s]", "1 mm/s, 1 m/s, 1 km/s]"
     )
     text = "\n".join(line for line in text.splitlines() if not line.startswith(("seed", "realisations")))
-    data = planted.make(tmp_path, text.replace("[friction_coefficient]", "[friction_coefficient, rms_slope]"))
-    for name in ("zone_one", "plateau", "interpolation"):
-        law = fits.available("sliding_friction")[name]
+    text = text.replace("[friction_coefficient]", "[friction_coefficient, rms_slope]")
+    for name in ("friction", "jumps"):
+        (tmp_path / name).mkdir()
+    friction, jumps = (planted.make(tmp_path / n, each) for n, each in (("friction", text), ("jumps", JUMPS)))
+    laws = {name: (fits.available("sliding_friction")[name], friction) for name in ("zone_one", "plateau")}
+    laws["interpolation"] = fits.available("sliding_friction")["interpolation"], friction
+    laws |= {law.name: (law, jumps) for law in fits.available("velocity_jump").values() if law.models}
+    del laws["relaxation_shape"]  # these courses are those of one exponential
+    for law, data in laws.values():
         (result,) = law.results(data).values()
         assert law.constants
         assert {f"{constant}{end}" for constant in law.constants for end in ("", "_low", "_high")} <= set(result)
+
+
+def test_the_unknowns_of_a_table_are_constants_too(toy, tmp_path, capsys):
+    """Realisations go on until calibration knows the slope; what the table names is no unknown."""
+    text = """
+name: rig
+model: toy
+realisations: {at_least: 10, at_most: 400, until: {calibration.slope: 4 %}}
+parameters: {slope: {linear: [1, 3, 6]}, position: {linear: [0.5 m, 3 m, 5]}, noise: 0.2}
+measured: {table: rig.csv}
+
+"""
+    rows = "".join(f"{x},{2 * x},{0.02 * x}\n" for x in (0.6, 1.1, 1.7, 2.2, 2.8))
+    (tmp_path / "rig.csv").write_text("position [m],height [m],standard_error [m]\n" + rows)
+    run(loads(text, "rig.yaml", str(tmp_path)), str(tmp_path / "rig.zarr"))
+    data = store.datasets(str(tmp_path / "rig.zarr"))
+    (found,) = fits.available("toy")["calibration"].results(data).values()
+    assert float(found.slope_high - found.slope_low) / 2 <= 0.04 * float(found.slope)
+    assert 10 < taken(str(tmp_path / "rig.zarr")).max() < 400
+    with pytest.raises(CampaignError, match=r"of the fit calibration \(slope\), got 'position'"):
+        run(
+            loads(text.replace("calibration.slope", "calibration.position"), "rig.yaml", str(tmp_path)),
+            str(tmp_path / "b"),
+        )

@@ -154,6 +154,7 @@ def test_requests_that_are_dropped_or_slow_lose_nothing(toy, link, bucket, url):
 def test_a_network_that_is_gone_ends_a_run_in_one_sentence_and_the_next_one_goes_on(
     toy, link, bucket, url, monkeypatch
 ):
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")  # those of the library below take more than a minute
     run(small(toy, 9), url)
     port, begun = link.target, []
     monkeypatch.setattr(locks, "SILENCE", 0.5)

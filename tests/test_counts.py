@@ -107,8 +107,8 @@ def test_a_block_is_one_task_and_one_file_of_every_array(toy, url):
 def sweeps(monkeypatch):
     """The search for a depth uncompiled, so that its sweeps can be counted."""
     counted = []
-    whole = steady.sweep
-    monkeypatch.setattr(steady, "sweep", lambda *arguments: counted.append(1) or whole(*arguments))
+    whole = steady.sweep_cells
+    monkeypatch.setattr(steady, "sweep_cells", lambda *arguments: counted.append(1) or whole(*arguments))
     for name in ("_solve", "_states"):
         monkeypatch.setattr(steady, name, getattr(steady, name).py_func)
     return counted
@@ -152,7 +152,7 @@ def test_nodes_visited_at_light_load(monkeypatch):
     barriers, block_barriers = np.empty(nodes), np.full(nodes // kelvin.BLOCK + 1, np.nan)
     sums, none = np.empty(kelvin.SUMS), np.empty(0)
     monkeypatch.setattr(kelvin, "_flown_over", kelvin._flown_over.py_func)
-    kelvin.sweep.py_func(
+    kelvin.sweep_cells.py_func(
         cells._replace(peak=peak), every, barriers, block_barriers, 1e-5 * nodes, 1e-2, sums, none, none
     )
     assert 0 < sums[kelvin.LENGTH] < 0.05 * nodes

@@ -3,8 +3,11 @@
 import os
 import platform
 import shutil
+from collections import Counter
+from concurrent import futures
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import numpy as np
@@ -16,7 +19,7 @@ from test_execute import digests, run, values
 from mdr_dask import execute, store, task
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import ClusterError, StoreError
-from mdr_dask.execute import Resources, clusters, executors
+from mdr_dask.execute import Resources, clusters, crew, executors
 from mdr_dask.models.base import Status
 
 
@@ -36,16 +39,24 @@ TWO = Replication(2, 2, {})
 
 
 @pytest.mark.slow
-def test_only_the_results_that_kill_their_worker_fail(toy, url, workers):
-    campaign = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0]), realisations=TWO, kill_above=2.5)
-    progress = run_on(workers, campaign, url)
-    assert (progress.done, progress.failed, progress.not_needed) == (4, 2, 0)
+def test_only_the_results_that_kill_their_worker_fail_and_none_that_went_out_with_them(toy, url, workers, monkeypatch):
+    """All but the first few blocks go out as one task; what it has finished when it is killed is not done again."""
+    monkeypatch.setattr(crew, "PACE", 1e-6)
+    positions = [1.0, 2.0, 3.0, 4.0, 5.0, 9.0, 6.0]
+    campaign = toy.campaign(toy.axis("position", positions), realisations=TWO, kill_above=8.0)
+    begun = []
+    progress = execute.run(
+        replace(campaign, blocks={"position": 1}), url, workers, lambda _: None, tell=lambda event: begun.append(event)
+    )
+    assert (progress.done, progress.failed, progress.not_needed) == (12, 2, 0)
     messages = [message for record in store.records(url, "") for message in record["messages"]]
-    assert {(m["case"]["position"], m["realisation"]) for m in messages} == {(3.0, 0), (3.0, 1)}
+    assert {(m["case"]["position"], m["realisation"]) for m in messages} == {(9.0, 0), (9.0, 1)}
     assert all(m["message"].startswith("its worker died again and again (1 times)") for m in messages)
-    clean = toy.campaign(toy.axis("position", [1.0, 2.0]), realisations=TWO)
+    told = Counter(event.facts["block"][0] for event in begun if event.name in ("block begun", "block retried"))
+    assert told[positions.index(5.0)] <= 1  # it dies with the worker if that dies at once
+    clean = toy.campaign(toy.axis("position", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), realisations=TWO)
     run(clean, url + "2")
-    np.testing.assert_array_equal(values(url).sel(position=[1.0, 2.0]), values(url + "2"))
+    np.testing.assert_array_equal(values(url).sel(position=values(url + "2").position), values(url + "2"))
 
 
 @pytest.mark.slow
@@ -54,6 +65,96 @@ def test_a_lost_worker_fails_nothing(toy, url, tmp_path, workers):
     progress = run_on(workers, campaign, url)
     assert (progress.done, progress.failed) == (12, 0)
     assert (tmp_path / "died").exists()
+
+
+class Central:
+    """As much of a scheduler as a crew sees, with any number of workers; what it is given ends when it is told to."""
+
+    status = "running"
+
+    def __init__(self):
+        self.threads, self.tasks, self.scheduler = {"first": 1}, [], self
+
+    def subscribe_topic(self, *_):
+        pass
+
+    def sync(self, *_, **__):
+        return self.threads
+
+    def ncores(self):
+        raise AssertionError("asked by way of sync")
+
+    def submit(self, _, works, **__):
+        future = futures.Future()
+        future.key, future.release, future.works = f"task-{len(self.tasks)}", (lambda: None), works
+        self.tasks.append(future)
+        return future
+
+    def end(self, seconds):
+        task_, *_ = (each for each in self.tasks if not each.done())
+        task_.set_result([task.Outcome((), 1, 0.0, seconds, 0.0) for _ in task_.works])
+
+
+@pytest.mark.parametrize(
+    ("threads", "seconds", "together"), [(1, 0.1, 1), (2, 1e-3, 25), (1000, 0.25, 50), (9, 1e-9, 100)]
+)
+def test_blocks_go_out_together_that_would_drown_the_scheduler_one_by_one(monkeypatch, threads, seconds, together):
+    """A thousand workers and blocks of a quarter of a second: fifty to a task, and eighty tasks end in a second."""
+    monkeypatch.setattr(crew, "LOOK", 0.0)
+    central = Central()
+    workers = crew.Crew(central, lambda _: None, 9.0, 0, lambda: None, str)
+    workers.look()
+    assert (workers.room, workers.together) == (4, 1)
+    workers.give(("first block",))
+    central.threads = {"many": threads}
+    rooms = []
+
+    def refill():
+        rooms.append(workers.room)
+        central.end(seconds)
+
+    assert workers.take(refill)[0] == ("first block",)
+    assert (rooms, workers.together) == ([2 * threads + 1], together)
+
+
+SILENT = {
+    "no worker yet": ({}, {}),
+    "all workers are gone": ({"first": 1}, {}),
+    "no answer of the scheduler yet": ({"first": 1}, None),
+}
+
+
+@pytest.mark.parametrize("what", SILENT)
+def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_limit_it_ends(monkeypatch, what):
+    clock, told, central = SimpleNamespace(now=0.0), [], Central()
+    monkeypatch.setattr(crew, "time", SimpleNamespace(monotonic=lambda: clock.now))
+
+    def answer(*_, callback_timeout):
+        if central.threads is None:
+            clock.now += callback_timeout
+            raise TimeoutError
+        return central.threads
+
+    central.sync = answer
+    central.threads, after = SILENT[what]
+    workers = crew.Crew(central, lambda event: told.append((clock.now, event.sentence)), 30.0, 0, lambda: None, str)
+    workers.look()
+    central.threads = after
+
+    def look_on():
+        while True:
+            clock.now += crew.LOOK
+            workers.look()
+
+    with pytest.raises(ClusterError, match=r"for \d+ s; what is in the store is kept: run the campaign again"):
+        look_on()
+    assert told[0][0] <= 5
+    assert told[0][1].startswith(f"{what}, waiting for ")
+    assert told[0][1].endswith("; giving up after 30 s")
+    assert clock.now <= 35
+    central.status = "closed"
+    with pytest.raises(ClusterError, match="the scheduler went away; what is in the store is kept"):
+        workers.look()
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from schemes import on_line
 from mdr_dask.errors import FitError
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
-from mdr_dask.physics.lubrication.line_contact import LineContact, solve
+from mdr_dask.physics.lubrication.line_contact import LineContact, solve_film
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, prony
@@ -160,7 +160,7 @@ def test_full_contact_of_any_solid_is_a_sum_over_waves(seed, count, pace):
 @given(load=st.floats(-3, 3), liquid=st.floats(0, 25))
 def test_films_from_rigid_and_isoviscous_to_heavy_and_piezoviscous(load, liquid):
     """The pressure carries the load and is nowhere negative, the film is open, and thinnest behind the middle."""
-    found = solve(LineContact(10**load, liquid))
+    found = solve_film(LineContact(10**load, liquid))
     if found.outcome != Outcome.CONVERGED:
         assert found.reason
         return
@@ -170,7 +170,7 @@ def test_films_from_rigid_and_isoviscous_to_heavy_and_piezoviscous(load, liquid)
     assert grid.film.min() > 0
     assert found.minimum_film.value <= found.central_film.value * (1 + 1e-6)
     assert 0 < found.central_film.error < 0.05 * found.central_film.value
-    thicker = solve(LineContact(10**load, liquid + 1.0))
+    thicker = solve_film(LineContact(10**load, liquid + 1.0))
     if thicker.outcome == Outcome.CONVERGED:
         slack = found.central_film.error + thicker.central_film.error
         assert thicker.central_film.value >= found.central_film.value - slack

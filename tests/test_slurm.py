@@ -12,6 +12,7 @@ import slurm as room
 from slow_campaign import make, mdr_dask
 from test_execute import digests
 
+BLOCKS = 12
 PAGE = (Path(__file__).parents[1] / "docs/cluster.md").read_text()
 SCRIPT = re.search(r"^```bash\n(.*?)^```", PAGE, flags=re.M | re.S)[1]
 
@@ -29,10 +30,10 @@ def slurm():
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch, slurm):
-    """A folder with a long campaign, as SLURM's jobs and this test see it."""
+    """A folder with a campaign of twice BLOCKS blocks, as SLURM's jobs and this test see it."""
     (tmp_path / "parts.sh").write_text(SCRIPT)
     monkeypatch.chdir(tmp_path)
-    for name, value in {**slurm.environment, **make(tmp_path, blocks=24, pause=1)}.items():
+    for name, value in {**slurm.environment, **make(tmp_path, blocks=BLOCKS, pause=1)}.items():
         monkeypatch.setenv(name, value)
         slurm.environment[name] = value
     return tmp_path
@@ -47,7 +48,7 @@ def missing(store):
 def whole(tmp_path_factory):
     """The digests of an undisturbed run."""
     folder = tmp_path_factory.mktemp("whole")
-    environment = make(folder, blocks=24, pause=0)
+    environment = make(folder, blocks=BLOCKS, pause=0)
     store = str(folder / "long.zarr")
     assert mdr_dask("run", str(folder / "long.yaml"), "--store", store, **environment).returncode == 0
     return digests(store)
@@ -113,7 +114,7 @@ def test_dask_workers_come_and_go_as_jobs_of_the_queue(folder, slurm, whole):
     names = [event["event"] for event in events(log)]
     assert len(jobs) > 1
     assert {"worker joined", "worker lost", "verified", "run ended"} <= set(names)
-    assert names.count("block done") == 48
+    assert names.count("block done") == 2 * BLOCKS
     assert digests("long.zarr") == whole
     assert not keys.exists()
 

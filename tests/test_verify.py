@@ -69,6 +69,54 @@ def test_the_command_lists_what_it_finds_and_mends_it(toy, url, capsys):
     assert run(small(toy), url).done == 4
 
 
+CAMPAIGN = """
+name: toy
+model: toy
+realisations: 4
+parameters: {position: [1 m, 3 m, 2 m], slope: 2}
+store: {path: toy.zarr, blocks: {position: 1, realisation: 2}}
+"""
+SERIES = "series: {one: {slope: 3}, two: {slope: 4}}\n"
+
+
+def lose_metadata(store: Path, spoil: bool) -> None:
+    """Lose everything that says how a store was laid out, but for the metadata of its arrays."""
+    for path in [*store.glob("zarr.json"), *store.glob("*/zarr.json"), *store.glob("**/layout.json")]:
+        if path.name == "layout.json" or "consolidated_metadata" in path.read_text():
+            path.write_text("{") if spoil else path.unlink()
+
+
+@pytest.mark.parametrize("spoil", [False, True], ids=["gone", "spoilt"])
+@pytest.mark.parametrize("series", ["", SERIES], ids=["no series", "series"])
+def test_a_store_without_metadata_and_their_copies_is_laid_out_again_from_its_campaign(
+    toy, tmp_path, monkeypatch, capsys, series, spoil
+):
+    monkeypatch.chdir(tmp_path)
+    Path("toy.yaml").write_text(CAMPAIGN + series)
+    assert main(["run", "toy.yaml", "--quiet"]) == 0
+    whole = digests("toy.zarr")
+    lose_metadata(Path("toy.zarr"), spoil)
+    if series:
+        Path("toy.zarr/two/position/c/0").unlink()
+    capsys.readouterr()
+    for command in (["verify", "toy.zarr"], ["run", "toy.yaml"], ["status", "toy.zarr"]):
+        assert main(command) == 2
+        remedy = "'mdr-dask verify --repair --campaign FILE toy.zarr' lays it out again"
+        assert (remedy in capsys.readouterr().err) == (not spoil or command[0] == "verify")
+    repair, held = ["verify", "toy.zarr", "--repair", "--campaign"], digests("toy.zarr")
+    for wrong in ("[1 m, 2 m, 3 m]", "[1 m, 3 m]", "[1 m, 3 m, 2 m, 4 m]"):
+        Path("wrong.yaml").write_text((CAMPAIGN + series).replace("[1 m, 3 m, 2 m]", wrong))
+        assert main([*repair, "wrong.yaml"]) == 2
+        assert "give the campaign that made the store" in capsys.readouterr().err
+    assert digests("toy.zarr") == held
+    assert main([*repair, "toy.yaml"]) == 0
+    assert "laid out again from the campaign" in capsys.readouterr().out
+    assert digests("toy.zarr") == whole
+    assert main(["verify", "toy.zarr"]) == 0
+    assert main(["run", "toy.yaml", "--quiet"]) == 0
+    assert "nothing to do" in capsys.readouterr().out
+
+
 def test_a_store_at_which_a_run_is_at_work_is_not_verified(url, toy, capsys):
     run(small(toy), url)
     with store.alone(url):

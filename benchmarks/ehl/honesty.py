@@ -11,7 +11,7 @@ import sys
 import numpy as np
 
 from benchmarks.measures import print_table, timed
-from mdr_dask.physics.lubrication.line_contact import SETTINGS, line_contact, solve
+from mdr_dask.physics.lubrication.line_contact import SETTINGS, line_contact, solve_film
 
 E_STAR = 115.385e9
 BOXES = {
@@ -53,9 +53,9 @@ def main():
     rows = []
     for box in BOXES:
         contacts = cases(box, number, seed)
-        exact = [films(solve(case, 0.0, FINEST)) for case in contacts]
+        exact = [films(solve_film(case, 0.0, FINEST)) for case in contacts]
         for accuracy in ACCURACIES:
-            found, seconds = zip(*(timed(solve, case, accuracy) for case in contacts), strict=True)
+            found, seconds = zip(*(timed(solve_film, case, accuracy) for case in contacts), strict=True)
             errors = np.array([abs(films(one)[:, 0] / true[:, 0] - 1) for one, true in zip(found, exact, strict=True)])
             stated = np.array(
                 [(films(one)[:, 1] + true[:, 1]) / true[:, 0] for one, true in zip(found, exact, strict=True)]

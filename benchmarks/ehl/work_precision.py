@@ -1,7 +1,8 @@
 """Error against run time of the film, and a stress suite: ``python -m benchmarks ehl work_precision [figure.png]``.
 
-In one run: graded grids with extrapolation (`solve`), the same graded grids without, and uniform grids, each against
-a solution on 2561 graded nodes. Then some hundred random points of the whole box, each law, flooded and starved.
+In one run: graded grids with extrapolation (`solve_film`), the same graded grids without, and uniform grids, each
+against a solution on 2561 graded nodes. Then some hundred random points of the whole box: each law, flooded and
+starved.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ STRESS = 100
 
 
 def extrapolated(case, accuracy):
-    found = line_contact.solve(case, accuracy)
+    found = line_contact.solve_film(case, accuracy)
     return float(found.central_film.value), float(found.minimum_film.value), found.finest.nodes.size
 
 
 def finest_grid(case, accuracy):
     """The same run, but the films of its finest grid alone."""
-    found = line_contact.solve(case, accuracy)
+    found = line_contact.solve_film(case, accuracy)
     return found.finest.central_film, found.finest.minimum[1], found.finest.nodes.size
 
 
@@ -62,7 +63,7 @@ def measure():
     for name, numbers in CASES.items():
         case = line_contact.line_contact(*numbers, E_STAR)
         finest = line_contact.SETTINGS._replace(nodes=(*line_contact.SETTINGS.nodes, 2561))
-        exact = line_contact.solve(case, 1e-6, finest)
+        exact = line_contact.solve_film(case, 1e-6, finest)
         for method, function, settings in METHODS:
             function(case, settings[0])
             for setting in settings:
@@ -87,7 +88,7 @@ def stress():
         seconds, failed, missed = [], 0, 0
         for _ in range(STRESS):
             numbers = (float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in BOX)
-            found, duration = timed(line_contact.solve, line_contact.line_contact(*numbers, E_STAR, **options))
+            found, duration = timed(line_contact.solve_film, line_contact.line_contact(*numbers, E_STAR, **options))
             seconds.append(duration)
             failed += found.outcome != Outcome.CONVERGED
             missed += found.error > 1e-3

@@ -16,7 +16,7 @@ from numba import njit
 
 from mdr_dask import bootstrap
 from mdr_dask.fits.relaxation import exponential, point_weights, widths
-from mdr_dask.physics.sliding.backward_euler import solve
+from mdr_dask.physics.sliding.backward_euler import steady_by_steps
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
@@ -119,7 +119,7 @@ def stepped(height: np.ndarray, way: int, last: float) -> tuple[np.ndarray, np.n
     n = height.size
     height = np.roll(height, -1 - int(np.argmax(height)))
     cells = np.array([REACH * n])
-    depth = solve(height - height[-1], True, cells, np.array([LOAD * n]))[0][0] - height[-1]
+    depth = steady_by_steps(height - height[-1], True, cells, np.array([LOAD * n]))[0][0] - height[-1]
     u, now, fade = np.empty(n), depth + height[-1], 1 / (1 + 1 / cells[0])
     for i in range(n):
         now = max(depth + height[i], fade * now)

@@ -9,6 +9,7 @@ import pytest
 from mdr_dask.models import load
 from mdr_dask.models.base import Block
 from mdr_dask.physics.lubrication import breakthrough as bt
+from mdr_dask.physics.lubrication.clusters import excursions, find_clusters
 from mdr_dask.physics.surfaces import roughness
 
 SPACING = 2 * np.pi * 0.05 / 10**6
@@ -25,7 +26,7 @@ def lines():
 
 def sliding(lines):
     line = lines[0] + lines[1]
-    return bt.contact_points(bt.find_clusters(bt.excursions(line, LEVEL), LEVEL, SPACING, STRENGTH), WINDOW)
+    return bt.contact_points(find_clusters(excursions(line, LEVEL), LEVEL, SPACING, STRENGTH), WINDOW)
 
 
 def every_window(lines, stride=1, slip=0.0):

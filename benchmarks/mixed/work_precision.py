@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.lubrication import breakthrough as bt
+from mdr_dask.physics.lubrication.clusters import excursions, find_clusters
 from mdr_dask.physics.surfaces import roughness
 
 CASES = {"800 N 40 C": (945, 1.0431e-6), "800 N 60 C": (945, 0.5317e-6), "800 N 80 C": (945, 0.3080e-6)}
@@ -28,7 +29,7 @@ def lines(points, realisation=0):
 
 def sliding(pair, window, level):
     spacing = PERIMETER / pair[0].size
-    clusters = bt.find_clusters(bt.excursions(pair[0] + pair[1], level), level, spacing, STRENGTH)
+    clusters = find_clusters(excursions(pair[0] + pair[1], level), level, spacing, STRENGTH)
     return float(np.mean(bt.contact_points(clusters, window) > 0))
 
 

@@ -16,8 +16,9 @@ from numba import njit
 
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.edges import depth_for
-from mdr_dask.physics.transients.elements.follow import closed_nodes, follow_line, steady_start
+from mdr_dask.physics.transients.elements.follow import follow_line, steady_start
 from mdr_dask.physics.transients.elements.foundation import KELVIN, foundation
 from mdr_dask.physics.transients.elements.steps import Schedule
 
@@ -33,7 +34,7 @@ SOLIDS = {
 def line(oversampling: int):
     amplitude, phase = roughness.amplitudes(POINTS // 2, 0.7), roughness.phases(2014, 0, POINTS // 2)
     nodes = POINTS * oversampling
-    return closed_nodes(roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1))
+    return periodic_line(roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1))
 
 
 def phase_moments(begin: float, speed: float, nodes: int, cells: float) -> np.ndarray:

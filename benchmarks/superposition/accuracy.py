@@ -91,26 +91,36 @@ def plateau_family(shape, curves, points, noise, overlap, seed):
     return np.arange(curves, dtype=float), pieces, shifts
 
 
-def on_plateaus(families=40, first=900_000):
+def on_plateau(setting, seed, vertical=False):
+    """Return errors of horizontal (and vertical) factors over half widths of 95 %, the first errors, and the time."""
+    groups, pieces, shifts = plateau_family(*setting, seed)
+    heights = RISE * vertical * (groups - groups[groups.size // 2])
+    pieces = [(x, y - height) for (x, y), height in zip(pieces, heights, strict=True)]
+    start = time.process_time()
+    result = superpose(groups, pieces, vertical)
+    spent = time.process_time() - start
+    errors = np.abs([result.horizontal - shifts, result.vertical - heights][: 1 + vertical])
+    widths = np.array([result.horizontal_error, result.vertical_error])[: 1 + vertical]
+    others = np.arange(shifts.size) != shifts.size // 2
+    ratios = errors[:, others] / (student.ppf(0.975, result.freedom) * widths[:, others])
+    return ratios, errors[0, others], spent
+
+
+def on_plateaus(families=40, first=900_000, vertical=False):
     """Print for each setting how many intervals of 95 % hold, the largest error, its half width, and processor time."""
-    print("intervals of 95 % on plateaus: held, median largest error and its half width, families beyond three of them")
+    beside = ", those of vertical factors" if vertical else ""
+    print(f"intervals of 95 % on plateaus: held{beside}; median largest error, its half width, families beyond three")
     for setting in PLATEAUS:
-        held, largest, half, beyond, times = [], [], [], 0, []
-        for seed in range(first, first + families):
-            groups, pieces, shifts = plateau_family(*setting, seed)
-            start = time.process_time()
-            result = superpose(groups, pieces)
-            times.append(time.process_time() - start)
-            width = student.ppf(0.975, result.freedom) * result.horizontal_error
-            others = np.arange(shifts.size) != shifts.size // 2
-            error = np.abs(result.horizontal - shifts)
-            held.append(np.mean(error[others] <= width[others]))
-            largest.append(error.max())
-            half.append(width[np.argmax(error)])
-            beyond += bool(np.any(error[others] > 3 * width[others]))
-        middle = np.median(largest), np.median(half)
-        print(f"{setting!s:34s} {np.mean(held):.3f} {middle[0]:.3f} {middle[1]:.3f} {beyond}/{families}", end=" ")
-        print(f"{1e3 * np.median(times):.1f} ms")
+        ratios, errors, times = zip(
+            *(on_plateau(setting, seed, vertical) for seed in range(first, first + families)), strict=True
+        )
+        held = " ".join(f"{share:.3f}" for share in np.mean(np.array(ratios) <= 1, axis=(0, 2)))
+        most = [
+            (error.max(), error.max() / ratio[0, error.argmax()]) for ratio, error in zip(ratios, errors, strict=True)
+        ]
+        beyond = sum(bool(np.any(ratio[0] > 3)) for ratio in ratios)
+        largest, half = np.median(most, axis=0)
+        print(f"{setting!s:34s} {held}; {largest:.3f} {half:.3f} {beyond}/{families} {1e3 * np.median(times):.1f} ms")
 
 
 def main(families=40):
@@ -123,7 +133,8 @@ def main(families=40):
             median, most = (" / ".join(f"{1e3 * of(times):.1f}" for _, times, _ in found) for of in (np.median, np.max))
             refused = sum(number for *_, number in found)
             print(f"{shape:16s} covered {shares}, median time {median} ms, longest {most} ms, refused {refused}")
-    on_plateaus(families)
+    for vertical in (False, True):
+        on_plateaus(families, vertical=vertical)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import DataFile, Parameters
+from mdr_dask.models.base import Parameters
+from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
 #: Most values of an axis that are looked at where all would take long.
@@ -117,10 +118,11 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How small an error has to be: both parts zero means nothing is enough."""
+    """How small an error has to be: both parts zero means nothing is enough; where it stands in its file."""
 
     relative: float = 0.0
     absolute: float = 0.0
+    place: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.reference import yaml_text
-from mdr_dask.models.base import DataFile, Model, NamedFile, Parameters, said, unit_of
+from mdr_dask.models.base import Model, Parameters, said, unit_of
+from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.units import is_unit, shown
 
 _HEAD = """\

@@ -124,8 +124,7 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
         for name, rows in found.conditions.items()
     }
     yield f"conditions {', '.join(ranges.values()) or 'none'}"
-    unknowns = [axis for axis in series.axes if axis.name not in found.conditions and len(axis.values) > 1]
-    yield f"unknowns {', '.join(axis.name for axis in unknowns) or 'none: every axis is a column of the table'}"
+    yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
     outside = [
         f"line {line}, {name} {shown(float(value), units[name])}"
         for name, (low, high) in _reach(model, series, found.conditions).items()
@@ -133,11 +132,8 @@ def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, 
         if not low - SAME * abs(low) <= value <= high + SAME * abs(high)
     ]
     more = f", ... ({len(outside)} in all)" if len(outside) > FEW else ""
-    yield (
-        f"outside the study, and refused by the fit: {'; '.join(outside[:FEW])}{more}"
-        if outside
-        else ("every row lies inside the study")
-    )
+    refused = f"outside the study, and refused by the fit: {'; '.join(outside[:FEW])}{more}"
+    yield refused if outside else "every row lies inside the study"
 
 
 def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
@@ -147,6 +143,25 @@ def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tu
     held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}
     held |= {axis.name: (min(axis.values), max(axis.values)) for axis in series.axes if axis.unit is not None}
     return {key: held[key] for key in conditions}
+
+
+def unknowns(campaign: Campaign) -> tuple[str, ...]:
+    """Return the axes of a campaign that its table of measurements does not name; none where it has no table."""
+    table = campaign.measured
+    if table is None:
+        return ()
+    found: list[str] = []
+    for one in campaign.series:
+        try:
+            measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
+        except DataError:
+            continue  # it is of another series
+        found += _unknown(measured, one)
+    return tuple(dict.fromkeys(found))
+
+
+def _unknown(measured: Measured, series: Series) -> list[str]:
+    return [axis.name for axis in series.axes if axis.unit is not None and axis.name not in measured.conditions]
 
 
 def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str]]:

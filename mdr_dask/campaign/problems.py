@@ -19,6 +19,9 @@ class Place:
     line: int
     column: int
 
+    def __str__(self) -> str:
+        return f"{self.source}:{self.line}:{self.column}"
+
 
 @dataclass(frozen=True, order=True)
 class Problem:
@@ -30,7 +33,7 @@ class Problem:
 
     def __str__(self) -> str:
         where = f"{self.where}: " if self.where else ""
-        return f"{self.place.source}:{self.place.line}:{self.place.column}: {where}{self.what}"
+        return f"{self.place}: {where}{self.what}"
 
 
 class Problems:

@@ -17,7 +17,8 @@ from mdr_dask.campaign.problems import Path, Problems, dotted, shown
 from mdr_dask.campaign.spec import AdaptiveSpec, CampaignSpec
 from mdr_dask.campaign.tolerances import answers, is_of_fit, tolerances
 from mdr_dask.errors import DataError, ModelError, did_you_mean
-from mdr_dask.models.base import DataFile, Model
+from mdr_dask.models.base import Model
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import to_si
 
 

@@ -14,7 +14,8 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.models.base import DataFile, Model, said, unit_of
+from mdr_dask.models.base import Model, said, unit_of
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import DEFINITIONS
 
 _HEAD = """\

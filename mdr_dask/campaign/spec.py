@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag
 
-from mdr_dask.models.base import NamedFile, Parameters, quantity, unquoted
+from mdr_dask.models.base import Parameters, quantity, unquoted
+from mdr_dask.models.data_file import NamedFile
 
 _LONGEST_NAME = 100
 

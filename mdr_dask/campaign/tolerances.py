@@ -74,7 +74,9 @@ def answers(document: Document, path: Path, given: Mapping[str, Written], proble
             problems.add(document.place((*path, name)), dotted((*path, name)), str(error))
             continue
         is_part = isinstance(written, ToleranceSpec) or (isinstance(written, str) and "%" in written)
-        found[constant] = wanted if is_part else Tolerance(absolute=wanted.relative)
+        place = str(document.key_place((*path, name)))
+        absolute = wanted.absolute if is_part else wanted.relative
+        found[constant] = Tolerance(wanted.relative if is_part else 0.0, absolute, place)
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -24,12 +25,16 @@ LOOK = 1.0
 #: Seconds after which a user is told that there is no worker, and between two such words.
 SILENCE = 3.0
 #: Seconds that a scheduler is given for a short answer.
-ANSWER = 5.0
+ANSWER = 3.0
+#: Tasks that a scheduler is given in a second: half of what it can take.
+PACE = 80
+#: Most blocks of a task.
+MOST_TOGETHER = 100
 KEPT = "what is in the store is kept: run the campaign again"
 
 
 class Crew:
-    """Blocks in the hands of workers, as many as keep them busy.
+    """Blocks in the hands of workers, as many as keep them busy; where workers are many, several blocks to a task.
 
     Parameters
     ----------
@@ -63,8 +68,9 @@ class Crew:
         self._replace_lost = replace_lost
         self._last_word = last_word
         self._ended: SimpleQueue[Future] = SimpleQueue()
-        self._running: dict[Future, Work] = {}
-        self._begun: set[str] = set()
+        self._running: dict[Future, tuple[Work, ...]] = {}
+        self._begun: dict[str, list[int]] = {}  # by task, which of its blocks
+        self._blocks, self._seconds = 0, 0.0
         self._threads = 0
         self._had_workers = False
         self._looked = self._seen = self._told = time.monotonic()
@@ -73,22 +79,30 @@ class Crew:
 
     @property
     def busy(self) -> bool:
-        """Whether any block is out."""
+        """Whether any task is out."""
         return bool(self._running)
 
     @property
     def room(self) -> int:
-        """How many more blocks to give out: a few ahead of what is being computed."""
-        return max(2 * max(self._threads, self._most) + 2 - len(self._running), 1)
+        """How many more tasks to give out: a few ahead of what is being computed."""
+        return max(2 * max(self._threads, self._most) + 2 - len(self._running), 0)
 
-    def give(self, work: Work) -> None:
-        """Give out a block."""
-        future = self._client.submit(run_on_worker, work, pure=False)
-        self._running[future] = work
+    @property
+    def together(self) -> int:
+        """How many blocks to a task, so that all workers together do not end more tasks than a scheduler can take."""
+        if not self._seconds:
+            return 1
+        wanted = math.ceil(self._threads / PACE * self._blocks / self._seconds)
+        return max(1, min(wanted, MOST_TOGETHER))
+
+    def give(self, works: tuple[Work, ...]) -> None:
+        """Give out some blocks as one task."""
+        future = self._client.submit(run_on_worker, works, pure=False)
+        self._running[future] = works
         future.add_done_callback(self._ended.put)
 
-    def take(self) -> tuple[Work, Outcome | KilledWorker]:
-        """Wait for a block to end; look after the cluster meanwhile.
+    def take(self, refill: Callable[[], None] = lambda: None) -> tuple[tuple[Work, ...], list[Outcome] | KilledWorker]:
+        """Wait for a task to end; meanwhile look after the cluster, and give out more as workers come.
 
         Raises
         ------
@@ -99,22 +113,26 @@ class Crew:
         """
         while True:
             if time.monotonic() - self._looked > LOOK:
-                self._look()
+                self.look()
+                refill()
             try:
                 future = self._ended.get(timeout=LOOK)
             except Empty:
                 continue
             try:
-                outcome = _outcome(future)
+                outcomes = _outcomes(future)
             except TimeoutError:  # its worker went away with what it had to say
                 future.add_done_callback(self._ended.put)
                 continue
-            work = self._running.pop(future)
-            self._begun.discard(future.key)
+            works = self._running.pop(future)
+            self._begun.pop(future.key, None)
             future.release()
-            return work, outcome
+            if not isinstance(outcomes, KilledWorker):
+                self._blocks += len(outcomes)
+                self._seconds += sum(outcome.seconds for outcome in outcomes)
+            return works, outcomes
 
-    def _look(self) -> None:
+    def look(self) -> None:
         """See whether the scheduler is there and has workers; give up when there has been none for too long."""
         if self._client.status != "running":
             raise ClusterError(f"the scheduler went away; {KEPT}")
@@ -143,9 +161,9 @@ class Crew:
 
     def _hear_of_block(self, event: tuple[float, dict[str, Any]]) -> None:
         facts = event[1]
-        key = facts.pop("key")
-        self._tell(Event("block retried" if key in self._begun else "block begun", facts))
-        self._begun.add(key)
+        begun, number = self._begun.setdefault(facts.pop("key"), []), facts.pop("number")
+        self._tell(Event("block retried" if number in begun else "block begun", facts))
+        begun.append(number)
 
     def _hear_of_worker(self, event: tuple[float, dict[str, Any]]) -> None:
         facts = event[1]
@@ -154,17 +172,17 @@ class Crew:
         elif facts.get("action") == "remove-worker":
             self._tell(Event("worker lost", {"worker": facts["worker"], "expected": facts.get("expected", False)}))
             lost = set(facts.get("processing-tasks", ()))
-            for future, work in list(self._running.items()):
-                if future.key in lost & self._begun:
-                    self._tell(of_block("lost", work, worker=facts["worker"]))
+            for future, works in list(self._running.items()):
+                if future.key in lost and (begun := self._begun.get(future.key)):
+                    self._tell(of_block("lost", works[begun[-1]], worker=facts["worker"]))
 
 
-def _outcome(future: Future) -> Outcome | KilledWorker:
+def _outcomes(future: Future) -> list[Outcome] | KilledWorker:
     """Return what a task sent home; what is no fault of the task ends the run in one sentence."""
     from concurrent.futures import CancelledError
 
     try:
-        outcome: Outcome = future.result(timeout=ANSWER)
+        outcomes: list[Outcome] = future.result(timeout=ANSWER)
     except KilledWorker as killed:
         return killed
     except CancelledError:
@@ -173,7 +191,7 @@ def _outcome(future: Future) -> Outcome | KilledWorker:
         raise ClusterError(f"a worker lacks {error.name!r}; {KEPT}") from None
     except (AttributeError, TypeError) as error:
         raise ClusterError(f"a worker has another version of mdr_dask: {error}; install the same on both") from None
-    return outcome
+    return outcomes
 
 
 @contextmanager
@@ -191,17 +209,20 @@ def run_distributed(crew: Crew, works: Iterable[Work], settle: Settle) -> None:
     suspects: list[Work] = []
 
     def fill() -> None:
-        for work in itertools.islice(remaining, crew.room):
-            crew.give(work)
+        for _ in range(crew.room):
+            if together := tuple(itertools.islice(remaining, crew.together)):
+                crew.give(together)
 
     with _connected():
+        crew.look()
         fill()
         while crew.busy:
-            work, outcome = crew.take()
-            if isinstance(outcome, KilledWorker):
-                suspects.append(work)
+            together, outcomes = crew.take(fill)
+            if isinstance(outcomes, KilledWorker):
+                suspects += together
             else:
-                settle(work, outcome)
+                for work, outcome in zip(together, outcomes, strict=True):
+                    settle(work, outcome)
             fill()
         for work in suspects:
             _run_suspect(crew, work, settle)
@@ -212,13 +233,13 @@ def _run_suspect(crew: Crew, suspect: Work, settle: Settle) -> None:
     pieces = [suspect]
     attempts = itertools.count(suspect.attempt)
     while pieces:
-        crew.give(replace(pieces.pop(), attempt=next(attempts)))
-        work, outcome = crew.take()
-        if not isinstance(outcome, KilledWorker):
-            settle(work, outcome)
+        crew.give((replace(pieces.pop(), attempt=next(attempts)),))
+        (work,), outcomes = crew.take()
+        if not isinstance(outcomes, KilledWorker):
+            settle(work, *outcomes)
             continue
         halves = work.halves()
         pieces += reversed(halves)
         if not halves:
-            died = f"its worker died again and again ({outcome.allowed_failures + 1} times)"
+            died = f"its worker died again and again ({outcomes.allowed_failures + 1} times)"
             settle(work, write_off(work, f"{died}, memory is the usual cause"))

@@ -1,4 +1,4 @@
-"""What a worker process does with a block that it is sent."""
+"""What a worker process does with the blocks that it is sent."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from mdr_dask.task import Outcome, Work, finished, run_block
 TOPIC = "mdr_dask"
 
 
-def run_on_worker(work: Work) -> Outcome:
-    """Run a block, unless a worker did so before that died before it was told."""
+def run_on_worker(works: tuple[Work, ...]) -> list[Outcome]:
+    """Run blocks one after the other, but for those that a worker has finished that died before it was told."""
+    return [finished(work) or _run(number, work) for number, work in enumerate(works)]
+
+
+def _run(number: int, work: Work) -> Outcome:
     worker = get_worker()
     facts = {**of_block("begun", work).facts, "worker": worker.address}
-    worker.log_event(TOPIC, {**facts, "key": worker.get_current_task()})
-    return finished(work) or run_block(work)
+    worker.log_event(TOPIC, {**facts, "key": worker.get_current_task(), "number": number})
+    return run_block(work)

@@ -157,7 +157,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
             for t, mask in zip(layout, asked, strict=True)
         ]
         progress = _begin_round(progress, groups)
-        if progress.to_do or campaign.replication.goes_on or not stage.is_adaptive:
+        if progress.to_do or campaign.replication.until or not stage.is_adaptive:
             break
         stage, _ = following(url, stage, layout, places, count)
     return progress
@@ -185,28 +185,31 @@ def _run_stages(job: _Job, execute: Execute) -> Progress:
         job.tell(Event("round ended", facts))
 
     reached, stage = 0, job.stage
-    while last := _run_rounds(job, run_round):
+    while last := _run_rounds(_before_answers(job) if stage.is_adaptive else job, run_round):
         reached = max(reached, last.realisations[1])
         if not stage.is_adaptive:
             break
         after, event = following(job.url, stage, *stored_layout(stage, job.url), reached)
         job.tell(event)
         if after is None:
-            _spare_the_rest(job, run_round, reached)
+            _end_stages(job, run_round, reached)
             break
         stage = after
         job = replace(job, stage=stage)
     return replace(progress, wall_seconds=time.monotonic() - start)
 
 
-def _run_rounds(job: _Job, run_round: Callable[[_Round, list[Cells]], None]) -> _Round | None:
+def _run_rounds(
+    job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
+) -> _Round | None:
     """Run round after round, each over the cases that the one before left too uncertain.
 
     Returns the last round; None if this part leaves while others are not done with it.
     """
-    current: _Round | None = None
     replication = job.stage.campaign.replication
     for count in rounds(replication):
+        if current and count <= current.realisations[1]:
+            continue
         further = _lay_out(job, current, count)
         if not any(mask.any() for mask in further.needed):
             break
@@ -220,13 +223,33 @@ def _run_rounds(job: _Job, run_round: Callable[[_Round, list[Cells]], None]) -> 
     return current
 
 
-def _spare_the_rest(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
-    """Write down as not needed what no stage has asked for."""
+def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
+    """Go on for fitted constants with all values there are, and write down as not needed what nothing has asked for."""
+    if job.stage.campaign.replication.answers:
+        job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
+        last = _run_rounds(job, run_round, _behind(job, realisations))
+        if last is None:
+            return
+        realisations = last.realisations[1]
     layout, places = stored_layout(job.stage, job.url)
     asked = cases_of(job.stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in job.stage.meshes])
     nothing = [np.zeros_like(mask) for mask in asked]
     rest = _Round(layout, asked, nothing, (0, realisations), tuple(mask.astype(np.int64) for mask in nothing))
     run_round(rest, [replace(cells, kept=0) for cells in _find(job, rest)])
+
+
+def _before_answers(job: _Job) -> _Job:
+    """Return a job whose cases get what they need for themselves; fits need all values of the axes."""
+    campaign = job.stage.campaign
+    campaign = replace(campaign, replication=replace(campaign.replication, answers={}))
+    return replace(job, stage=replace(job.stage, campaign=campaign))
+
+
+def _behind(job: _Job, count: int) -> _Round:
+    """Return the round that all cases of a stage have behind them."""
+    layout, places = stored_layout(job.stage, job.url)
+    asked = cases_of(job.stage, layout, places, job.stage.new)
+    return _Round(layout, asked, asked, (0, count), tuple(np.where(mask, count, 0) for mask in asked))
 
 
 def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:

@@ -16,6 +16,10 @@ from mdr_dask.fits.base import Fit
 STEP = 1e-3
 #: Most groups of neighbours along a dimension that are moved one after the other.
 GROUPS = 32
+#: Part of the standard error of a constant below which a group of cases counts for nothing.
+NEGLIGIBLE = 0.01
+#: Change of the scatter by which it is seen how much of an interval comes from it.
+LESS = 0.01
 
 
 def require_known(campaign: Campaign) -> None:
@@ -27,21 +31,20 @@ def require_known(campaign: Campaign) -> None:
         With one sentence for each.
     """
     known = available(campaign.model) if campaign.replication.answers else {}
+    is_adaptive = any(axis.refinement for one in campaign.series for axis in one.axes)
     problems = []
-    for answer in campaign.replication.answers:
+    for answer, tolerance in campaign.replication.answers.items():
         name, _, constant = answer.partition(".")
         if name not in known:
             wrong = f"neither an output nor a fit of {campaign.model}{did_you_mean(name, list(known))}"
-        elif constant not in known[name].constants:
-            has = ", ".join(known[name].constants) or "none"
+        elif constant not in known[name].constants_of(campaign):
+            has = ", ".join(known[name].constants_of(campaign)) or "none"
             wrong = f"expected a constant with an interval of the fit {name} ({has}), got {constant!r}"
+        elif campaign.replication.until and is_adaptive:
+            wrong = "expected outputs alone or constants alone beside an adaptive axis, got both"
         else:
             continue
-        problems.append(f"{campaign.source}: realisations.until.{answer}: {wrong}")
-    if campaign.replication.answers and any(axis.refinement for one in campaign.series for axis in one.axes):
-        problems.append(
-            f"{campaign.source}: realisations.until: expected outputs beside an adaptive axis, got constants"
-        )
+        problems.append(f"{tolerance.place or campaign.source}: realisations.until.{answer}: {wrong}")
     if problems:
         raise CampaignError(*problems)
 
@@ -66,7 +69,64 @@ def half_widths(
 
 def is_wide(value: xr.DataArray, half: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
     """Return where an interval is too wide; not where it has no ends, as of a law that does not hold."""
-    return half > np.maximum(tolerance.absolute, tolerance.relative * abs(value))
+    return (half > _allowed(value, tolerance)) & np.isfinite(half)
+
+
+def _allowed(value: xr.DataArray, tolerance: Tolerance) -> xr.DataArray:
+    relative = tolerance.relative * abs(value)
+    return relative.where(relative > tolerance.absolute, tolerance.absolute)
+
+
+def without_scatter(fit: Fit, constant: str, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.DataArray]:
+    """Return what would be left of half of an interval if realisations did not scatter, by series.
+
+    That comes from errors of the grid and from what a law misses; more realisations do not narrow it. It is seen by
+    making the scatter a little less and a little more. The smaller result counts: one of both may be where the law
+    begins to be doubted.
+    """
+    now = half_widths(fit, constant, groups)
+
+    def left(scale: float) -> dict[str, xr.DataArray]:
+        found = half_widths(fit, constant, {name: _scattered(data, scale) for name, data in groups.items()})
+        return {name: (half - scale * now[name][1]) / (1 - scale) for name, (_, half) in found.items()}
+
+    more = left(1 + LESS)
+    return {name: less.where(less < more[name], more[name]) for name, less in left(1 - LESS).items()}
+
+
+def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
+    """Return a study with the same means and another scatter of its realisations."""
+    found = {}
+    for name in _results(data):
+        mean = data[name].mean("realisation")
+        found[name] = (mean + scale * (data[name] - mean)).transpose(*data[name].dims).assign_attrs(data[name].attrs)
+    return data.assign(found)
+
+
+def still_wide(
+    fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
+) -> dict[str, xr.DataArray]:
+    """Return where an interval is too wide and so many realisations may narrow it enough, by series.
+
+    They are in vain where scatter alone is within the tolerance, and falling with the root of their number leaves too
+    much with what is left without it.
+
+    Raises
+    ------
+    FitError
+        As `half_widths`.
+    """
+    found = half_widths(fit, constant, groups)
+    wide = {name: is_wide(*both, tolerance) for name, both in found.items()}
+    if not any(bool(flags.any()) for flags in wide.values()):
+        return wide
+    left = without_scatter(fit, constant, groups)
+    count = max(data.sizes["realisation"] for data in groups.values())
+    for name, (value, half) in found.items():
+        allowed = _allowed(value, tolerance)
+        scatter, rest = half - left[name], left[name]
+        wide[name] = wide[name] & ~((scatter <= allowed) & (rest + (count / at_most) ** 0.5 * scatter > allowed))
+    return wide
 
 
 def cases_behind(
@@ -76,7 +136,7 @@ def cases_behind(
 
     The values of every dimension, apart from those that the constant has itself, are moved by a small part of their
     standard error. Cases take part if the constant follows each of their coordinates, so they are whole rows and
-    columns: what a fit compares has the same lines.
+    columns: what a fit compares has the same lines. Values that hardly count do not.
 
     Parameters
     ----------
@@ -95,35 +155,41 @@ def cases_behind(
     """
     data = groups[name]
     sizes = {str(dim): size for dim, size in data["status"].sizes.items() if dim != "realisation"}
-    own = [dim for dim in sizes if dim in wide.dims]
+    own = [dim for dim in sizes if dim in wide.dims and _is_own(data, wide, dim)]
     place = {dim: xr.DataArray(np.arange(size), dims=dim) for dim, size in sizes.items()}
     chosen = xr.ones_like(sum(place.values(), xr.DataArray(0)), dtype=bool) & _over(own, wide)
     step = _steps(data, [dim for dim in sizes if dim not in own])
 
-    def constants(moved: xr.DataArray | None = None) -> xr.DataArray | None:
-        changed = data
-        if moved is not None:
-            shifted = {key: data[key] + by.where(moved, 0.0) for key, by in step.items()}
-            changed = data.assign({key: array.assign_attrs(data[key].attrs) for key, array in shifted.items()})
+    result = name if fit.apart else ""
+    start, half = half_widths(fit, constant, groups)[result]
+
+    def after(moved: xr.DataArray) -> xr.DataArray | None:
+        shifted = {key: data[key] + by.where(moved, 0.0) for key, by in step.items()}
+        changed = data.assign({key: array.assign_attrs(data[key].attrs) for key, array in shifted.items()})
         try:
-            return half_widths(fit, constant, {**groups, name: changed})[name if fit.apart else ""][0]
+            return half_widths(fit, constant, {**groups, name: changed})[result][0]
         except FitError:
             return None
 
-    start = constants()
     for dim in sizes:
         if dim in own:
             continue
         follows = xr.zeros_like(chosen)
         for group in np.array_split(np.arange(sizes[dim]), min(GROUPS, sizes[dim])):
             here = place[dim].isin(group)
-            after = constants(here)
-            if after is None or start is None:
-                follows = follows | here
-                continue
-            follows = follows | (here & _over(own, after != start))
+            there = after(here)
+            if there is not None:
+                here = here & _over(own, wide & (abs(there - start) > NEGLIGIBLE * STEP * half))
+            follows = follows | here
         chosen = chosen & follows
     return chosen.transpose(*sizes)
+
+
+def _is_own(data: xr.Dataset, wide: xr.DataArray, dim: str) -> bool:
+    """Return whether a result has the values of a dimension of its study, and not a row for all of them beside."""
+    if dim in data.coords and dim in wide.coords:
+        return data[dim].equals(wide[dim])
+    return data.sizes[dim] == wide.sizes[dim]
 
 
 def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
@@ -134,11 +200,16 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
     """Return by how much the results of every case are moved, all of its realisations alike: some up, some down."""
-    beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
-    signs = np.random.Generator(np.random.Philox(0)).choice([-1.0, 1.0], [data.sizes[dim] for dim in inner])
+    generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
-    for key, values in data.data_vars.items():
-        if key not in beside and "realisation" in values.dims:
-            error = values.std("realisation", ddof=1) / values.notnull().sum("realisation") ** 0.5
-            found[str(key)] = (STEP * xr.DataArray(signs, dims=inner) * error).drop_vars(error.coords).fillna(0.0)
+    for key in _results(data):
+        signs = generator.choice([-1.0, 1.0], shape)
+        error = data[key].std("realisation", ddof=1) / data[key].notnull().sum("realisation") ** 0.5
+        found[key] = (STEP * xr.DataArray(signs, dims=inner) * error).drop_vars(error.coords).fillna(0.0)
     return found
+
+
+def _results(data: xr.Dataset) -> list[str]:
+    """Return the outputs that differ between realisations, without their errors."""
+    beside = {"status", *(array.attrs.get("ancillary_variables") for array in data.data_vars.values())}
+    return [str(key) for key, array in data.data_vars.items() if key not in beside and "realisation" in array.dims]

@@ -16,6 +16,7 @@ import xarray as xr
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
+from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError
 
 #: Departure of a law, rms and half of the largest, that counts as none: laws of friction are not meant to hold better.
@@ -43,7 +44,7 @@ class Fit:
         of fit, and ``law_holds``; units in attrs.
     apart : bool
         Whether each series of a store is fitted for itself, with a mapping of that one series only.
-    constants : tuple of str
+    constants : tuple of str, or callable, Campaign -> tuple of str
         Constants with an interval that realisations may go on for (``until: {name.constant: 1 %}``).
     """
 
@@ -52,7 +53,11 @@ class Fit:
     summary: str
     compute: Callable[[Mapping[str, xr.Dataset]], xr.Dataset]
     apart: bool = False
-    constants: tuple[str, ...] = ()
+    constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
+
+    def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
+        """Return the constants that realisations of a campaign may go on for."""
+        return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
         """Fit a store: one result for each series that has the data for it, or one for all series together.

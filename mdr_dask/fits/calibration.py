@@ -14,7 +14,7 @@ import xarray as xr
 from scipy.stats import chi2
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.campaign.measured import Measured, read_measured
+from mdr_dask.campaign.measured import Measured, read_measured, unknowns
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import determined
 from mdr_dask.fits.base import DOUBTFUL, Fit
@@ -334,5 +334,6 @@ FITS: tuple[Fit, ...] = (
         "axes that the table `measured` does not name, from the measured points: values, intervals, what is open",
         calibration,
         apart=True,
+        constants=unknowns,
     ),
 )

@@ -196,6 +196,7 @@ FITS: tuple[Fit, ...] = (
         "mu(t) after the jump beside the closed law: jump of eq. 4.11, rate of eq. 4.12 (eqs. 4.13 to 4.15)",
         _relaxation_course,
         apart=True,
+        constants=tuple(COURSE_FIELDS),
     ),
     Fit(
         "jump_linearity",
@@ -203,5 +204,6 @@ FITS: tuple[Fit, ...] = (
         "zeta and xi over dv / v_1: constant if the jump goes with the change of velocity (eq. 4.8)",
         _jump_linearity,
         apart=True,
+        constants=tuple(LINEAR_FIELDS),
     ),
 )

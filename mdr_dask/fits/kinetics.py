@@ -498,13 +498,21 @@ def _rate_and_state(series: Series) -> xr.Dataset:
 
 _MODELS = ("velocity_jump",)
 FITS: tuple[Fit, ...] = (
-    Fit("kinetics", _MODELS, "jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part", _kinetics, apart=True),
+    Fit(
+        "kinetics",
+        _MODELS,
+        "jump of every case: d_mu_0 v_1 / (dv s), zeta, xi, relaxing part",
+        _kinetics,
+        apart=True,
+        constants=tuple(JUMP_FIELDS),
+    ),
     Fit(
         "relaxation",
         _MODELS,
         "mu = mu_2 + mu* exp(-b t') of every case, integral rate, length and time, whether one is enough",
         _relaxation,
         apart=True,
+        constants=(*RATE_FIELDS, *LENGTH_FIELDS),
     ),
     Fit(
         "relaxation_shape",
@@ -512,6 +520,7 @@ FITS: tuple[Fit, ...] = (
         "exp(-(b t')^beta) and two exponentials where one is not enough",
         _shape,
         apart=True,
+        constants=tuple(SHAPE_FIELDS),
     ),
     Fit(
         "jump_law",
@@ -519,6 +528,7 @@ FITS: tuple[Fit, ...] = (
         "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c for every H",
         _jump_law,
         apart=True,
+        constants=("constant",),
     ),
     Fit(
         "jump_limits",
@@ -526,6 +536,7 @@ FITS: tuple[Fit, ...] = (
         "zeta in region I beside 1, and d_mu_0 v_1 / (dv s) on the plateau beside 0.4, for every H",
         _jump_limits,
         apart=True,
+        constants=("found",),
     ),
     Fit(
         "rate_power",
@@ -533,6 +544,7 @@ FITS: tuple[Fit, ...] = (
         "b = factor (v_1 tau q_max)^a for every H, below and above v_1 tau q_max = 1",
         _rate_power,
         apart=True,
+        constants=("power", "power_unweighted"),
     ),
     Fit(
         "rate_and_state",
@@ -540,5 +552,6 @@ FITS: tuple[Fit, ...] = (
         "a ln(v_2 / v_1) at once, - b ln(v_2 / v_1) over the slip length D_c, of every case",
         _rate_and_state,
         apart=True,
+        constants=tuple(STATE_FIELDS),
     ),
 )

@@ -330,6 +330,7 @@ FITS: tuple[Fit, ...] = (
         "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, beside 1 / (1 + H), and mu over eq. 3.12",
         lambda series: each(series, zone_one_axes, _contact_growth, "contact_fraction"),
         apart=True,
+        constants=("exponent", "factor", "slope_in_contact", "mu_over_law"),
     ),
     Fit(
         "contact_slope",
@@ -337,6 +338,7 @@ FITS: tuple[Fit, ...] = (
         "rms slope in contact over its size, slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
         lambda series: each(series, zone_one_axes, _contact_slope, "contact_slope", "contact_fraction"),
         apart=True,
+        constants=("factor", "power"),
     ),
     Fit(
         "collapse",
@@ -344,5 +346,6 @@ FITS: tuple[Fit, ...] = (
         "mu = slope g(F_N) q(v f(F_N)): curves over log v shifted along both axes into one (eqs. 3.22, 3.23)",
         lambda series: each(series, zone_one_axes, _collapse),
         apart=True,
+        constants=("horizontal", "vertical"),
     ),
 )

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import lru_cache, partial, reduce
 from importlib import import_module
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Generic, TypeVar, get_args
+from typing import Any, ClassVar, Generic, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError
-from mdr_dask.tables import decoded, described
 
 
 class Status(IntEnum):
@@ -144,48 +140,6 @@ def unit_of(parameters: type[BaseModel], name: str) -> str | None:
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
-#: Bytes of a file beyond which it is no table to tell of.
-LARGEST_TABLE = 10**7
-
-
-class DataFile(BaseModel):
-    """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-    name: str
-    path: str
-    sha256: str
-
-    def read_bytes(self) -> bytes:
-        """Return the file's content; DataError if it has changed since the campaign was read."""
-        content = Path(self.path).read_bytes()
-        if hashlib.sha256(content).hexdigest() != self.sha256:
-            raise DataError(f"{self.path}: changed since the campaign was read")
-        return content
-
-    def read_text(self) -> str:
-        """Return the file's text.
-
-        Raises
-        ------
-        DataError
-            If the file has changed since the campaign was read, or is no text.
-        """
-        return decoded(self.read_bytes(), self.path)
-
-    def notes(self) -> tuple[str, ...]:
-        """Return columns and ranges of a table, as it has them; nothing of any other file."""
-        return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
-
-
-@lru_cache(maxsize=64)
-def _notes_of_file(file: DataFile) -> tuple[str, ...]:
-    try:
-        return (f"table {file.name}: {described(file.read_text(), file.name)}",)
-    except DataError:
-        return ()
-
-
 def notes_of(parameters: Any) -> tuple[str, ...]:
     """Return what a parameter set and the parts in it tell of themselves: tables, measured lines, fits."""
     told: tuple[str, ...] = ()
@@ -197,19 +151,6 @@ def notes_of(parameters: Any) -> tuple[str, ...]:
         told += own(parameters) if callable(own) else ()
     return told
 
-
-def _find_file(value: Any, info: ValidationInfo) -> Any:
-    if not isinstance(value, str):
-        return value
-    directory = info.context["directory"] if info.context else "."
-    path = Path(directory, value).resolve()
-    if not path.is_file():
-        raise ValueError(f"no such file: {path}")
-    return DataFile(name=value, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
-
-
-#: A parameter that names a file, relative to the campaign file.
-NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]
 
 #: Dimensionless numbers that agree to 6e-14 are the same case.
 CANONICAL_BITS = 44

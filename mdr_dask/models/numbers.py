@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pydantic import BaseModel
 
-from mdr_dask.models.base import DataFile, unit_of
+from mdr_dask.models.base import unit_of
+from mdr_dask.models.data_file import DataFile
 
 
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:

@@ -106,13 +106,17 @@ def read_copy(url: str, series: str) -> Copy | None:
 
 def groups_laid_out(url: str) -> list[str]:
     """Return the names of the groups of a study by their copies alone, which are no other study's in a folder below."""
+    return [series for series in groups_with(url, _NAME) if _is_readable(url, series)]
+
+
+def groups_with(url: str, member: str) -> list[str]:
+    """Return the names of the groups that have a file of a certain name, whatever the metadata say."""
     path = local(url)
     if path is None:
-        names = [name for name in listed(url) if name.endswith(_NAME)]
+        names = [name for name in listed(url) if name.endswith(member)]
     else:
-        names = [found.relative_to(path).as_posix() for depth in ("", "*/") for found in path.glob(f"{depth}{_NAME}")]
-    found = [name.removesuffix(_NAME).rstrip("/") for name in names]
-    return [series for series in found if _is_readable(url, series)]
+        names = [found.relative_to(path).as_posix() for depth in ("", "*/") for found in path.glob(f"{depth}{member}")]
+    return [name.removesuffix(member).rstrip("/") for name in names]
 
 
 def _is_readable(url: str, series: str) -> bool:

@@ -27,6 +27,8 @@ ROOT = "-"
 
 #: Where the claims of runners lie in a store whose file system, or server, has no locks.
 CLAIMS = ".claims/"
+#: How the names of files end that were set aside.
+ASIDE = ".aside"
 #: What clearing a store that was never laid out leaves: its first document, and who is at work on it.
 KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 
@@ -286,6 +288,15 @@ def remove(url: str, files: Iterable[str]) -> None:
 
     with guarded(url, "removing files"):
         sync(delete())
+
+
+def set_aside(url: str, files: Iterable[str]) -> None:
+    """Rename files, so that nothing reads them and nothing is lost."""
+    for name in files:
+        content = read_bytes(url, name)
+        if content is not None:
+            write_bytes(url, f"{name}{ASIDE}", content)
+            remove(url, [name])
 
 
 def clear(url: str) -> None:

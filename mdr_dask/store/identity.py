@@ -16,7 +16,7 @@ from mdr_dask import models
 from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Axis, Campaign, Series
 from mdr_dask.errors import StoreError
-from mdr_dask.models.base import DataFile
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.store.files import ROOT
 from mdr_dask.store.layout import plain_values
 from mdr_dask.store.study import attributes, document, series_names

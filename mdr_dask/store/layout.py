@@ -6,6 +6,7 @@ import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
 def _copy(url: str, template: Template, study: Mapping[str, Any]) -> Copy:
     series, own = template.series.name, _series_attributes(template)
     path = group_name(series, "zarr.json").removesuffix("zarr.json")
-    files = _arrays_in_memory(template)
+    files = laid_out_files(template)
     if series:
         arrays = {file.removesuffix("/zarr.json"): json.loads(files[file]) for file in files if "zarr.json" in file}
         files["zarr.json"] = group_document(arrays, {**study, **own})
@@ -98,7 +99,7 @@ def _is_laid_out(url: str, template: Template) -> bool:
     return bool(shown["shape"] == list(template.shape) and wanted.items() <= held["attributes"].items())
 
 
-def _arrays_in_memory(template: Template) -> dict[str, bytes]:
+def laid_out_files(template: Template) -> dict[str, bytes]:
     """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
     files: dict[str, Any] = {}
     group = zarr.create_group(zarr.storage.MemoryStore(files))
@@ -185,9 +186,14 @@ def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
     return {"units": unit, "long_name": long_name} if unit else {"long_name": long_name}
 
 
+@cache
+def _packages() -> dict[str, str]:
+    """Return the versions of the packages that a store names: looked up once, which takes as long as laying out."""
+    return {name: version(name) for name in ("numpy", "scipy", "numba", "dask", "zarr", "xarray")}
+
+
 def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    packages = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
     what = "grown" if "history" in earlier else "laid out"
     history = [*earlier.get("history", []), f"{now} {what} on {platform.node()}"]
     return {
@@ -203,7 +209,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "source": Path(campaign.source).name,
         "host": platform.node(),
         "python": platform.python_version(),
-        "versions": {"mdr_dask": __version__, **{name: version(name) for name in packages}},
+        "versions": {"mdr_dask": __version__, **_packages()},
         "created": earlier.get("created", now),
         "history": history,
     }

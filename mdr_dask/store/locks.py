@@ -22,7 +22,18 @@ from pathlib import Path
 from typing import Any
 
 from mdr_dask.errors import StoreBusyError, StoreError
-from mdr_dask.store.files import CLAIMS, conditional, create, guarded, listed, local, read_json, remove, write_bytes
+from mdr_dask.store.files import (
+    CLAIMS,
+    conditional,
+    create,
+    guarded,
+    listed,
+    local,
+    read_bytes,
+    read_json,
+    remove,
+    write_bytes,
+)
 
 try:
     import fcntl
@@ -32,6 +43,8 @@ except ImportError:  # a system without it: claims are held instead
 #: Seconds between two signs of life of the owner of a claim, and after which a silent one counts as gone.
 BEAT = 10.0
 SILENCE = 60.0
+#: How often claims are listed again when the last one is gone before it is read.
+LISTINGS = 10
 #: What a file system without locks answers.
 NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP)
 
@@ -270,10 +283,13 @@ def _claimed(url: str, name: str) -> Iterator[Hold]:
 
 def _stake(url: str, name: str, owner: str) -> int:
     """Make the next claim, unless the owner of the last one is alive; return its number."""
-    standing = [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
+    for _ in range(LISTINGS):
+        standing = _numbers(url, name)
+        if not standing or _is_silent(url, name, max(standing)):
+            break
+    else:
+        raise _busy(url, "another process")
     number = max(standing, default=0) + 1
-    if standing:
-        _require_silence(url, name, number - 1)
     content = json.dumps({"owner": owner, "who": _me(), "time": time.time()}).encode()
     if not create(url, _claim(name, number), content):
         held = _told(url, _claim(name, number))
@@ -285,15 +301,24 @@ def _stake(url: str, name: str, owner: str) -> int:
     return number
 
 
-def _require_silence(url: str, name: str, number: int) -> None:
-    """Refuse if the owner of a claim has given a sign of life, by its own clock or while we wait for one."""
+def _numbers(url: str, name: str) -> list[int]:
+    return [int(claim.rpartition("/")[2].removesuffix(".json")) for claim in _standing(url, name)]
+
+
+def _is_silent(url: str, name: str, number: int) -> bool:
+    """Refuse if the owner of a claim has given a sign of life, by its own clock or while we wait for one.
+
+    False if the claim is gone: its owner has just left, and somebody else may have come.
+    """
     claim = _told(url, _claim(name, number))
+    if not claim and read_bytes(url, _claim(name, number)) is None:
+        return False
     last = _told(url, _life(name, number)) or claim
     if time.time() - last.get("time", 0.0) > SILENCE:
         log.warning("%s: waiting %g s for a sign of life of %s", url, 2 * BEAT, claim.get("who", "another process"))
         time.sleep(2 * BEAT)
         if (_told(url, _life(name, number)) or claim) == last:
-            return
+            return True
     raise _busy(url, claim.get("who", "another process"))
 
 

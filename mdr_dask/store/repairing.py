@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import uuid
-from collections.abc import Iterable
-from typing import Any
 
+from mdr_dask.campaign import Campaign
 from mdr_dask.store.copies import Copy, root_of
-from mdr_dask.store.files import read_bytes, read_json, read_many, remove, write_stages
+from mdr_dask.store.files import read_json, read_many, remove, set_aside, write_stages
 from mdr_dask.store.layout import OF_SERIES, group_document
 from mdr_dask.store.records import folder, lines, opened
+from mdr_dask.store.relaid import lay_out_again
 from mdr_dask.store.runners import alone
 from mdr_dask.store.seals import seal_name
 from mdr_dask.store.sound import unsound_files
-from mdr_dask.store.verifying import ASIDE, Group, Inspection, inspect
+from mdr_dask.store.verifying import Finding, Group, Inspection, inspect
 
 
-def repair(url: str) -> tuple[Inspection, Inspection]:
+def repair(url: str, campaign: Campaign | None = None) -> tuple[Inspection, Inspection]:
     """Mend what can be mended, and return what was found before and after.
 
-    Metadata and coordinates are written anew from their copies. Blocks that are damaged lose their chunks, so that the
-    next run computes them. Records and chunks that do not belong are renamed; other foreign files stay.
+    Metadata and coordinates are written anew from their copies, or from the campaign if the copies are gone, too.
+    Blocks that are damaged lose their chunks, so that the next run computes them. Records and chunks that do not belong
+    are renamed; other foreign files stay.
 
     Raises
     ------
@@ -30,13 +31,15 @@ def repair(url: str) -> tuple[Inspection, Inspection]:
         If a run is at work on it.
     """
     with alone(url):
+        lost = lay_out_again(url, campaign) if campaign else []
         found = inspect(url)
+        found.findings[:0] = [Finding("missing", name, "laid out again from the campaign") for name in lost]
         _mend_layout(url, found)
         for group in found.groups:
             for block in sorted(group.bad_blocks):
                 remove(url, [group.chunk(name, block) for name in group.data])  # the ledger first
             _set_aside_records(url, group)
-            _set_aside(url, group.strangers)
+            set_aside(url, group.strangers)
             remove(url, [seal_name(group.series)])  # the next run seals what it has looked at
         return found, inspect(url)
 
@@ -87,13 +90,4 @@ def _set_aside_records(url: str, group: Group) -> None:
     if good:
         together = b"".join(line + b"\n" for line in good)
         write_stages(url, [{f"{folder(group.series)}{uuid.uuid4().hex[:12]}.jsonl": together}])
-    _set_aside(url, sorted(bad))
-
-
-def _set_aside(url: str, names: Iterable[str]) -> None:
-    """Rename files, so that nothing reads them and nothing is lost."""
-    for name in names:
-        content: Any = read_bytes(url, name)
-        if content is not None:
-            write_stages(url, [{f"{name}{ASIDE}": content}])
-        remove(url, [name])
+    set_aside(url, sorted(bad))

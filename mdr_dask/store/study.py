@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mdr_dask.errors import StoreError
-from mdr_dask.store.copies import groups_laid_out
+from mdr_dask.store.copies import groups_laid_out, groups_with
 from mdr_dask.store.expected import faults
 from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, local, read_json
 
@@ -38,6 +38,11 @@ def _remedy(url: str) -> str:
     return f"'mdr-dask verify {url}' looks into it"
 
 
+def laying_out_again(url: str) -> str:
+    """Return what mends a store whose metadata are lost, copies included."""
+    return f"'mdr-dask verify --repair --campaign FILE {url}' lays it out again"
+
+
 def exists(url: str) -> bool:
     """Say whether there is a study at a path or URL, whoever made it.
 
@@ -67,6 +72,8 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
     found = document(url)
     if found is None and groups_laid_out(url):
         raise StoreError(f"{url}: zarr.json is gone; 'mdr-dask verify --repair {url}' puts it back")
+    if found is None and groups_with(url, "status/zarr.json"):
+        raise StoreError(f"{url}: zarr.json is gone, and the copy of it, too; {laying_out_again(url)}")
     return None if found is None else dict(found.get("attributes", {}))
 
 

@@ -17,16 +17,14 @@ from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.plan import BlockIndex
 from mdr_dask.store.copies import Copy, copy_name, groups_laid_out, read_copy, root_of
 from mdr_dask.store.digests import History, allowed, histories
-from mdr_dask.store.files import CLAIMS, LAYOUT, bytes_of, group_name, listed, read_bytes, read_many
+from mdr_dask.store.files import ASIDE, CLAIMS, LAYOUT, bytes_of, group_name, listed, read_bytes, read_many
 from mdr_dask.store.layout import group_document
 from mdr_dask.store.records import digest, folder, lines, name_of, opened
 from mdr_dask.store.runners import at_work
 from mdr_dask.store.seals import read_seal, seal_name
 from mdr_dask.store.sound import is_root_sound, unsound_files
-from mdr_dask.store.study import attributes, document
+from mdr_dask.store.study import attributes, document, laying_out_again
 
-#: How the names of files end that were set aside.
-ASIDE = ".aside"
 IGNORED = (".partial", ASIDE)
 #: What lies beside the files of a store that was published: page, campaign and data, and what is said of all.
 PUBLISHED = "published/"
@@ -221,9 +219,8 @@ def _root(url: str, found: Inspection, present: set[str]) -> dict[str, Any]:
         return {}
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         if not copies:
-            raise StoreError(
-                f"{url}: zarr.json is damaged ({type(error).__name__}), and no copy of it is left"
-            ) from None
+            what = f"zarr.json is damaged ({type(error).__name__}), and no copy of it is left"
+            raise StoreError(f"{url}: {what}; {laying_out_again(url)}") from None
         found.findings.append(Finding("damaged", "zarr.json", "not readable"))
         return {}
     if root["attributes"].get("mdr_dask_layout") != LAYOUT and not copies:

@@ -10,7 +10,8 @@ from pydantic import Field, model_validator
 
 from mdr_dask import models
 from mdr_dask.errors import ModelError
-from mdr_dask.models.base import Model, NamedFile, Output, Parameters, Result, quantity
+from mdr_dask.models.base import Model, Output, Parameters, Result, quantity
+from mdr_dask.models.data_file import NamedFile
 
 
 class Cone(Parameters):

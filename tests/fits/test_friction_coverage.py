@@ -8,14 +8,14 @@ from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
 FIT = {fit.name: fit for fit in FITS}
-STUDIES = 200
-LEAST = 0.92
+STUDIES = 100
+LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of so many studies
 G, RMS, LENGTH, TAU, SLOPE = 1e7, 5e-7, 0.02, 1e-3, 0.1
-LINES = pytest.mark.parametrize("lines", [5, 10, 30])
+LINES = pytest.mark.parametrize("lines", [5, 30])
 # scatter that all cases of a line share, and scatter of every case for itself
-SCATTER = pytest.mark.parametrize("scatter", [(0.1, 0.02), (0.05, 0.1)])
-# what takes longer: with many lines and with few, scatter of the one kind and of the other
-BOTH = pytest.mark.parametrize(("lines", "scatter"), [(5, (0.05, 0.1)), (10, (0.1, 0.02)), (30, (0.05, 0.1))])
+SHARED, OWN = (0.1, 0.02), (0.05, 0.1)
+# with many lines and with few, scatter of the one kind and of the other
+BOTH = pytest.mark.parametrize(("lines", "scatter"), [(5, OWN), (10, SHARED), (30, OWN)])
 
 
 def planted(law, axes, lines, scatter, studies=STUDIES, grid=0.0, **fixed):
@@ -59,8 +59,7 @@ def zone(force, velocity):
     return laws.zone_one(force, velocity, 0.35, 1.5)
 
 
-@LINES
-@SCATTER
+@BOTH
 def test_zone_one(lines, scatter):
     found = FIT["zone_one"].compute({"": planted(zone, ZONE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
@@ -83,16 +82,44 @@ def saturating(_, velocity):
     return np.sqrt(2) * (1 + (velocity / 0.05) ** -2) ** -0.5
 
 
-@LINES
-@SCATTER
-@pytest.mark.parametrize("law", [broad, skew, saturating])
-def test_plateau(lines, scatter, law):
-    found = FIT["plateau"].compute({"": planted(law, TOP, lines, scatter, studies=150)})
+@pytest.mark.parametrize(
+    ("law", "lines", "scatter"),
+    [
+        (broad, 5, OWN),
+        (broad, 30, SHARED),
+        (skew, 5, SHARED),
+        (skew, 30, OWN),
+        (saturating, 5, OWN),
+        (saturating, 10, SHARED),
+    ],
+)
+def test_plateau(law, lines, scatter):
+    found = FIT["plateau"].compute({"": planted(law, TOP, lines, scatter)})
     truth = float(law(None, np.geomspace(1e-3, 1e4, 20001)).max())
     assert coverage(found, "plateau", truth) >= LEAST
     # no bias from taking a maximum: the largest of noisy means is up to 7 % too high here
     assert float(found["plateau"].mean()) == pytest.approx(truth, rel=0.025)
     assert judged(found, "yes") >= LEAST
+    place = velocity_of_top(law)
+    if law is saturating:  # friction is level at the end of the velocities: scatter of 2 % shows no top, of 10 % one
+        assert scatter[1] > 0.05 or bool(found["plateau_velocity_high"].isnull().all())
+    else:
+        assert coverage(found, "plateau_velocity", place) >= LEAST
+
+
+def velocity_of_top(law):
+    velocity = np.geomspace(1e-3, 1e4, 200001)
+    return float(velocity[np.argmax(law(None, velocity))])
+
+
+def test_the_velocity_of_the_top_does_not_depend_on_where_the_velocities_lie():
+    """Neither on how many there are nor on where they begin: within 3 %, as long as they show the curve."""
+    places = []
+    for velocities in (np.geomspace(1e-4, 1e2, 13), np.geomspace(1.7e-4, 1.7e2, 13), np.geomspace(1e-4, 1e2, 49)):
+        data = planted(skew, TOP | {"velocity": velocities}, 3, (0.0, 1e-3), studies=1)
+        places.append(float(FIT["plateau"].compute({"": data})["plateau_velocity"].item()))
+    assert max(places) / min(places) < 1.03
+    assert places[0] == pytest.approx(velocity_of_top(skew), rel=0.03)
 
 
 PLANE = {"normal_force": np.geomspace(0.3, 30, 4) * G * RMS * LENGTH, "velocity": np.geomspace(1e-6, 1e-2, 7)}
@@ -104,7 +131,7 @@ def interpolated(force, velocity):
 
 @BOTH
 def test_interpolation(lines, scatter):
-    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter, studies=200)})
+    found = FIT["interpolation"].compute({"": planted(interpolated, PLANE, lines, scatter)})
     assert coverage(found, "alpha", 0.35) >= LEAST
     assert coverage(found, "beta", 1.5) >= LEAST
     assert judged(found, "yes") >= LEAST

@@ -11,8 +11,8 @@ TIMES = np.geomspace(1e-3, 20, 40)
 POINTS, LENGTH, TAU, SLOPE, CHANGE = 5000, 0.01, 1e-3, 0.07, 0.2
 WAVENUMBER = np.pi * POINTS / LENGTH
 SHARE = 0.25  # of the jump that relaxes
-LEAST = 0.92
-LINES = pytest.mark.parametrize("lines", [5, 10, 30])
+LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 stores
+LINES = pytest.mark.parametrize("lines", [5, 30])
 
 
 def studies(speeds: np.ndarray, stores: int, lines: int, power: float = 0.5, shape: float = 1.0) -> xr.Dataset:
@@ -79,7 +79,7 @@ def test_jump_and_rate_and_state_terms(lines: int) -> None:
 
 @LINES
 def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
-    found = FIT["relaxation"].compute({"": studies(np.array([0.05]), 200, lines)})
+    found = FIT["relaxation"].compute({"": studies(np.array([0.05]), 100, lines)})
     rate = (0.05 * TAU * WAVENUMBER) ** 0.5
     assert coverage(found, "rate", rate) >= LEAST
     assert coverage(found, "rate_unweighted", rate) >= LEAST
@@ -91,7 +91,7 @@ def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
 
 @LINES
 def test_stretched_exponential(lines: int) -> None:
-    found = FIT["relaxation_shape"].compute({"": studies(np.array([0.05]), 150, lines, shape=0.5)})
+    found = FIT["relaxation_shape"].compute({"": studies(np.array([0.05]), 100, lines, shape=0.5)})
     assert coverage(found, "stretched_exponent", 0.5) >= LEAST
     assert coverage(found, "stretched_rate", (0.05 * TAU * WAVENUMBER) ** 0.5) >= LEAST
 
@@ -110,12 +110,12 @@ def test_power_of_the_rate_of_lines_that_all_velocities_share(lines: int) -> Non
 @LINES
 def test_constant_and_limits_of_the_jump(lines: int) -> None:
     speeds = np.geomspace(1e-4, 1, 6)
-    data = studies(speeds, 200, lines)
-    results = [FIT["jump_law"].compute({"": data.isel(normal_force=k)}).squeeze() for k in range(200)]
+    data = studies(speeds, 100, lines)
+    results = [FIT["jump_law"].compute({"": data.isel(normal_force=k)}).squeeze() for k in range(100)]
     found = xr.concat(results, "store")
     assert coverage(found, "constant", 0.42) >= LEAST
     assert said(found, "no:") < 0.08
-    limits = [FIT["jump_limits"].compute({"": data.isel(normal_force=k)}).squeeze() for k in range(200)]
+    limits = [FIT["jump_limits"].compute({"": data.isel(normal_force=k)}).squeeze() for k in range(100)]
     first = xr.concat(limits, "store").sel(limit="region I")
     x = speeds * TAU * WAVENUMBER
     # which cases lie in region I is a matter of their mean: two of them always, with the lines of all stores

@@ -12,9 +12,9 @@ from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 
 FIT = {fit.name: fit for fit in FITS}
-LEAST = 0.92
+LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 studies
 G, RMS, LENGTH, TAU, SLOPE, POINTS = 1e7, 5e-7, 0.02, 1e-3, 0.1, 400
-LINES = pytest.mark.parametrize("lines", [5, 10, 30])
+LINES = pytest.mark.parametrize("lines", [5, 30])
 
 
 def planted(axes, lines, studies, hurst=0.5, **outputs):
@@ -48,7 +48,7 @@ LOADS = {"normal_force": np.geomspace(1e-3, 3e-2, 8)}
 
 @LINES
 def test_growth_of_the_contact(lines):
-    data = planted(LOADS, lines, 300, contact_fraction=lambda force, _: 0.3 * force**0.6)
+    data = planted(LOADS, lines, 100, contact_fraction=lambda force, _: 0.3 * force**0.6)
     found = FIT["contact_growth"].compute({"": data})
     assert coverage(found, "exponent", 0.6) >= LEAST
     assert coverage(found, "factor", 0.3) >= LEAST
@@ -80,7 +80,7 @@ def test_slope_in_contact(lines):
     def slope(force, _):
         return 0.9 * SLOPE * contact_slope_law(fraction(force, _), 0.9, POINTS)
 
-    data = planted(LOADS, lines, 300, 0.9, contact_fraction=fraction, contact_slope=slope)
+    data = planted(LOADS, lines, 100, 0.9, contact_fraction=fraction, contact_slope=slope)
     found = FIT["contact_slope"].compute({"": data})
     assert coverage(found, "factor", 0.9) >= LEAST
     assert coverage(found, "power", 1.0) >= LEAST
@@ -103,7 +103,7 @@ def scaled(force, velocity):
 
 @LINES
 def test_curves_collapse_and_tell_their_shifts(lines):
-    found = FIT["collapse"].compute({"": planted(CURVES, lines, 150, friction_coefficient=scaled)})
+    found = FIT["collapse"].compute({"": planted(CURVES, lines, 60, friction_coefficient=scaled)})
     decades = np.log10(found["force_number"] / found["force_number"].isel(curve=2))
     assert coverage(found, "horizontal", -RIGHT * decades) >= LEAST
     assert coverage(found, "vertical", -UP * decades) >= LEAST
@@ -131,7 +131,7 @@ def test_straight_curves_have_no_shifts_that_are_told_apart():
 def test_the_model_follows_its_statics():
     axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(0.01, 0.3, 6) * 0.1, "velocity": [1e-7, 1e-6]}
     outputs = ("friction_coefficient", "contact_fraction", "contact_slope", "rms_slope")
-    data = store(axes, realisations=12, outputs=outputs, points=2000)
+    data = store(axes, realisations=8, outputs=outputs, points=1000)
     found = FIT["contact_growth"].compute({"": data})
     assert np.all(np.abs(found["exponent"] - found["exponent_stated"]) < 0.06)
     # eq. 3.12 is exact where nothing flies: at the lowest velocity

@@ -5,7 +5,7 @@ import hashlib
 import pytest
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile
+from mdr_dask.models.data_file import DataFile
 
 
 def data_file(path):

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mdr_dask.models.base import Block, DataFile, Status
+from mdr_dask.models.base import Block, Status
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.fretting_wear import MODEL
 from mdr_dask.models.fretting_wear.declaration import Cone, FrettingWear, LoadStep, Parabola, Power, Table
 from mdr_dask.physics.mdr.revolution import PowerProfile

@@ -11,7 +11,7 @@ from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.physics.lubrication import oil
-from mdr_dask.physics.lubrication.line_contact import line_contact, solve
+from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
 
 MODEL = load("mixed_lubrication")
 RPM = 2 * np.pi / 60
@@ -244,7 +244,7 @@ def test_film_of_the_full_solution_is_that_of_the_line_contact_in_metres(law):
     viscosity, alpha = float(data.dynamic(313.15)), float(data.alpha(313.15))
     radius, line_load, velocity = 0.025, 800.0 / 0.01, 100 * RPM * 0.05
     W, U, G = line_load / (2 * STEEL * radius), viscosity * velocity / (2 * STEEL * radius), alpha * 2 * STEEL
-    solution = solve(line_contact(W, U, G, STEEL, viscosity_law=law, viscosity=viscosity))
+    solution = solve_film(line_contact(W, U, G, STEEL, viscosity_law=law, viscosity=viscosity))
     half_width = np.sqrt(4 * line_load * radius / (np.pi * STEEL))
     expected = float(solution.central_film.value) * half_width**2 / radius
     assert found.values["film"][0, 0] == pytest.approx(expected, rel=1e-4)

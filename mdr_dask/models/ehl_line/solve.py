@@ -19,7 +19,7 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
-from mdr_dask.physics.lubrication.line_contact import Estimate, LineContact, LineSolution, line_contact, solve
+from mdr_dask.physics.lubrication.line_contact import Limit, LineContact, LineSolution, line_contact, solve_film
 from mdr_dask.physics.outcome import Outcome
 
 #: Outputs whose errors count relative to the half width, in which they are given.
@@ -59,16 +59,14 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
     ]
 
 
-def _estimates(
-    case: EhlLineParameters, W: float, solution: LineSolution, outputs: tuple[str, ...]
-) -> dict[str, Estimate]:
+def _estimates(case: EhlLineParameters, W: float, solution: LineSolution, outputs: tuple[str, ...]) -> dict[str, Limit]:
     """Return those outputs asked for that the solution decides, each with its error, in their units."""
     film, p0 = square_of_half_width(W), 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
     metres = film * (np.nan if case.radius is None else case.radius)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
     read = solution.estimate
-    ways: dict[str, Callable[[], Estimate]] = {
+    ways: dict[str, Callable[[], Limit]] = {
         "central_film": lambda: solution.central_film.scaled(film),
         "minimum_film": lambda: solution.minimum_film.scaled(film),
         "central_film_thickness": lambda: solution.central_film.scaled(metres),
@@ -87,12 +85,12 @@ def _estimates(
     return {name: way() for name, way in ways.items() if name in outputs}
 
 
-def _profile(found: Estimate) -> Estimate:
+def _profile(found: Limit) -> Limit:
     """Give each position the largest error around it: where grids cross each other, they agree by chance."""
     return found._replace(error=maximum_filter1d(found.error, _AROUND))
 
 
-def _relative_error(name: str, found: Estimate) -> float:
+def _relative_error(name: str, found: Limit) -> float:
     """Return the largest relative error of an output: of a position in half widths, of a pressure in its maximum."""
     error = found.error[np.isfinite(found.value)]
     scale = np.ones_like(found.value) if name in _POSITIONS else np.abs(found.value)
@@ -102,7 +100,7 @@ def _relative_error(name: str, found: Estimate) -> float:
     return float(np.max(error[error > 0] / scale[error > 0], initial=0.0))
 
 
-def _missed(solution: LineSolution, estimates: dict[str, Estimate], accuracy: float) -> str:
+def _missed(solution: LineSolution, estimates: dict[str, Limit], accuracy: float) -> str:
     """Say which outputs miss the accuracy and by how much; an empty string if none does."""
     errors = {name: _relative_error(name, found) for name, found in estimates.items()}
     missed = [f"{name} {error:.1e}" for name, error in errors.items() if error > accuracy]
@@ -134,7 +132,7 @@ def compute(block: Block[EhlLineParameters]) -> Result:
     accuracy = block.accuracy or ACCURACY
     for index, case in enumerate(_line_contacts(block)):
         if case not in solved:
-            solved[case] = solve(case, accuracy)
+            solved[case] = solve_film(case, accuracy)
         solution = solved[case]
         found: dict[str, FloatArray | float] = {name: float(column[index]) for name, column in given.items()}
         notes = [solution.reason]

@@ -11,7 +11,8 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, NamedFile, Number, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.indenter import Other
 from mdr_dask.tables import Column, read_table
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import Block, NamedFile, canonical
+from mdr_dask.models.base import Block, canonical
+from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Pressed, Table, profile_columns
 from mdr_dask.models.parts.indenter import Other
 

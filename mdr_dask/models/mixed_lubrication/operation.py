@@ -166,7 +166,7 @@ def _film_of(
 @lru_cache(maxsize=1024)
 def _solved(contact: line_contact.LineContact, accuracy: float) -> Film:
     """Return the central film of the EHL solution in ``a^2/R``, once for all realisations, and its relative error."""
-    solution = line_contact.solve(contact, accuracy)
+    solution = line_contact.solve_film(contact, accuracy)
     if solution.outcome == Outcome.FILM_COLLAPSED:
         return Film(0.0)  # too thin for the grids; the asperities will carry most of the load
     if solution.reason:

@@ -14,8 +14,7 @@ from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubricatio
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.turn import Turn, creeping, profiles, rolling, trace, turn_values
-from mdr_dask.physics.lubrication import breakthrough
-from mdr_dask.physics.lubrication.breakthrough import Excursions
+from mdr_dask.physics.lubrication.clusters import Excursions, excursions
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
 FILM_RATIO_WARNING = 0.5
@@ -124,7 +123,7 @@ def _realise(
         solve: Callable[..., Turn] = partial(creeping, operation, lines)
         if operation.case.slide_roll_ratio == 0:
             level = operation.level
-            above = breakthrough.excursions(lines[0] + lines[1], level) if above is None else above.above(level)
+            above = excursions(lines[0] + lines[1], level) if above is None else above.above(level)
             solve = partial(rolling, operation, above)
         turn = solve()
         found = turn_values(operation, turn, partial(solve, coarser=2), block.outputs)

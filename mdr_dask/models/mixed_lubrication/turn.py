@@ -13,7 +13,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.models.mixed_lubrication.declaration import POSITIONS
 from mdr_dask.models.mixed_lubrication.operation import Operation
 from mdr_dask.physics.lubrication import breakthrough, film_formulas
-from mdr_dask.physics.lubrication.breakthrough import Excursions
+from mdr_dask.physics.lubrication.clusters import Excursions, find_clusters
 
 #: Windows with creep that overlap by more than one part in this many tell the same.
 STRIDES = 8
@@ -47,7 +47,7 @@ def rolling(operation: Operation, above: Excursions, coarser: int = 1) -> Turn:
     """
     points = above if coarser == 1 else above.every_second()
     window = _window(operation, coarser)
-    clusters = breakthrough.find_clusters(points, operation.level, coarser * operation.spacing, operation.strength)
+    clusters = find_clusters(points, operation.level, coarser * operation.spacing, operation.strength)
     contact_points = breakthrough.contact_points(clusters, window, operation.case.edge_rule)
     return Turn(contact_points, window)
 

@@ -9,7 +9,8 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, NamedFile, quantity
+from mdr_dask.models.base import quantity
+from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.topography import TEXT, topography
 from mdr_dask.tables import Column, read_table

@@ -9,7 +9,8 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, Parameters, Ways, quantity
+from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables
 from mdr_dask.units import shown

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from pydantic import Field
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile, NamedFile, quantity
+from mdr_dask.models.base import quantity
+from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.models.parts.measured_line import recorded
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.topography import TEXT, topography

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.models.base import DataFile
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, line_of_scan, rings_of
 from mdr_dask.physics.surfaces.measured import rms_slope

@@ -10,7 +10,8 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import NamedFile, Parameters, quantity
+from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.data_file import NamedFile
 from mdr_dask.tables import Column, read_table
 from mdr_dask.units import shown
 

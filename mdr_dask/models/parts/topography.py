@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import DataFile
+from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import to_si
 
 #: Ends of the names of plain text.

@@ -24,10 +24,10 @@ from mdr_dask.models.parts.sliding_problem import (
 )
 from mdr_dask.models.velocity_jump.declaration import VelocityJump
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces.cubic_line import without_kinks
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, Jumps, solve_jumps
-from mdr_dask.physics.transients.elements.follow import closed_nodes, indented_nodes
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import Course
@@ -236,12 +236,7 @@ class _Followed(_Group):
         course = [piece.scaled(unit, velocity, force) for piece in course]
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
-        body = self.setting.body
-        line = (
-            closed_nodes(heights, slopes)
-            if body is None
-            else indented_nodes(np.append(heights, heights[0]), np.append(slopes, slopes[0]), body)
-        )
+        line = without_kinks(RoughLine(waves, self.setting.body).through(heights, slopes))
         elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
         times = np.array(case.relaxation_times)
         return trace(line, elements, before / velocity, course, times, self.steps / every)

@@ -12,11 +12,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.lubrication.clusters import Clusters
 
 #: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
 #: testing every window by itself), judged whole and counted with its part inside (``clip``), judged and counted whole
@@ -57,120 +57,6 @@ def window_points(half_width: float, spacing: float, points: int) -> int:
     return window
 
 
-class Excursions(NamedTuple):
-    """The points of a closed line above some level: all that higher levels need.
-
-    Parameters
-    ----------
-    place : int array, shape (n,)
-        Their numbers on the line, ascending.
-    height : array, shape (n,)
-        Their heights in m.
-    points : int
-        Number of points of the whole line.
-    """
-
-    place: IntArray
-    height: FloatArray
-    points: int
-
-    def above(self, level: float) -> Excursions:
-        """Return those above a higher level."""
-        keep = self.height > level
-        return Excursions(self.place[keep], self.height[keep], self.points)
-
-    def every_second(self) -> Excursions:
-        """Return the excursions of the line made of the even points, for an estimate of the grid's error."""
-        keep = (self.place % 2 == 0) & (self.place < self.points // 2 * 2)
-        return Excursions(self.place[keep] // 2, self.height[keep], self.points // 2)
-
-
-def excursions(line: FloatArray, level: float) -> Excursions:
-    """Return the points of a closed line (heights in m) that lie above a level (m)."""
-    place = np.flatnonzero(line > level)
-    return Excursions(place, line[place], line.size)
-
-
-class Clusters(NamedTuple):
-    """Clusters of overlapping points of a closed line, in the order of their starts.
-
-    Parameters
-    ----------
-    start, length : int array, shape (n,)
-        First point and number of points; a cluster across the seam has ``start + length > points``.
-    total : array, shape (n,)
-        Sum of ``z - h0`` over its points in m.
-    overlap : array, shape (length.sum(),)
-        ``z - h0`` of all points in m, cluster after cluster.
-    limit : float
-        ``s dx^2`` in m: the layer breaks where ``total > limit length^3``.
-    points : int
-        Number of points of the line.
-    """
-
-    start: IntArray
-    length: IntArray
-    total: FloatArray
-    overlap: FloatArray
-    limit: float
-    points: int
-
-    @property
-    def broken(self) -> NDArray[np.bool_]:
-        """Whether each cluster, taken whole, breaks the layer (thesis eq. 5.6)."""
-        return self.total > self.limit * self.length.astype(np.float64) ** 3
-
-
-@compiled
-def _scan(
-    place: IntArray,
-    height: FloatArray,
-    points: int,
-    level: float,
-    start: IntArray,
-    length: IntArray,
-    total: FloatArray,
-    overlap: FloatArray,
-) -> int:
-    """Fill the clusters of excursions in the order of their starts; return their number."""
-    first = 0
-    while first < place.size and (place[first - 1] + 1) % points == place[first]:
-        first += 1
-    count = -1
-    for k in range(place.size):
-        j = (first + k) % place.size
-        if k == 0 or (place[j - 1] + 1) % points != place[j]:
-            count += 1
-            start[count] = place[j]
-            length[count] = 0
-            total[count] = 0.0
-        length[count] += 1
-        overlap[k] = height[j] - level
-        total[count] += overlap[k]
-    return count + 1
-
-
-def find_clusters(above: Excursions, level: float, spacing: float, strength: float) -> Clusters:
-    """Return the clusters at a film thickness.
-
-    Parameters
-    ----------
-    above : Excursions
-        The line's points above some level not higher than `level`.
-    level : float
-        Film thickness h0 in m.
-    spacing : float
-        Distance dx of the points in m.
-    strength : float
-        From `layer_strength`, in 1/m.
-    """
-    place, height, points = above.above(level)
-    start, length = np.empty(place.size, np.int64), np.empty(place.size, np.int64)
-    total, overlap = np.empty(place.size), np.empty(place.size)
-    n = _scan(place, height, points, level, start, length, total, overlap)
-    return Clusters(start[:n], length[:n], total[:n], overlap, strength * spacing**2, points)
-
-
 @compiled
 def _block(jumps: NDArray[np.int32], begin: int, count: int, value: int) -> None:
     """Add `value` to `count` positions of the circle from `begin` on, as jumps."""
@@ -184,7 +70,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, value: int) -> None
     jumps[end] -= value
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _add_parts(
     overlap: FloatArray, limit: float, window: int, start: int, always: bool, judged: bool, jumps: NDArray[np.int32]
 ) -> None:
@@ -212,7 +98,7 @@ def _add_parts(
             _block(jumps, start + n - j, 1, j)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _collect(
     start: IntArray,
     length: IntArray,
@@ -418,7 +304,7 @@ def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> Flo
     return np.where(length > 0, np.asarray(resistivity) / safe, np.inf)
 
 
-class Interval(NamedTuple):
+class Proportion(NamedTuple):
     """A probability with its standard error and the ends of its interval."""
 
     mean: float
@@ -427,7 +313,7 @@ class Interval(NamedTuple):
     high: float
 
 
-def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence: float = 0.95) -> Interval:
+def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence: float = 0.95) -> Proportion:
     """Return the probability of contact of one turn with an interval from its batches.
 
     Parameters
@@ -441,7 +327,7 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
 
     Returns
     -------
-    Interval
+    Proportion
         From the means of batches at least five windows long (40 at most), with Student's t, cut to [0, 1]; NaN for all
         but the mean if the trace is too short for two batches.
     """
@@ -450,9 +336,9 @@ def probability_interval(in_contact: NDArray[np.bool_], window: int, confidence:
     mean = float(in_contact.mean())
     batches = min(40, in_contact.size // (5 * window))
     if batches < 2:
-        return Interval(mean, np.nan, np.nan, np.nan)
+        return Proportion(mean, np.nan, np.nan, np.nan)
     size = in_contact.size // batches
     means = in_contact[: batches * size].reshape(batches, size).mean(axis=1)
     error = float(means.std(ddof=1) / np.sqrt(batches))
     reach = float(stdtrit(batches - 1, (1 + confidence) / 2)) * error
-    return Interval(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))
+    return Proportion(mean, error, max(0.0, mean - reach), min(1.0, mean + reach))

@@ -15,8 +15,8 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.lubrication import grids
-from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
+from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
@@ -91,10 +91,6 @@ class Settings(NamedTuple):
 
 
 SETTINGS = Settings()
-#: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
-_SPIKE = 0.01
-#: Positions between two cells at which the lowest film is looked for.
-_SUBDIVISION = 41
 
 
 class LineContact(NamedTuple):
@@ -185,84 +181,7 @@ def line_contact(
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
 
-class GridSolution(NamedTuple):
-    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, and the steps taken.
-
-    Between two nodes the pressure is straight and the film sags; :meth:`film_between` goes through the nodes instead.
-    """
-
-    nodes: FloatArray
-    pressure: FloatArray
-    film: FloatArray
-    central: float
-    steps: int
-
-    def film_between(self, positions: FloatArray) -> FloatArray:
-        """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
-        film = _cubic(self.nodes, self.film, positions)
-        behind = positions > self.nodes[-1]
-        film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
-        return np.where(positions < self.nodes[0], np.nan, film)
-
-    def pressure_between(self, positions: FloatArray) -> FloatArray:
-        """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
-        inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
-        return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
-
-    @property
-    def central_film(self) -> float:
-        """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
-        return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
-
-    @property
-    def minimum(self) -> tuple[float, float]:
-        """Position and height of the lowest film, between the nodes around the lowest one."""
-        i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
-        positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
-        heights = _cubic(self.nodes, self.film, positions)
-        k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
-        left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
-        if not right > left:
-            return float(positions[k]), float(heights[k])
-        offset = -(left + right) / (2 * (right - left))  # the vertex of a parabola
-        width = positions[1] - positions[0]
-        return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
-
-    @property
-    def spike(self) -> tuple[float, float]:
-        """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
-        P = self.pressure
-        peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
-        if peaks.size < 2:
-            return float("nan"), float("nan")
-        last = peaks[-1]
-        if P[last] - P[peaks[-2] : last].min() < _SPIKE * P.max():
-            return float("nan"), float("nan")
-        return float(self.nodes[last]), float(P[last])
-
-    @property
-    def rupture(self) -> float:
-        """Where the film ends, from the pressure's last two positive values: it goes out like a square."""
-        last = int(np.flatnonzero(self.pressure)[-1])
-        (x1, x2), (P1, P2) = self.nodes[last - 1 : last + 1], self.pressure[last - 1 : last + 1]
-        ratio = np.sqrt(P1 / P2)
-        end = (ratio * x2 - x1) / (ratio - 1) if ratio > 1 else np.inf
-        return float(min(end, self.nodes[min(last + 1, self.nodes.size - 1)]))
-
-
-def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the cubic through the two nodes before and the two behind each position (Lagrange)."""
-    first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
-    x = nodes[first[:, None] + np.arange(4)]
-    total = np.zeros(positions.size)
-    for k in range(4):
-        others = [m for m in range(4) if m != k]
-        weight = np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
-        total += weight * values[first + k]
-    return total
-
-
-class Estimate(NamedTuple):
+class Limit(NamedTuple):
     """What values on nested grids tend to, its estimated absolute error, and the order of convergence observed.
 
     Each is a number or an array; the order is NaN where the values do not approach anything steadily.
@@ -272,12 +191,12 @@ class Estimate(NamedTuple):
     error: FloatArray
     order: FloatArray
 
-    def scaled(self, factor: float) -> Estimate:
+    def scaled(self, factor: float) -> Limit:
         """Return the estimate in another unit."""
-        return Estimate(self.value * factor, self.error * factor, self.order)
+        return Limit(self.value * factor, self.error * factor, self.order)
 
 
-def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
+def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Limit:
     """Return what values on grids of halved spacing tend to.
 
     Where the changes from grid to grid shrink at about second order, the limit is Richardson's, to third order, and the
@@ -293,7 +212,7 @@ def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
 
     Returns
     -------
-    Estimate
+    Limit
         Elementwise; an error is infinite where a coarser grid has no value.
     """
     coarse, middle, fine = np.asarray(values[-3:], dtype=np.float64)
@@ -307,7 +226,7 @@ def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Estimate:
     is_trusted = (order >= settings.lowest_order) & (order <= settings.highest_order)
     value = np.where(is_trusted, limit + (limit - earlier) / 7, fine)
     error = np.where(is_trusted, trusted, np.abs(last) * np.maximum(1.0, 1 / (slow - 1)))
-    return Estimate(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
+    return Limit(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
 
 
 @dataclass(frozen=True)
@@ -324,7 +243,7 @@ class LineSolution:
         One sentence if no film was found, else empty.
     grids : tuple of GridSolution
         The last three grids, the finest last; empty if no film was found.
-    central_film, minimum_film : Estimate
+    central_film, minimum_film : Limit
         In ``a^2/R``; NaN if no film was found.
     steps : int
         Newton steps on all grids together.
@@ -334,8 +253,8 @@ class LineSolution:
     outcome: Outcome
     reason: str
     grids: tuple[GridSolution, ...]
-    central_film: Estimate
-    minimum_film: Estimate
+    central_film: Limit
+    minimum_film: Limit
     steps: int
 
     @property
@@ -353,7 +272,7 @@ class LineSolution:
         """Relative deviation of the pressure's integral from the load."""
         return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
-    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Estimate:
+    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Limit:
         """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
         return extrapolate(np.array([reading(grid) for grid in self.grids]))
 
@@ -424,7 +343,7 @@ def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, G
     return outcome, state, steps
 
 
-def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
+def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
     """Return the film and pressure of a lubricated line contact.
 
     Parameters
@@ -444,7 +363,7 @@ def solve(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTIN
 
     Examples
     --------
-    >>> found = solve(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
+    >>> found = solve_film(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
     >>> central = found.central_film.scaled(8 * 2e-5 / np.pi)  # a^2/R^2
     >>> print(f"h_c/R = {central.value:.3e}")
     h_c/R = 2.546e-05
@@ -479,7 +398,7 @@ def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> Line
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution, steps: int) -> LineSolution:
     """Return a solution without a film, and why there is none."""
-    none = Estimate(*(np.array(np.nan),) * 3)
+    none = Limit(*(np.array(np.nan),) * 3)
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"
     return LineSolution(case, outcome, reason, (), none, none, steps)

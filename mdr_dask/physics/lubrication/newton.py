@@ -15,11 +15,10 @@ from math import exp
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
@@ -102,7 +101,7 @@ class Liquid(NamedTuple):
 
 
 @compiled
-def log_viscosity(P: float, liquid: Liquid) -> tuple[float, float]:
+def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
     """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
     if liquid.exponent == 0.0:
         return liquid.alpha * P, liquid.alpha
@@ -111,12 +110,12 @@ def log_viscosity(P: float, liquid: Liquid) -> tuple[float, float]:
     return liquid.alpha * liquid.pole / liquid.exponent * (power * ratio - 1.0), liquid.alpha * power
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
     result = np.empty_like(pressure)
     for i in range(pressure.size):
-        result[i] = log_viscosity(pressure[i], liquid)[0]
+        result[i] = log_viscosity_at(pressure[i], liquid)[0]
     return result
 
 
@@ -167,7 +166,7 @@ def balance(
     for i in range(P.size):
         rho[i] = 1.0 + liquid.density_rise * P[i] / (1.0 + liquid.density_saturation * P[i])
         rho_slope[i] = liquid.density_rise / (1.0 + liquid.density_saturation * P[i]) ** 2
-        viscosity[i], viscosity_slope[i] = log_viscosity(P[i], liquid)
+        viscosity[i], viscosity_slope[i] = log_viscosity_at(P[i], liquid)
     R[:] = 0.0
     by_pressure[:] = 0.0
     by_film[:] = 0.0
@@ -237,7 +236,7 @@ def _fill_active(
     return count
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _fill_equations(
     grid: Grid,
     P: FloatArray,
@@ -270,7 +269,7 @@ def _fill_equations(
     A[count, count] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
     """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
     for i in range(P.size):
@@ -280,7 +279,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
         H[i] = total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
@@ -294,7 +293,7 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
     return share
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _take_step(
     grid: Grid, pace: Pace, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
 ) -> tuple[int, float]:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.lubrication.line_contact import GridSolution, LineContact
+from mdr_dask.physics.lubrication.grid_solution import GridSolution
+from mdr_dask.physics.lubrication.line_contact import LineContact
 from mdr_dask.physics.lubrication.newton import log_viscosities
 
 #: Largest exponent of a viscosity ratio that is evaluated; a Newtonian liquid that thick has no meaning any more.

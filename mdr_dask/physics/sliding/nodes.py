@@ -7,9 +7,9 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
@@ -44,15 +44,15 @@ class Nodes(NamedTuple):
     top: float
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _close(turn: FloatArray) -> None:
     """Write the nodes of the turns before and after."""
     n = turn.size - BEFORE - AFTER
-    turn[:BEFORE] = turn[n : n + BEFORE]
-    turn[n + BEFORE :] = turn[BEFORE : BEFORE + AFTER]
+    copy_into(turn[:BEFORE], turn[n : n + BEFORE])
+    copy_into(turn[n + BEFORE :], turn[BEFORE : BEFORE + AFTER])
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inlined
 def _end_term(h: FloatArray, s: FloatArray, i: int) -> float:
     """Return what Euler and Maclaurin add to the trapezium of the slope squared at its first node, in cells.
 
@@ -65,7 +65,7 @@ def _end_term(h: FloatArray, s: FloatArray, i: int) -> float:
     return term
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool) -> Nodes:
     """Take every stride-th node of a line; differences for slopes if it is not resolved.
 
@@ -110,7 +110,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     return Nodes(h, s, blocks, top)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _integrals(h: FloatArray, s: FloatArray, first: int, cells: int, mean: FloatArray, square: FloatArray) -> None:
     """Write the integrals of the height and of the slope squared over cells; `square` is one longer."""
     for k in range(cells + 1):
@@ -121,7 +121,7 @@ def _integrals(h: FloatArray, s: FloatArray, first: int, cells: int, mean: Float
         square[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + square[k] - square[k + 1]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _peaks(h: FloatArray, s: FloatArray, first: int, cells: int, peak: FloatArray) -> None:
     """Write the highest point of cells."""
     for k in range(cells):
@@ -135,7 +135,7 @@ def _peaks(h: FloatArray, s: FloatArray, first: int, cells: int, peak: FloatArra
         peak[k] = top if top > ends else ends
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
     """Write a tile of a line, on the finer grid that weights make, and return the number of its cells.
 
@@ -152,8 +152,8 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     """
     refinement = weights.shape[1]
     if refinement == 1:
-        tile[HEIGHT, : cells + 3] = line.height[first - 1 : first + cells + 2]
-        tile[SLOPE, : cells + 3] = line.slope[first - 1 : first + cells + 2]
+        copy_into(tile[HEIGHT, : cells + 3], line.height[first - 1 : first + cells + 2])
+        copy_into(tile[SLOPE, : cells + 3], line.slope[first - 1 : first + cells + 2])
     else:
         refine(line, first, cells, weights, tile[HEIGHT], tile[SLOPE])
     cells *= refinement
@@ -191,7 +191,7 @@ def weights(refinement: int) -> FloatArray:
     return np.stack([_hermite(places, step / refinement) for step in range(refinement)], axis=1)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
     """Write heights and slopes of the finer grid over cells of a line, from the node before to the second one after."""
     refinement = weights.shape[1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.superposition.least_squares import Prior, Shifts, changes_of, fit
-from mdr_dask.physics.superposition.problem import RATIOS, Common, Problem, differences
+from mdr_dask.physics.superposition.problem import RATIOS, Common, ShiftProblem, differences
 from mdr_dask.physics.superposition.steps import Steps, scan, scan_pairs, together
 
 
@@ -24,16 +24,21 @@ class Settings(NamedTuple):
     """Of fit and scan, at most."""
     near: float = 1.5
     """Standard deviations by which a scan may move a step without another round."""
-    apart: float = 3.0
-    """Standard deviations between two ways to a step beyond which the linearised problem starts anew."""
     vertical_rounds: int = 6
     """Of the linearised problem with vertical shifts, at most."""
     settled: float = 0.3
     """Standard errors by which no shift moves any more in the last of them."""
     rises: tuple[float, float] = (0.0, 0.03)
     """Scatter that horizontal shifts allow for, in heights of a curve, before vertical ones are known and after."""
-    places: int = 5
-    """Places on either side of the best, one standard deviation apart, along the loosest combination of shifts."""
+    places: int = 20
+    """Places on either side of the best, one standard deviation apart, along the loosest combination of shifts, at
+    most."""
+    unlikely: float = 5.0
+    """Logarithm of the evidence, below the largest, where they end."""
+    power: float = 0.7
+    """Power of the evidence there: a curve is not quite what its smoothing expects."""
+    open: float = 0.25
+    """Widths of a curve by which a step may scatter before all that is known is that its curves overlap."""
     pin: float = 1e6
     """Precision with which that combination is held there, relative to its own."""
     held: int = 3
@@ -46,7 +51,7 @@ SETTINGS = Settings()
 class Found(NamedTuple):
     """Shifts, the covariance of those that are free, and the smoothing, scatter and prior they were found with.
 
-    ``told`` says how far the curves tell each horizontal step: see `Steps`.
+    ``told`` says how far the curves tell each horizontal step: see `Steps`; ``rising`` is the scatter of vertical ones.
     """
 
     shifts: Shifts
@@ -56,9 +61,10 @@ class Found(NamedTuple):
     prior: Prior
     told: FloatArray
     common: Common
+    rising: float = 0.0
 
 
-def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
+def find_horizontal(problem: ShiftProblem, least: float = 0.0) -> Found:
     """Find horizontal shifts.
 
     A first fit knows smoothing and scatter. Scans of all pairs of neighbours then tell what steps have in common, a
@@ -82,7 +88,7 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
         variance = max(variance, least**2)
         _, covariance, *_ = changes_of(problem.points, shifts, problem.grid, weight, variance, [prior])
         spread = _of_steps(covariance)
-        scanned = scan(problem, shifts.across, spread, (weight, variance), steps.common, pairs)
+        scanned = scan(problem, shifts, spread, (weight, variance), steps.common, pairs)
         steps = together(scanned, problem)
         apart = steps.mean - np.diff(shifts.across)
         if np.all(np.abs(apart) < SETTINGS.near * np.sqrt(np.diag(spread))):
@@ -92,39 +98,72 @@ def find_horizontal(problem: Problem, least: float = 0.0) -> Found:
     return Found(_chained(steps.mean), covariance, weight, variance, prior, steps.told, steps.common)
 
 
-def find_both(problem: Problem) -> Found:
+def find_both(problem: ShiftProblem) -> Found:
     """Find vertical shifts beside horizontal ones.
 
-    Vertical shifts enter linearly, so that the problem is linear about good horizontal ones. Scans of curves moved
-    along the ordinate, as a plateau lies level only then, tell whether they are good, and how wide steps on a plateau
-    are.
+    Vertical shifts enter linearly, so that the problem is linear about good horizontal ones. On a plateau it is not:
+    there scans, in which vertical shifts are free at each place, tell whether it began well, and what it leaves open.
+    What both disagree in counts as an error.
     """
     starts = [find_horizontal(problem, rise * problem.height) for rise in SETTINGS.rises]
-    found = _likeliest(problem, starts)
-    size = problem.curves - 1
-    second = find_horizontal(problem.lifted(found.shifts.along))
-    spread, scanned = _of_steps(found.covariance[:size, :size]), _of_steps(second.covariance)
-    apart = np.abs(np.diff(found.shifts.across - second.shifts.across))
-    if np.any(apart > SETTINGS.apart * np.sqrt(np.diag(spread) + np.diag(scanned))):
-        shifts = Shifts(second.shifts.across, found.shifts.along)
-        found = _likeliest(problem, [second._replace(shifts=shifts)])
+    found, size = _likeliest(problem, starts), problem.curves - 1
+    for left in range(SETTINGS.rounds - 1, -1, -1):
         spread = _of_steps(found.covariance[:size, :size])
-    wider = np.sqrt(np.clip(1 - np.diag(spread) / np.diag(scanned), 0.0, 1.0))
-    sums = np.tri(size)
-    # on a plateau the linear problem stays near its start, and the scan may find another place
-    other = (second.shifts.across - found.shifts.across)[1:]
-    found.covariance[:size, :size] += sums @ (wider[:, None] * scanned * wider) @ sums.T + np.outer(other, other)
-    return found._replace(told=second.told, common=second.common)
+        steps = _scanned(problem, found, spread)
+        apart = steps.mean - np.diff(found.shifts.across)
+        if not left or np.all(np.abs(apart) < SETTINGS.near * np.sqrt(np.diag(spread))):
+            break
+        shifts = found.shifts._replace(across=_chained(steps.mean).across)
+        found = _likeliest(problem, [found._replace(shifts=shifts, common=steps.common)])
+    return _joined(problem, found, steps, spread)
 
 
-def _likeliest(problem: Problem, starts: list[Found]) -> Found:
+def _joined(problem: ShiftProblem, found: Found, steps: Steps, spread: FloatArray) -> Found:
+    """Return shifts of the linearised problem and of scans together; `spread` is the covariance of the former's steps.
+
+    A scan counts for the place as far as it is the wider of the two, and for the width where the curves do not tell.
+    """
+    scanned, linear, sums = steps.shared + np.diag(steps.own), np.diff(found.shifts.across), np.tri(steps.mean.size)
+    share = np.clip(1 - np.diag(spread) / np.diag(scanned), 0.0, 1.0)
+    wide, apart = np.sqrt(np.maximum(share, 1 - steps.told)), steps.mean - linear
+    between = linear + share * apart
+    is_open = np.sqrt(np.diag(spread)) > SETTINGS.open * problem.width
+    place = np.where(is_open, np.clip(between, *problem.windows.T), between)
+    other = sums @ ((1 - steps.told) * (1 - share) * apart + place - between)
+    covariance = sums @ (spread + wide[:, None] * scanned * wide) @ sums.T + np.outer(other, other)
+    told = np.where(place == between, steps.told, 0.0)
+    return _followed(found, sums @ (place - linear), covariance)._replace(told=told, common=steps.common)
+
+
+def _scanned(problem: ShiftProblem, found: Found, spread: FloatArray) -> Steps:
+    """Return what scans tell of steps where vertical shifts are free, about their mean step."""
+    usual = found.shifts.along[-1] / (problem.curves - 1) * np.arange(problem.curves)
+    level, smoothing = problem.lifted(usual), (found.weight, found.variance)
+    shifts = found.shifts._replace(along=found.shifts.along - usual)
+    pairs = scan_pairs(level, *smoothing, found.rising)
+    return together(scan(level, shifts, spread, smoothing, found.common, pairs, found.rising), level)
+
+
+def _followed(found: Found, moved: FloatArray, covariance: FloatArray) -> Found:
+    """Return horizontal shifts moved, with another covariance, and the vertical ones as they follow linearly."""
+    size = moved.size
+    gain = np.linalg.solve(found.covariance[:size, :size], found.covariance[:size, size:]).T
+    alone = found.covariance[size:, size:] - gain @ found.covariance[:size, size:]
+    beside = gain @ covariance
+    whole = np.block([[covariance, beside.T], [beside, alone + beside @ gain.T]])
+    changes = np.insert(np.append(moved, gain @ moved), [0, size], 0.0).reshape(2, -1)
+    shifts = Shifts(found.shifts.across + changes[0], found.shifts.along + changes[1])
+    return found._replace(shifts=shifts, covariance=whole)
+
+
+def _likeliest(problem: ShiftProblem, starts: list[Found]) -> Found:
     """Return both kinds of shifts from the start of most evidence."""
     priors = problem.priors(float(np.mean([start.common.mean for start in starts])))
     found, _ = max((_linear(problem, start, priors) for start in starts), key=lambda pair: pair[1])
     return _along_the_loosest(problem, found, priors)
 
 
-def _linear(problem: Problem, start: Found, priors: list[Prior]) -> tuple[Found, float]:
+def _linear(problem: ShiftProblem, start: Found, priors: list[Prior]) -> tuple[Found, float]:
     """Return both kinds of shifts as the linearised problem has them, and the logarithm of their evidence."""
     size, best, (shifts, _, weight, variance, *_) = problem.curves - 1, RATIOS.size // 2, start
     for _ in range(SETTINGS.vertical_rounds):
@@ -135,11 +174,16 @@ def _linear(problem: Problem, start: Found, priors: list[Prior]) -> tuple[Found,
         if np.all(np.abs(changes) < SETTINGS.settled * np.sqrt(np.diag(covariance))):
             break
     return start._replace(
-        shifts=shifts, covariance=covariance, weight=weight, variance=variance, prior=priors[best]
+        shifts=shifts,
+        covariance=covariance,
+        weight=weight,
+        variance=variance,
+        prior=priors[best],
+        rising=RATIOS[best] * problem.height,
     ), log
 
 
-def _along_the_loosest(problem: Problem, found: Found, priors: list[Prior]) -> Found:
+def _along_the_loosest(problem: ShiftProblem, found: Found, priors: list[Prior]) -> Found:
     """Return mean and covariance of shifts over places along their loosest combination, by their evidence.
 
     A straight piece may slide along itself by horizontal and vertical shifts together, so far that the problem is not
@@ -162,7 +206,9 @@ def _along_the_loosest(problem: Problem, found: Found, priors: list[Prior]) -> F
             means.append(np.append(shifts.across[1:], shifts.along[1:]) + changes)
             spreads.append(spread)
             here = means[-1] + sign * wide * axis
-    share = np.exp(np.array(evidence) - max(evidence))
+            if log < max(evidence) - SETTINGS.unlikely:
+                break
+    share = np.exp(SETTINGS.power * (np.array(evidence) - max(evidence)))
     share /= share.sum()
     mean = share @ np.array(means)
     apart = np.array(means) - mean

@@ -14,7 +14,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.physics.superposition.factors import Found, find_both, find_horizontal
 from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows, slopes
-from mdr_dask.physics.superposition.problem import Problem
+from mdr_dask.physics.superposition.problem import ShiftProblem
 
 CURVE_POINTS = 201
 DRAW_ITERATIONS = 3
@@ -139,7 +139,7 @@ def superpose(
     [0. 1. 2.]
     """
     values, sorted_curves = _sorted(groups, curves)
-    problem, origin = Problem.of(sorted_curves).from_own_origin()
+    problem, origin = ShiftProblem.of(sorted_curves).from_own_origin()
     found = find_both(problem) if vertical else find_horizontal(problem)
     result = _result(problem, found, values).moved(origin)
     _require_overlap(result)
@@ -166,7 +166,7 @@ def _sorted(
     return np.sort(values), arrays
 
 
-def _result(problem: Problem, found: Found, values: FloatArray) -> Superposition:
+def _result(problem: ShiftProblem, found: Found, values: FloatArray) -> Superposition:
     points, shifts, curves = problem.points, found.shifts, values.size
     linear = _Merged.at(problem, found)
     across, along = shifts.across[points.member], shifts.along[points.member]
@@ -207,7 +207,7 @@ def _runs(groups: FloatArray, steps: NDArray[np.bool_]) -> tuple[tuple[float, fl
     return tuple((float(groups[first]), float(groups[last])) for first, last in ends)
 
 
-def _bootstrap(problem: Problem, found: Found, draws: int, seed: int) -> FloatArray:
+def _bootstrap(problem: ShiftProblem, found: Found, draws: int, seed: int) -> FloatArray:
     """Return factors fitted to residuals drawn again within each curve, shape (draws, 2 curves).
 
     A fit anew repeats the best fit. What the curves leave open, as along a plateau, is drawn from a normal distribution
@@ -246,7 +246,7 @@ class _Merged:
     coefficients: FloatArray
 
     @classmethod
-    def at(cls, problem: Problem, found: Found) -> _Merged:
+    def at(cls, problem: ShiftProblem, found: Found) -> _Merged:
         """Return the problem about the shifts found, with the best curve through them."""
         points, shifts, step = problem.points, found.shifts, problem.grid.step
         low, splines = extent(points, shifts.across, step)

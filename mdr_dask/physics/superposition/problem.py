@@ -7,10 +7,10 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.superposition.least_squares import SETTINGS, Grid, Points, Prior
+from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.superposition.least_squares import SETTINGS, Knots, Points, Prior
 
 RATIOS = np.geomspace(0.03, 2.0, 12)
 """Scatters considered of steps about their mean with vertical factors, in widths and in heights of a curve."""
@@ -24,7 +24,7 @@ class Common(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
+class ShiftProblem:
     """Points of all curves, ascending in x within each.
 
     Parameters
@@ -33,7 +33,7 @@ class Problem:
     curves : int
     width, height : float
         Of a curve, the median.
-    grid : Grid
+    grid : Knots
     windows : array, shape (curves - 1, 2)
         Least and largest step with which a curve overlaps the one before it.
     """
@@ -42,22 +42,22 @@ class Problem:
     curves: int
     width: float
     height: float
-    grid: Grid
+    grid: Knots
     windows: FloatArray
 
     @classmethod
-    def of(cls, curves: list[tuple[FloatArray, FloatArray]]) -> Problem:
+    def of(cls, curves: list[tuple[FloatArray, FloatArray]]) -> ShiftProblem:
         """Put curves, ascending in x and in their groups, in one row."""
         member = np.repeat(np.arange(len(curves)), [x.size for x, _ in curves])
         points = Points(np.concatenate([x for x, _ in curves]), np.concatenate([y for _, y in curves]), member)
         width = float(np.median([np.ptp(x) for x, _ in curves]))
         height = float(np.median([np.ptp(y) for _, y in curves])) or 1.0
         density = points.x.size / (len(curves) * SETTINGS.cells)
-        grid = Grid(width / SETTINGS.cells, density * np.logspace(*SETTINGS.smoothing))
+        grid = Knots(width / SETTINGS.cells, density * np.logspace(*SETTINGS.smoothing))
         windows = np.array([[one[0] - other[-1], one[-1] - other[0]] for (one, _), (other, _) in pairwise(curves)])
         return cls(points, len(curves), width, height, grid, windows)
 
-    def from_own_origin(self) -> tuple[Problem, float]:
+    def from_own_origin(self) -> tuple[ShiftProblem, float]:
         """Return the problem with its first point where cells begin, and by how much it was moved.
 
         The cells of the spline stand where they are, so that a unit of the abscissa would be seen in the shifts.
@@ -65,7 +65,7 @@ class Problem:
         origin = float(self.points.x[0])
         return replace(self, points=self.points._replace(x=self.points.x - origin)), origin
 
-    def lifted(self, along: FloatArray) -> Problem:
+    def lifted(self, along: FloatArray) -> ShiftProblem:
         """Return the same problem with curves moved along the ordinate."""
         return replace(self, points=self.points._replace(y=self.points.y + along[self.points.member]))
 
@@ -99,13 +99,20 @@ class Problem:
         steps = [about / ratio**2 + np.eye(size) for ratio in RATIOS]
         return [Prior(usual, np.kron(scales, rows.T @ inner @ rows)) for inner in steps]
 
+    def rises(self, scatter: float, curves: int) -> FloatArray:
+        """Return the precision of the vertical shifts of some neighbours but the first, whose steps scatter; none
+        where they do not.
+        """
+        rows = differences(curves - 1)
+        return np.asarray(rows.T @ rows / scatter**2, dtype=np.float64) if scatter else np.empty((0, 0))
+
 
 def differences(size: int) -> FloatArray:
     """Return the matrix that makes steps of shifts."""
     return np.eye(size) - np.eye(size, k=-1)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:  # pragma: no cover
     """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
     more.

@@ -11,22 +11,23 @@ from math import erf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.superposition.least_squares import (
     DEGREE,
-    Grid,
+    Knots,
     Normal,
     Points,
     Shifts,
     assemble,
     eliminate,
     extent,
+    solve_border,
     workspace,
 )
 from mdr_dask.physics.superposition.least_squares import SETTINGS as FIT
-from mdr_dask.physics.superposition.problem import Common, Problem
+from mdr_dask.physics.superposition.problem import Common, ShiftProblem
 
 
 class Settings(NamedTuple):
@@ -81,7 +82,7 @@ class Steps(NamedTuple):
     common: Common
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no cover
     """Return the trace of the squared second differences times the inverse of a factorised band.
 
@@ -101,9 +102,42 @@ def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
+def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  # pragma: no cover
+    """Return what the border adds to the trace of the penalties times the inverse, after `solve_border`.
+
+    `known` is what the border's own penalty added to it. Overwrites `cross`.
+    """
+    band, cross, border = normal.band, normal.cross, normal.border
+    unknowns, splines = cross.shape
+    inner = known.copy()
+    for row in cross:
+        for i in range(splines - 1, -1, -1):
+            for k in range(i + 1, min(splines, i + DEGREE + 1)):
+                row[i] -= band[k, k - i] * row[k]
+            row[i] /= band[i, 0]
+    bent = cross[:, 2:] - 2 * cross[:, 1:-1] + cross[:, :-2]
+    for k in range(unknowns):
+        for other in range(unknowns):
+            inner[k, other] += weight * np.sum(bent[k] * bent[other])
+    found, column = 0.0, np.empty(unknowns)
+    for j in range(unknowns):
+        for i in range(unknowns):
+            column[i] = inner[i, j]
+            for k in range(i):
+                column[i] -= border[i, k] * column[k]
+            column[i] /= border[i, i]
+        for i in range(unknowns - 1, j - 1, -1):
+            for k in range(i + 1, unknowns):
+                column[i] -= border[k, i] * column[k]
+            column[i] /= border[i, i]
+        found += column[j]
+    return found
+
+
+@kernel
 def likelihoods(
-    points: Points, ways: FloatArray, step: float, weight: float, variance: float
+    points: Points, ways: FloatArray, step: float, weight: float, variance: float, rises: FloatArray
 ) -> FloatArray:  # pragma: no cover
     """Return logarithms of the likelihood of horizontal shifts, as far as the data tell them apart.
 
@@ -118,23 +152,29 @@ def likelihoods(
         Horizontal shifts of all curves.
     step, weight, variance : float
         Width of the cells, weight of the curvature, variance of the scatter.
+    rises : array, shape (curves - 1, curves - 1) or (0, 0)
+        Precision of the vertical shifts of all curves but the first, which are free beside the curve; none without.
     """
-    places, widest = ways.shape[0], 0
+    places, widest, known = ways.shape[0], 0, variance * rises
     for place in range(places):
         widest = max(widest, extent(points, ways[place], step)[1])
-    whole, near = workspace(widest, 0), np.empty((widest, DEGREE + 1))
+    whole, near = workspace(widest, rises.shape[0]), np.empty((widest, DEGREE + 1))
     found, nothing, level = np.empty(places), np.empty(0), np.zeros(ways.shape[1])
     for place in range(places):
         low, size = extent(points, ways[place], step)
         part = Normal(whole.band[:size], whole.right[:size], whole.cross[:, :size], whole.border, whole.pull)
         total = assemble(points, Shifts(ways[place], level), nothing, low, step, part)
+        part.border[:] += known
         _, explained = eliminate(part, weight)
         freedom = size - weight * _roughness_trace(part.band, near)
+        if rises.size > 0:
+            explained += solve_border(part)[2]
+            freedom += rises.shape[0] - _border_trace(part, weight, known)
         found[place] = -0.5 * ((total - explained) / variance + freedom)
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _given(
     places: FloatArray, shares: FloatArray, window: FloatArray, means: FloatArray, scatters: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
@@ -161,7 +201,7 @@ def _given(
     return evidence, centre, spread
 
 
-def together(scan: Scan, problem: Problem) -> Steps:
+def together(scan: Scan, problem: ShiftProblem) -> Steps:
     """Return what all steps are if they scatter about a common mean, by an amount that they tell.
 
     Where a step is hardly told, its likelihood is little but noise, and counts for less.
@@ -170,7 +210,7 @@ def together(scan: Scan, problem: Problem) -> Steps:
     return _averaged(scan, problem, SETTINGS.noisy + (1 - SETTINGS.noisy) * steps.told)
 
 
-def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
+def _averaged(scan: Scan, problem: ShiftProblem, powers: FloatArray) -> Steps:
     """Return mean and covariance of steps over their common mean and scatter, the likelihoods raised to powers."""
     shares = []
     for place, log, power in zip(*scan, powers, strict=True):
@@ -193,8 +233,8 @@ def _averaged(scan: Scan, problem: Problem, powers: FloatArray) -> Steps:
     return Steps(mean, own, (apart * share.ravel()) @ apart.T, told, common)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, variance: float) -> float:  # pragma: no cover
+@kernel
+def _smoothing(points: Points, shifts: Shifts, grid: Knots, usual: float, variance: float) -> float:  # pragma: no cover
     """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)
     curve, nothing = workspace(splines, 0), np.empty(0)
@@ -210,32 +250,34 @@ def _smoothing(points: Points, shifts: Shifts, grid: Grid, usual: float, varianc
     return best
 
 
-def scan_pairs(problem: Problem, weight: float, variance: float) -> Scan:
-    """Scan each step with its two curves alone, from one end of their overlap to the other."""
+def scan_pairs(problem: ShiftProblem, weight: float, variance: float, rising: float = 0.0) -> Scan:
+    """Scan each step with its two curves alone, from one end of their overlap to the other; `rising` as of `scan`."""
     found = Scan([], [])
     for k, window in enumerate(problem.windows):
         place = np.linspace(window[0], window[1], SETTINGS.coarse)
         ways = np.column_stack([np.zeros(place.size), place])
         found.places.append(place)
-        found.logs.append(likelihoods(problem.between(k, k + 1), ways, problem.grid.step, weight, variance))
+        pair, rises = problem.between(k, k + 1), problem.rises(rising, 2)
+        found.logs.append(likelihoods(pair, ways, problem.grid.step, weight, variance, rises))
     return found
 
 
 def scan(
-    problem: Problem,
-    across: FloatArray,
+    problem: ShiftProblem,
+    shifts: Shifts,
     spread: FloatArray,
     smoothing: tuple[float, float],
     common: Common,
     pairs: Scan,
+    rising: float = 0.0,
 ) -> Scan:
     """Scan each step while the others follow it, with the curves that overlap across it.
 
     Parameters
     ----------
-    problem : Problem
-    across : array, shape (curves,)
-        Shifts found.
+    problem : ShiftProblem
+    shifts : Shifts
+        Found.
     spread : array, shape (steps, steps)
         Covariance of their steps in the linearised problem.
     smoothing : tuple of float
@@ -244,8 +286,12 @@ def scan(
         What the other steps are expected to be.
     pairs : Scan
         Of two neighbours: where else a step may lie.
+    rising : float
+        Scatter of vertical steps, in heights of a curve, where vertical shifts are free at each place; 0 where there
+        are none.
     """
     weight, variance = smoothing
+    across, along = shifts
     found, best, wide = Scan([], []), np.diff(across), np.sqrt(np.diag(spread))
     for k, window in enumerate(problem.windows):
         near, far = best[k] + wide[k] * FINE, pairs.places[k]
@@ -253,11 +299,12 @@ def scan(
         far = far[pairs.logs[k] > pairs.logs[k].max() - SETTINGS.unlikely]
         place = np.unique(np.append(near, far[(far < near[0]) | (far > near[-1]) | (wide[k] > gap)]))
         first, last = _overlapping(problem, across, k)
-        points, own = problem.between(first, last), across[first : last + 1] - across[first]
-        local = _smoothing(points, Shifts(own, np.zeros(own.size)), problem.grid, weight, variance)
+        points, rises = problem.between(first, last), problem.rises(rising, last - first + 1)
+        own = Shifts(across[first : last + 1] - across[first], along[first : last + 1] - along[first])
+        local = _smoothing(points, own, problem.grid, weight, variance)
         steps = best + np.outer(place - best[k], spread[:, k] / spread[k, k])
         ways = np.column_stack([np.zeros(place.size), np.cumsum(steps[:, first:last], axis=1)])
-        log = likelihoods(points, ways, problem.grid.step, local, variance)
+        log = likelihoods(points, ways, problem.grid.step, local, variance, rises)
         others = np.delete(steps, k, axis=1) - common.mean
         beyond = np.maximum(np.maximum(place - window[1], window[0] - place), 0) / (SETTINGS.beyond[0] * problem.width)
         log -= 0.5 * np.sum(others**2, axis=1) / common.scatter**2 + np.minimum(0.5 * beyond**2, SETTINGS.beyond[1])
@@ -266,7 +313,7 @@ def scan(
     return found
 
 
-def _overlapping(problem: Problem, across: FloatArray, k: int) -> tuple[int, int]:
+def _overlapping(problem: ShiftProblem, across: FloatArray, k: int) -> tuple[int, int]:
     """Return first and last curve of those that overlap across step k, and of those beside its own two."""
     member = problem.points.member
     ends = (

@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
-from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march, retrace
+from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
 
@@ -306,7 +306,9 @@ class _Relaxation(NamedTuple):
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
         close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
         marching, found, work = self.begun(limits, SETTINGS.moments)
-        count, outcome = march(marching, self.pace, Finish(self.depth[1], self.after, close, settled), found, work)
+        count, outcome = march_depth(
+            marching, self.pace, Finish(self.depth[1], self.after, close, settled), found, work
+        )
         if outcome == LEFT_LIMITS:
             return None
         time, depth, _, drag = (column[:count] for column in found)
@@ -345,7 +347,7 @@ class _Relaxation(NamedTuple):
         return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _reachable(track: Track, slowest: Patches, high: float) -> Reachable:
     """Return where elements can be in contact up to a depth, from the steady state at the least depth and speed."""
     floor = np.empty(track.height.size)

@@ -7,6 +7,7 @@ from scipy.special import ndtr
 from mdr_dask.physics.lubrication import breakthrough as bt
 from mdr_dask.physics.lubrication import film_formulas as film
 from mdr_dask.physics.lubrication import oil
+from mdr_dask.physics.lubrication.clusters import excursions, find_clusters
 
 E_STAR = float(film.reduced_modulus(210e9, 0.3, 210e9, 0.3))
 STRENGTH = float(bt.layer_strength(1e6, E_STAR, 5e-9))
@@ -25,7 +26,7 @@ def rough_line(points, lowest, highest, hurst, seed, rms=1.0):
 
 
 def clusters_of(line, level, spacing=1.0, strength=1e-3):
-    return bt.find_clusters(bt.excursions(line, level), level, spacing, strength)
+    return find_clusters(excursions(line, level), level, spacing, strength)
 
 
 def test_clusters_of_a_line_written_by_hand():
@@ -130,8 +131,8 @@ def test_number_of_clusters_by_rice():
 
 def test_every_second_point_makes_the_coarser_line():
     line, _, _ = rough_line(1000, 3, 100, 0.7, 8)
-    fine = bt.excursions(line, 0.5).every_second()
-    coarse = bt.excursions(line[::2], 0.5)
+    fine = excursions(line, 0.5).every_second()
+    coarse = excursions(line[::2], 0.5)
     np.testing.assert_array_equal(fine.place, coarse.place)
     np.testing.assert_array_equal(fine.height, coarse.height)
     assert fine.points == coarse.points == 500

@@ -19,7 +19,7 @@ from mdr_dask.physics.lubrication.line_contact import (
     LineSolution,
     extrapolate,
     line_contact,
-    solve,
+    solve_film,
 )
 from mdr_dask.physics.outcome import Outcome
 
@@ -36,7 +36,7 @@ def in_radii(value: float, W: float) -> float:
 
 @pytest.fixture(scope="module")
 def checked() -> LineSolution:
-    return solve(line_contact(*CHECKED, E_STAR), accuracy=1e-4)
+    return solve_film(line_contact(*CHECKED, E_STAR), accuracy=1e-4)
 
 
 def test_checked_figures(checked: LineSolution) -> None:
@@ -56,7 +56,7 @@ def test_pressure_has_a_spike_before_the_constriction(checked: LineSolution) -> 
 @pytest.mark.parametrize("M", [0.001, 0.01])
 def test_kapitza(M: float) -> None:
     """Rigid, isoviscous, incompressible: W h0/(U R) = 4.894968; the inlet at 300 sqrt(2 Hc) costs 2e-5."""
-    found = solve(LineContact(M, 0.0), accuracy=1e-4)
+    found = solve_film(LineContact(M, 0.0), accuracy=1e-4)
     assert found.minimum_film.value * RIGID * M**2 == pytest.approx(film.RIGID_ISOVISCOUS, rel=5e-5)
     assert found.finest.rupture / np.sqrt(2 * found.minimum_film.value) == pytest.approx(0.4751, rel=0.02)
 
@@ -93,7 +93,7 @@ def _rigid_barus_film(M: float, L: float) -> float:
 @pytest.mark.parametrize("L", [0.0, 30.0, 300.0, 1000.0])
 def test_rigid_piezoviscous_by_quadrature(L: float) -> None:
     """At M = 0.003 elasticity moves the film by less than the tolerance."""
-    found = solve(LineContact(0.003, L), accuracy=2e-4)
+    found = solve_film(LineContact(0.003, L), accuracy=2e-4)
     assert found.outcome == Outcome.CONVERGED
     assert found.minimum_film.value == pytest.approx(_rigid_barus_film(0.003, L), rel=4e-4)
 
@@ -101,12 +101,12 @@ def test_rigid_piezoviscous_by_quadrature(L: float) -> None:
 @pytest.mark.parametrize("M", [10.0, 30.0, 100.0, 1000.0])
 def test_soft_limit(M: float) -> None:
     """Moes' 2.05 is a fit over moderate loads; the limit found here is 1.98, within 4 %."""
-    found = solve(LineContact(M, 0.0), accuracy=1e-3)
+    found = solve_film(LineContact(M, 0.0), accuracy=1e-3)
     assert found.minimum_film.value * 8 * M / np.pi * M**0.2 == pytest.approx(film.ELASTIC_ISOVISCOUS, rel=0.04)
 
 
 def test_heavy_load_gives_the_pressure_of_hertz() -> None:
-    found = solve(line_contact(5e-4, 1e-13, 5000.0, E_STAR))
+    found = solve_film(line_contact(5e-4, 1e-13, 5000.0, E_STAR))
     inside = np.linspace(-0.9, 0.9, 19)
     np.testing.assert_allclose(found.finest.pressure_between(inside), np.sqrt(1 - inside**2), atol=5e-3)
 
@@ -114,7 +114,7 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
 def test_flow_is_the_same_everywhere() -> None:
     """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
     case = LineContact(8.0, 4.0)
-    found = solve(case, accuracy=1e-5)
+    found = solve_film(case, accuracy=1e-5)
     x = found.finest.nodes[(found.finest.nodes > -3) & (found.finest.nodes < found.finest.rupture - 0.02)]
     middle = (x[1:] + x[:-1]) / 2
     reduced = -np.exp(-case.liquid.alpha * found.finest.pressure_between(x)) / case.liquid.alpha
@@ -125,7 +125,7 @@ def test_flow_is_the_same_everywhere() -> None:
 
 @pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-13, 500.0), (5e-5, 1e-9, 2000.0), (2e-4, 1e-12, 2000.0)])
 def test_second_order(numbers: tuple[float, float, float]) -> None:
-    found = solve(line_contact(*numbers, E_STAR), accuracy=1e-4)
+    found = solve_film(line_contact(*numbers, E_STAR), accuracy=1e-4)
     assert found.central_film.order == pytest.approx(2.0, abs=0.15)
     assert found.minimum_film.order == pytest.approx(2.0, abs=0.35)  # the rupture lies anywhere between two nodes
 
@@ -184,7 +184,7 @@ def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: floa
     errors, stated = [], []
     for case, central, minimum in _heavy():
         assert case.M > 200
-        found = solve(case, accuracy)
+        found = solve_film(case, accuracy)
         assert found.error <= accuracy
         for here, true in ((found.central_film, central), (found.minimum_film, minimum)):
             errors.append(abs(float(here.value) / true - 1))
@@ -208,7 +208,7 @@ def test_soft_heavy_contacts_that_three_coarse_grids_agree_on(
     """Where central films between two nodes sag, grids may agree on a film that is 0.2 to 1.2 % off."""
     case = line_contact(*numbers, E_STAR, **options)
     for accuracy in (1e-2, 1e-3):
-        coarse, fine = solve(case, accuracy), solve(case, 1e-4)
+        coarse, fine = solve_film(case, accuracy), solve_film(case, 1e-4)
         for here, there in (
             (coarse.central_film, fine.central_film),
             (coarse.minimum_film, fine.minimum_film),
@@ -218,7 +218,7 @@ def test_soft_heavy_contacts_that_three_coarse_grids_agree_on(
 
 def test_an_independent_solver_s_film() -> None:
     """8.376e-7 by an equally spaced solver of 3201 nodes, written apart from this one."""
-    found = solve(line_contact(4.838e-4, 3.837e-13, 1385.0, E_STAR))
+    found = solve_film(line_contact(4.838e-4, 3.837e-13, 1385.0, E_STAR))
     assert in_radii(float(found.central_film.value), 4.838e-4) == pytest.approx(8.376e-7, rel=1e-3)
 
 
@@ -226,7 +226,7 @@ def test_an_independent_solver_s_film() -> None:
 def test_error_estimate_covers_the_error(index: int) -> None:
     W, U, G = (np.exp(np.random.default_rng(index).uniform(np.log(a), np.log(b))) for a, b in BOX)
     case = line_contact(W, U, G, E_STAR)
-    coarse, fine = solve(case, accuracy=1e-3), solve(case, accuracy=1e-4)
+    coarse, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=1e-4)
     for name in ("central_film", "minimum_film"):
         here, there = getattr(coarse, name), getattr(fine, name)
         assert abs(here.value - there.value) < here.error + there.error
@@ -240,7 +240,7 @@ BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))
 @pytest.mark.parametrize("U", [1e-13, 1e-11, 1e-9])
 @pytest.mark.parametrize("G", [500.0, 8000.0])
 def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: float, law: str) -> None:
-    found = solve(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
+    found = solve_film(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
     assert found.outcome == Outcome.CONVERGED, found.reason
     assert found.reason == ""
     assert found.error <= 1e-3
@@ -253,8 +253,8 @@ def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: flo
 @pytest.mark.parametrize(("W", "U", "G"), [(2e-5, 1e-11, 5000.0), (1e-4, 1e-10, 2500.0), (3e-6, 1e-12, 1000.0)])
 def test_only_moes_numbers_count_without_density(W: float, U: float, G: float) -> None:
     """The same M and L from other W, U, G: the film in units of R sqrt(2 U) is the same."""
-    here = solve(line_contact(W, U, G, E_STAR, compressible=False))
-    there = solve(line_contact(2 * W, 4 * U, G / np.sqrt(2), 3 * E_STAR, compressible=False))
+    here = solve_film(line_contact(W, U, G, E_STAR, compressible=False))
+    there = solve_film(line_contact(2 * W, 4 * U, G / np.sqrt(2), 3 * E_STAR, compressible=False))
     np.testing.assert_allclose(here.case[:2], there.case[:2], rtol=1e-14)
     assert here.central_film.value == pytest.approx(
         there.central_film.value, rel=1e-9
@@ -270,7 +270,7 @@ def test_formulas_over_27_points(law: str, central: tuple[float, float], minimum
     for W in (2.0452e-5, 1e-4, 5e-4):
         for U in (1e-12, 1e-11, 1e-10):
             for G in (2504.0, 3500.0, 5007.0):
-                found = solve(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
+                found = solve_film(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
                 ratios.append(
                     (
                         in_radii(found.central_film.value, W) / float(film.PAN_HAMROCK_CENTRAL(W, U, G)),
@@ -284,15 +284,15 @@ def test_formulas_over_27_points(law: str, central: tuple[float, float], minimum
 
 def test_ratio_of_films_is_that_of_the_thesis_without_density_and_higher_with_it() -> None:
     for W, U, G in ((2.0452e-5, 1e-11, 5007.0), (1e-4, 1e-11, 5000.0)):
-        loose = solve(line_contact(W, U, G, E_STAR, compressible=False))
-        dense = solve(line_contact(W, U, G, E_STAR))
+        loose = solve_film(line_contact(W, U, G, E_STAR, compressible=False))
+        dense = solve_film(line_contact(W, U, G, E_STAR))
         assert 0.74 < loose.minimum_film.value / loose.central_film.value < 0.79
         assert 0.82 < dense.minimum_film.value / dense.central_film.value < 0.92
 
 
 def test_short_inlet_starves_the_film() -> None:
     films = [
-        solve(line_contact(*CHECKED, E_STAR, inlet=inlet)).central_film.value
+        solve_film(line_contact(*CHECKED, E_STAR, inlet=inlet)).central_film.value
         for inlet in (-1.5, -2.0, -4.0, -10.0, None)
     ]
     assert np.all(np.diff(films) > 0)
@@ -304,7 +304,7 @@ def test_short_inlet_starves_the_film() -> None:
 @pytest.mark.parametrize("U", [1e-13, 1e-9])
 @pytest.mark.parametrize("G", [500.0, 8000.0])
 def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet: float) -> None:
-    found = solve(line_contact(W, U, G, E_STAR, inlet=inlet))
+    found = solve_film(line_contact(W, U, G, E_STAR, inlet=inlet))
     assert found.outcome == Outcome.CONVERGED, found.reason
     assert found.finest.nodes[0] == inlet
     assert 0 < found.minimum_film.value <= found.finest.film.min() * 1.02
@@ -312,16 +312,16 @@ def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet
 
 def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     case = line_contact(*CHECKED, E_STAR)
-    usual = solve(case, accuracy=1e-4)
+    usual = solve_film(case, accuracy=1e-4)
     monkeypatch.setattr(ehl_grid, "FLOODED", 3 * ehl_grid.FLOODED)
-    assert solve(case, accuracy=1e-4).central_film.value == pytest.approx(usual.central_film.value, rel=1e-4)
+    assert solve_film(case, accuracy=1e-4).central_film.value == pytest.approx(usual.central_film.value, rel=1e-4)
 
 
 def test_same_case_same_bytes() -> None:
     case = line_contact(*CHECKED, E_STAR)
-    first = solve(case)
-    solve(line_contact(1e-4, 1e-10, 3000.0, E_STAR))
-    second = solve(case)
+    first = solve_film(case)
+    solve_film(line_contact(1e-4, 1e-10, 3000.0, E_STAR))
+    second = solve_film(case)
     assert first.finest.pressure.tobytes() == second.finest.pressure.tobytes()
     assert first.central_film.value == second.central_film.value
 
@@ -336,7 +336,7 @@ def test_film_at_nodes_is_the_film_and_the_gap_opens_behind(checked: LineSolutio
 
 
 def test_impossible_case_says_why() -> None:
-    found = solve(LineContact(1e9, 0.0))
+    found = solve_film(LineContact(1e9, 0.0))
     assert found.outcome != Outcome.CONVERGED
     assert found.reason.startswith("no film found for M = 1e+09, L = 0: ")
     assert np.isnan(found.central_film.value)
@@ -344,7 +344,7 @@ def test_impossible_case_says_why() -> None:
 
 
 def test_missed_accuracy_is_in_the_error() -> None:
-    found = solve(LineContact(5000.0, 0.0), accuracy=1e-10)
+    found = solve_film(LineContact(5000.0, 0.0), accuracy=1e-10)
     assert found.outcome == Outcome.CONVERGED
     assert found.finest.nodes.size == SETTINGS.nodes[-1]
     assert 1e-10 < found.error < 1e-2

@@ -14,7 +14,7 @@ from mdr_dask.physics.lubrication.newton import (
     _mobility,
     balance,
     film_on,
-    log_viscosity,
+    log_viscosity_at,
     newton,
 )
 from mdr_dask.physics.outcome import Outcome
@@ -31,11 +31,11 @@ def test_laws_are_those_of_the_oil() -> None:
         (Liquid(alpha * p0, oil.ROELANDS_PRESSURE / p0, z, 0.0, 0.0), oil.roelands),
     ):
         for P in (0.0, 0.2, 1.0):
-            value, slope = log_viscosity(P, liquid)
+            value, slope = log_viscosity_at(P, liquid)
             assert value == pytest.approx(
                 float(np.log(law(P * p0, viscosity, alpha) / viscosity)), rel=1e-12, abs=1e-14
             )
-            difference = log_viscosity(P + 1e-6, liquid)[0] - value
+            difference = log_viscosity_at(P + 1e-6, liquid)[0] - value
             assert slope == pytest.approx(difference / 1e-6, rel=1e-5)  # forward difference
 
 

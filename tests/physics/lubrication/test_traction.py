@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve
+from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve_film
 from mdr_dask.physics.lubrication.traction import rolling_coefficient, shear_stress, sliding_coefficient
 
 W, U, G, E_STAR = 2.0452e-5, 1e-11, 2500.0, 115.385e9
@@ -17,7 +17,7 @@ def sliding(solution: LineSolution, slide_roll_ratio: float, eyring_stress: floa
 
 @pytest.fixture(scope="module")
 def solution() -> LineSolution:
-    return solve(line_contact(W, U, G, E_STAR))
+    return solve_film(line_contact(W, U, G, E_STAR))
 
 
 def test_newtonian_stress_in_units(solution: LineSolution) -> None:
@@ -49,7 +49,7 @@ def test_newtonian_traction_is_proportional_to_sliding_and_zero_in_rolling(solut
 
 def test_rolling_friction_of_a_rigid_contact_balances_the_pressure() -> None:
     """The half film times the gradient is, by parts, the pressure on half the slope of the gap."""
-    found = solve(LineContact(0.01, 0.0), accuracy=1e-4)
+    found = solve_film(LineContact(0.01, 0.0), accuracy=1e-4)
     small = 1e-6
     grid = found.finest
     by_pressure = -2 / np.pi * np.sqrt(8 * small / np.pi) * np.trapezoid(grid.pressure * grid.nodes / 2, grid.nodes)
@@ -61,7 +61,7 @@ def test_rolling_friction_of_a_rigid_contact_balances_the_pressure() -> None:
 @pytest.mark.parametrize("law", ["barus", "roelands"])
 def test_errors_of_friction_cover_the_finest_grids(law: str, eyring_stress: float | None) -> None:
     case = line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08)
-    coarse, fine = solve(case, 1e-3), solve(case, 3e-5)
+    coarse, fine = solve_film(case, 1e-3), solve_film(case, 3e-5)
     for read in (
         lambda grid: sliding_coefficient(case, grid, W, 0.01, eyring_stress),
         lambda grid: rolling_coefficient(grid, W),
@@ -73,7 +73,7 @@ def test_errors_of_friction_cover_the_finest_grids(law: str, eyring_stress: floa
 
 def test_a_liquid_like_glass_gives_no_overflow() -> None:
     case = line_contact(5e-4, 1e-11, 8000.0, E_STAR)
-    found = solve(case)
+    found = solve_film(case)
     with np.errstate(all="raise", under="ignore"):
         assert np.isfinite(sliding_coefficient(case, found.finest, 5e-4, 1.0, None))
         assert 0 < sliding_coefficient(case, found.finest, 5e-4, 1.0, 3e-3) < 1

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
+from scipy.linalg import block_diag
 
 from mdr_dask.physics.superposition.least_squares import (
     Points,
@@ -15,16 +16,17 @@ from mdr_dask.physics.superposition.least_squares import (
     restricted,
     rows,
 )
-from mdr_dask.physics.superposition.problem import Problem
+from mdr_dask.physics.superposition.problem import ShiftProblem
 from mdr_dask.physics.superposition.steps import likelihoods
 
 STEP, WEIGHT = 0.25, 0.3
+NONE = np.empty((0, 0))
 
 
 def data(curves=3, points=9, noise=0.01):
     random, x = np.random.default_rng(0), np.linspace(-1, 1, points)
     pieces = [(x, np.tanh(x + 0.4 * k) + noise * random.standard_normal(points)) for k in range(curves)]
-    return Problem.of(pieces)
+    return ShiftProblem.of(pieces)
 
 
 def dense(points, across):
@@ -75,13 +77,17 @@ def dense_at(points, across, move):
     ).toarray()
 
 
-def test_likelihoods_are_misfit_and_freedom_of_the_smoothed_curve():
+@pytest.mark.parametrize("rises", [NONE, np.array([[50.0, -20.0], [-20.0, 30.0]])])
+def test_likelihoods_are_misfit_and_freedom_of_the_smoothed_curve(rises):
+    """With vertical shifts free beside the curve, or without."""
     points, variance = data().points, 1e-4
     ways = np.array([[0.0, 0.4, 0.8], [0.0, -0.3, 1.9], [0.0, 2.5, 5.1]])
-    found = likelihoods(points, ways, STEP, WEIGHT, variance)
+    found = likelihoods(points, ways, STEP, WEIGHT, variance, rises)
+    moved = -np.eye(3)[points.member][:, 1 : 1 + len(rises)]
     for way, log in zip(ways, found, strict=True):
         basis, second = dense(points, way)
-        hat = basis @ np.linalg.solve(basis.T @ basis + WEIGHT * second.T @ second, basis.T)
+        design, penalty = np.hstack([basis, moved]), block_diag(WEIGHT * second.T @ second, variance * rises)
+        hat = design @ np.linalg.solve(design.T @ design + penalty, design.T)
         misfit = points.y @ (points.y - hat @ points.y)
         assert log == pytest.approx(-0.5 * (misfit / variance + np.trace(hat)), rel=1e-6)
 
@@ -93,7 +99,9 @@ def test_on_a_plateau_all_steps_are_as_likely_in_the_mean():
     ways = np.column_stack([np.zeros(9), steps])
     member = np.repeat([0, 1], 15)
     both = np.append(x, x)
-    logs = [likelihoods(Points(both, random.standard_normal(30), member), ways, STEP, 1.0, 1.0) for _ in range(400)]
+    logs = [
+        likelihoods(Points(both, random.standard_normal(30), member), ways, STEP, 1.0, 1.0, NONE) for _ in range(400)
+    ]
     mean = np.mean(logs, axis=0)
     spread = np.std(np.array(logs) - np.mean(logs, axis=1, keepdims=True), axis=0) / 20
     assert np.all(np.abs(mean - mean.mean()) < 4 * spread)

@@ -5,14 +5,11 @@ from schemes import material_on_line, on_line
 from mdr_dask.physics import solids as rheology
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements.edges import Line
 from mdr_dask.physics.transients.elements.follow import (
     Response,
-    closed_nodes,
     follow_line,
-    indented_nodes,
     steady_start,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
@@ -34,9 +31,9 @@ def rough(oversampling: int = 8) -> tuple[np.ndarray, np.ndarray]:
     return roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
 
 
-def bowl(nodes: int, coefficient: float = 10.0) -> Line:
+def bowl(nodes: int, coefficient: float = 10.0) -> CubicLine:
     """Return a smooth parabola."""
-    return indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, 2.0))
+    return indented_line(np.zeros(nodes), np.zeros(nodes), PowerLaw(coefficient, 2.0))
 
 
 def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
@@ -46,7 +43,7 @@ def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.
 
 
 def jump(
-    line: Line, solid: Foundation, reaches: tuple[float, float], load: float, last: float, cells: float = 0.5
+    line: CubicLine, solid: Foundation, reaches: tuple[float, float], load: float, last: float, cells: float = 0.5
 ) -> tuple[np.ndarray, Response]:
     state, depth, status = steady_start(line, solid, reaches[0], load)
     assert status == Outcome.CONVERGED
@@ -68,7 +65,7 @@ def missing(found: Response) -> float:
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
 @pytest.mark.parametrize("indenter", [False, True])
 def test_work_is_stored_or_lost(solid: Foundation, indenter: bool) -> None:
-    line = bowl(400) if indenter else closed_nodes(*rough())
+    line = bowl(400) if indenter else periodic_line(*rough())
     _, found = jump(line, solid, (0.05, 0.08), 0.1, 1.0)
     assert missing(found) < BALANCE
 
@@ -77,14 +74,14 @@ def test_work_is_that_of_drag_and_load() -> None:
     """The work on the elements is F_x v + F_N d_dot, of the forces at the moments, at second order."""
     errors = []
     for oversampling in (8, 32):
-        moments, found = jump(closed_nodes(*rough(oversampling)), KELVIN, (0.05, 0.06), 0.3, 2.0)
+        moments, found = jump(periodic_line(*rough(oversampling)), KELVIN, (0.05, 0.06), 0.3, 2.0)
         power = 0.06 * found.drag + 0.3 * found.rate
         errors.append(abs(np.trapezoid(power, moments) / found.work[-1] - 1))
     assert errors[1] < 3e-4
     assert errors[1] < errors[0] / 4**SECOND
 
 
-def at_times(line: Line, solid: Foundation, reaches: tuple[float, float], cells: float = 0.5) -> np.ndarray:
+def at_times(line: CubicLine, solid: Foundation, reaches: tuple[float, float], cells: float = 0.5) -> np.ndarray:
     """Return the drag at 0+ and at `TIMES`."""
     moments, found = jump(line, solid, reaches, 0.3, 1.5, cells)
     return found.drag[np.append(0, np.searchsorted(moments, TIMES))]
@@ -92,8 +89,8 @@ def at_times(line: Line, solid: Foundation, reaches: tuple[float, float], cells:
 
 @pytest.mark.parametrize("solid", [STANDARD, SERIES])
 def test_second_order_in_the_grid(solid: Foundation) -> None:
-    exact = at_times(closed_nodes(*rough(40)), solid, (0.1, 0.12))
-    found = [np.max(np.abs(at_times(closed_nodes(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
+    exact = at_times(periodic_line(*rough(40)), solid, (0.1, 0.12))
+    found = [np.max(np.abs(at_times(periodic_line(*rough(o)), solid, (0.1, 0.12)) / exact - 1)) for o in (4, 12)]
     assert found[1] < 5e-4
     assert found[1] < found[0] / 3**SECOND
 
@@ -104,7 +101,7 @@ def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     reaches = 0.1, 0.1 * (1 + change)
     march = velocity_jump(periodic_line(*rough(64)), 0.3, reaches, Course(TIMES, np.pi * POINTS, 96))
     exact = np.append(march.at, march.trace)
-    found = [np.abs(at_times(closed_nodes(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
+    found = [np.abs(at_times(periodic_line(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
     assert found[1][0] < 2e-4
     assert found[1].max() < 2e-4
     assert found[1].max() < found[0].max() / 4**SECOND
@@ -112,7 +109,7 @@ def test_second_order_in_the_grid_against_the_march(change: float) -> None:
 
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
 def test_second_order_in_the_step(solid: Foundation) -> None:
-    line = closed_nodes(*rough(8))
+    line = periodic_line(*rough(8))
     exact = at_times(line, solid, (0.1, 0.12), 1 / 16)
     found = [np.max(np.abs(at_times(line, solid, (0.1, 0.12), cells) / exact - 1)) for cells in (2.0, 0.5)]
     assert found[1] < (5e-5 if solid is KELVIN else 1e-3)
@@ -121,7 +118,7 @@ def test_second_order_in_the_step(solid: Foundation) -> None:
 
 def test_every_course_keeps_the_balance() -> None:
     """Reversal, rest and changing load."""
-    line = closed_nodes(*rough())
+    line = periodic_line(*rough())
     state, depth, _ = steady_start(line, STANDARD, 0.0, 0.2)
     moments = np.linspace(0, 4, 4001)
     speed, load = 0.1 * np.sin(2 * moments), 0.2 + 0.1 * np.sin(3 * moments)
@@ -134,7 +131,7 @@ def test_every_course_keeps_the_balance() -> None:
 @pytest.mark.parametrize(("solid", "last"), [(STANDARD, 25.0), (SERIES, 40.0)])
 def test_ends_in_the_direct_steady_state(solid: Foundation, last: float) -> None:
     height, slope = rough()
-    _, found = jump(closed_nodes(height, slope), solid, (0.1, 0.12), 0.3, last)
+    _, found = jump(periodic_line(height, slope), solid, (0.1, 0.12), 0.3, last)
     body = rheology.prony(1.0, solid.moduli, solid.times, solid.viscosity)
     steady = material_on_line(height, 1 / height.size, body, 0.12, 4 * 0.3)
     # second order in eight nodes for the shortest half wavelength
@@ -146,7 +143,7 @@ def test_kelvin_ends_in_the_direct_steady_state_at_second_order() -> None:
     errors = []
     for oversampling in (8, 32):
         height, slope = rough(oversampling)
-        _, found = jump(closed_nodes(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
+        _, found = jump(periodic_line(height, slope), KELVIN, (0.1, 0.12), 0.3, 12.0, 1.0)
         steady = on_line(height, slope, np.array([0.12]), np.array([0.3]))
         errors.append(abs(found.drag[-1] / steady.drag[0] - 1))
     assert errors[0] < 6e-3
@@ -167,7 +164,7 @@ def test_fast_arm_is_a_dashpot() -> None:
 
 def test_limits_of_a_general_body() -> None:
     """An arm of no stiffness beside the dashpot is the Kelvin body; two arms of one time are one arm."""
-    line = closed_nodes(*rough(4))
+    line = periodic_line(*rough(4))
     pairs = [
         (KELVIN, foundation([1e-10], [0.3], 1.0)),
         (STANDARD, foundation([1.0, 2.0], [0.25, 0.25 * (1 + 1e-9)], 0.0)),
@@ -182,7 +179,7 @@ def test_full_contact_is_exact(solid: Foundation) -> None:
     """One wave in full contact: the stretch of an arm is Q exp(i k s), Q' = i k V - (i k V + 1 / tau) Q."""
     nodes, k, before, after = 1000, 2 * np.pi, 0.05, 0.08
     x = np.arange(nodes) / nodes
-    moments, found = jump(closed_nodes(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
+    moments, found = jump(periodic_line(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
     exact = 0.5 * solid.viscosity * after * k * k * np.ones(moments.size)
     for modulus, tau in zip(solid.moduli, solid.times, strict=True):
         first, last = (1j * k * reach / (1j * k * reach + 1 / tau) for reach in (before, after))

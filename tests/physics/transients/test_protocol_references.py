@@ -8,13 +8,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line, without_kinks
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements.edges import Line
 from mdr_dask.physics.transients.elements.follow import (
     Response,
-    closed_nodes,
     follow_line,
-    indented_nodes,
     steady_start,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
@@ -41,7 +39,7 @@ def load(time: Array) -> Array:
     return LOAD * (1 + 0.5 * time / LAST)
 
 
-def followed(line: Line, solid: Foundation, before: float, cells: float = 0.5) -> tuple[Array, Response]:
+def followed(line: CubicLine, solid: Foundation, before: float, cells: float = 0.5) -> tuple[Array, Response]:
     """Follow the course above from a steady state, in steps that begin finely."""
     state, depth, status = steady_start(line, solid, before, LOAD)
     assert status == Outcome.CONVERGED
@@ -107,7 +105,7 @@ def test_arms_under_a_wave_in_partial_contact(solid: Foundation) -> None:
     errors = []
     for nodes in (100, 400):
         x = np.arange(nodes) / nodes
-        moments, found = followed(closed_nodes(np.cos(k * x), -k * np.sin(k * x)), solid, 0.0)
+        moments, found = followed(periodic_line(np.cos(k * x), -k * np.sin(k * x)), solid, 0.0)
         assert found.contact.max() < 0.5
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) - drag)) / np.max(np.abs(drag)))
         off = np.max(np.abs(np.interp(TIMES, moments, found.depth) - depth))
@@ -124,7 +122,7 @@ def test_arms_under_indenters(coefficient: float, exponent: float) -> None:
     drag, depth = at_rest_then_slide(STANDARD, 2000, height, 1.25)
     errors = []
     for nodes in (200, 800):
-        line = indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
+        line = without_kinks(indented_line(np.zeros(nodes), np.zeros(nodes), PowerLaw(coefficient, exponent)))
         moments, found = followed(line, STANDARD, 0.0)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) - drag)) / np.max(np.abs(drag)))
         off = np.max(np.abs(np.interp(TIMES, moments, found.depth) / depth - 1))
@@ -171,7 +169,7 @@ def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
     instant = forces(start, rate_of(start, reach(0.0), LOAD), reach(0.0))[1]
     errors, first = [], []
     for nodes in (200, 800):
-        line = indented_nodes(np.zeros(nodes + 1), np.zeros(nodes + 1), PowerLaw(coefficient, exponent))
+        line = without_kinks(indented_line(np.zeros(nodes), np.zeros(nodes), PowerLaw(coefficient, exponent)))
         moments, found = followed(line, KELVIN, 0.05)
         errors.append(np.max(np.abs(np.interp(TIMES, moments, found.drag) / np.array(drag) - 1)))
         first.append(abs(found.drag[0] / instant - 1))

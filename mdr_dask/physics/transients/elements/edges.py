@@ -10,17 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
-
-
-class Line(NamedTuple):
-    """Heights and slopes at n + 1 nodes of a line of unit length, and whether it closes."""
-
-    height: FloatArray
-    slope: FloatArray
-    periodic: bool
+from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
 class Edges(NamedTuple):
@@ -30,25 +23,56 @@ class Edges(NamedTuple):
     gap: FloatArray
 
 
-@njit(nogil=True, cache=True)
-def under_elements(line: Line, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
-    """Write height and slope over every element after a travel, from cubic cells; return the whole cells of it."""
+class Contact(NamedTuple):
+    """Elements under a line at one moment, shape (n,) each, and where the edges of their contact are.
+
+    Parameters
+    ----------
+    gaps, slope : array
+        From the line to where an element would be without contact, and the slope of the line.
+    pulls, force, power : array
+        Force of springs and arms of elements at the line; the whole force, and that times the slope, are overwritten.
+    touching : bool array
+    edges : Edges
+    """
+
+    gaps: FloatArray
+    pulls: FloatArray
+    slope: FloatArray
+    force: FloatArray
+    power: FloatArray
+    touching: BoolArray
+    edges: Edges
+
+
+class Drive(NamedTuple):
+    """Deborah number and load of a moment, and the element at the start of a line that does not close, else -1."""
+
+    deborah: float
+    load: float
+    first: int
+
+
+@compiled
+def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
+    """Write height and slope (over the line's length) above every element after a travel; return its whole cells."""
     n = under.size
     cells = travel * n
     shift = int(np.floor(cells))
     y = cells - shift
     a0, a1 = (1 + 2 * y) * (1 - y) ** 2, y * y * (3 - 2 * y)
-    b0, b1 = y * (1 - y) ** 2 / n, y * y * (y - 1) / n
-    g0, k0, k1 = 6 * y * (y - 1) * n, (1 - y) * (1 - 3 * y), y * (3 * y - 2)
+    b0, b1 = y * (1 - y) ** 2, y * y * (y - 1)
+    g0, k0, k1 = 6 * y * (y - 1), (1 - y) * (1 - 3 * y), y * (3 * y - 2)
     i = shift % n
     for j in range(n):
-        under[j] = a0 * line.height[i] + a1 * line.height[i + 1] + b0 * line.slope[i] + b1 * line.slope[i + 1]
-        slope_under[j] = g0 * (line.height[i] - line.height[i + 1]) + k0 * line.slope[i] + k1 * line.slope[i + 1]
+        before, after, enter, leave = line.height[i], line.height[i + 1], line.enter[i], line.leave[i]
+        under[j] = a0 * before + a1 * after + b0 * enter + b1 * leave
+        slope_under[j] = n * (g0 * (before - after) + k0 * enter + k1 * leave)
         i = i + 1 if i + 1 < n else 0
     return shift
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
     """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
     n = under.size
@@ -76,14 +100,14 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     return depth, False
 
 
-@njit(nogil=True, cache=True)
+@inlined
 def _whole(values: FloatArray, j: int) -> float:
     """Return the integral over the cell before node j of the cubic through four nodes."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
-@njit(nogil=True, cache=True)
+@inlined
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     """Return the part of a cell up to the edge, seen from the element in contact."""
     if place < 0:
@@ -92,7 +116,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     return place + (1 - place) * np.sqrt(max(1 - outer / gap, 0.0)) if gap < 0 else place
 
 
-@njit(nogil=True, cache=True)
+@inlined
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
@@ -119,29 +143,17 @@ def _cell(
     return low, high
 
 
-@njit(nogil=True, cache=True)
-def _forces(
-    gaps: FloatArray,
-    force: FloatArray,
-    power: FloatArray,
-    slope: FloatArray,
-    touching: BoolArray,
-    edges: Edges,
-    keep: bool,
-    first: int,
-) -> tuple[float, float, float]:
-    """Return mean load, drag and fraction in contact.
-
-    `power` is force times slope. `first` is the element at the start of the line, behind which there is none if the
-    line does not close, else -1. The edges are noted if `keep`.
-    """
-    n = gaps.size
+@compiled
+def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
+    """Return mean load, drag and fraction in contact; there is nothing before element `first`. Note edges if `keep`."""
+    force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
+    n = force.size
     load, drag, length = 0.0, 0.0, 0.0
     for j in range(n):
         if j == first or not (touching[j - 1] or touching[j]):
             edges.place[j] = -1.0
             continue
-        low, high = _cell(j, gaps, force, touching, edges, keep)
+        low, high = _cell(j, contact.gaps, force, touching, edges, keep)
         width, middle = high - low, 0.5 * (low + high)
         if width >= 1:
             load += _whole(force, j)
@@ -156,34 +168,22 @@ def _forces(
     return load / n, drag / n, length / n
 
 
-@njit(nogil=True, cache=True)
-def carrying_rate(
-    weight: float,
-    gaps: FloatArray,
-    pulls: FloatArray,
-    slope: FloatArray,
-    touching: BoolArray,
-    edges: Edges,
-    rate: float,
-    deborah: float,
-    load: float,
-    first: int,
-    force: FloatArray,
-    power: FloatArray,
-) -> tuple[float, float, float]:
-    """Return the rate at which the load is carried, drag and fraction in contact.
+@compiled
+def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
+    """Return the rate at which the load is carried, drag and fraction in contact; note the edges.
 
     The force of an element pressed to the line is `pulls` and `weight` times ``rate + deborah * slope``: with a dashpot
     its viscosity and the rate of the depth, without one the glass modulus and a correction of the depth, deborah 0.
     """
-    carried, drag, length = 0.0, 0.0, 0.0
+    force, power, slope = contact.force, contact.power, contact.slope
+    drag, length = 0.0, 0.0
     for turn in range(60):
-        for j in range(gaps.size):
-            force[j] = pulls[j] + weight * (rate + deborah * slope[j])
+        for j in range(force.size):
+            force[j] = contact.pulls[j] + weight * (rate + drive.deborah * slope[j])
             power[j] = force[j] * slope[j]
-        carried, drag, length = _forces(gaps, force, power, slope, touching, edges, False, first)
-        if length <= 0 or abs(carried - load) <= 1e-11 * load or turn == 59:
+        carried, drag, length = _forces(contact, drive.first, False)
+        if length <= 0 or abs(carried - drive.load) <= 1e-11 * drive.load or turn == 59:
             break
-        rate += (load - carried) / (length * weight)
-    _forces(gaps, force, power, slope, touching, edges, True, first)
+        rate += (drive.load - carried) / (length * weight)
+    _forces(contact, drive.first, True)
     return rate, drag, length

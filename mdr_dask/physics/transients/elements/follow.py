@@ -11,10 +11,23 @@ import numpy as np
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces.shapes import Shape
-from mdr_dask.physics.transients.elements.edges import Edges, Line, under_elements
-from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, periodic_line
+from mdr_dask.physics.transients.elements.edges import Edges, under_elements
+from mdr_dask.physics.transients.elements.foundation import (
+    KELVIN,
+    Foundation,
+    Lapse,
+    Release,
+    Rise,
+    advance,
+    fading,
+    flight,
+    fly,
+    release,
+    scratch_for,
+)
 from mdr_dask.physics.transients.elements.steps import (
     ROWS,
     Schedule,
@@ -22,7 +35,6 @@ from mdr_dask.physics.transients.elements.steps import (
     follow_elements,
     mean_after,
     note_edges,
-    orbit,
 )
 
 TURNS = 3000  # of an element around the line before it is as it was
@@ -63,26 +75,6 @@ class Response(NamedTuple):
     state: State
 
 
-def closed_nodes(height: FloatArray, slope: FloatArray) -> Line:
-    """Return a periodic line of unit length from heights and slopes at its n nodes."""
-    return Line(np.append(height, height[0]), np.append(slope, slope[0]), True)
-
-
-def indented_nodes(height: FloatArray, slope: FloatArray, body: Shape) -> Line:
-    """Return the line of a rough indenter, which does not close.
-
-    Parameters
-    ----------
-    height, slope : array, shape (n + 1,)
-        The roughness and its derivative at the nodes of a line of unit length, both ends included.
-    body : Shape
-        What is under the roughness, its tip at node n // 2. The kink of a cone is rounded over one cell.
-    """
-    n = height.size - 1
-    smooth, left, right = body.at((np.arange(n + 1) - n // 2) / n)
-    return Line(height + smooth, slope + 0.5 * (left + right), False)
-
-
 def untouched(elements: int, arms: int) -> State:
     """Return elements that have never been touched."""
     edges = Edges(np.full(elements, -1.0), np.zeros(elements))
@@ -103,7 +95,7 @@ def _copy(state: State) -> State:
     )
 
 
-def steady_start(line: Line, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
+def steady_start(line: CubicLine, solid: Foundation, deborah: float, load: float) -> tuple[State, float, Outcome]:
     """Return the steady state of the elements at the nodes, sliding at constant speed under a constant load.
 
     One element is carried around the line until it comes back as it was, in steps of half a cell by the method of
@@ -138,17 +130,18 @@ def steady_start(line: Line, solid: Foundation, deborah: float, load: float) -> 
     return state, depth, Outcome.OUTSIDE_LINE if outside else Outcome.CONVERGED
 
 
-def _halved(line: Line) -> Line:
-    """Return the same cubic line with a node more in the middle of every cell."""
-    n = line.height.size - 1
-    height, slope = np.empty(2 * n + 1), np.empty(2 * n + 1)
-    height[::2], slope[::2] = line.height, line.slope
-    height[1::2] = 0.5 * (line.height[:-1] + line.height[1:]) - np.diff(line.slope) / (8 * n)
-    slope[1::2] = 1.5 * n * np.diff(line.height) - 0.25 * (line.slope[:-1] + line.slope[1:])
-    return Line(height, slope, line.periodic)
+def _halved(line: CubicLine) -> CubicLine:
+    """Return the same line with a node more in the middle of every cell."""
+    n = line.enter.size
+    height, enter, leave = np.empty(2 * n + 1), np.empty(2 * n), np.empty(2 * n)
+    height[::2] = line.height
+    height[1::2] = 0.5 * (line.height[:-1] + line.height[1:]) + (line.enter - line.leave) / 8
+    enter[::2], leave[1::2] = line.enter / 2, line.leave / 2
+    leave[::2] = enter[1::2] = 0.75 * np.diff(line.height) - (line.enter + line.leave) / 8
+    return CubicLine(height, enter, leave, line.periodic, line.smooth)
 
 
-def _resting(line: Line, state: State, depth: float) -> float:
+def _resting(line: CubicLine, state: State, depth: float) -> float:
     """Fill all elements of a body at rest; return the load."""
     w = depth + line.height[:-1]
     state.displacement[:] = np.maximum(w, 0)
@@ -159,12 +152,12 @@ def _resting(line: Line, state: State, depth: float) -> float:
     return float(state.displacement.mean())
 
 
-def _sliding(line: Line, solid: Foundation, state: State, deborah: float, depth: float) -> float:
+def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, depth: float) -> float:
     """Fill all elements in the steady state at a depth; return the load that makes their mean what it is."""
     if depth + line.height[:-1].max() <= 0:
         return 0.0
     n = state.displacement.size
-    good, last = orbit(solid, line, deborah, depth, state, TURNS)
+    good, last = _orbit(solid, line, deborah, depth, state, TURNS)
     if not good:
         return np.nan
     step, modes = 1 / (n * deborah), np.empty(solid.rates.size)
@@ -173,8 +166,56 @@ def _sliding(line: Line, solid: Foundation, state: State, deborah: float, depth:
     return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
 
 
+@kernel
+def _orbit(
+    solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, turns: int
+) -> tuple[bool, float]:
+    """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
+
+    The line may have a multiple of the nodes that there are elements.
+
+    Return whether it did, and its displacement at the end.
+    """
+    n = line.height.size - 1
+    every, step = n // state.displacement.size, 1 / (n * deborah)
+    lapse = Lapse(step, np.empty(solid.rates.size), np.empty(solid.times.size), scratch_for(solid))
+    fading(solid, step, lapse.decay, lapse.fades)
+    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
+    top = int(np.argmax(line.height[:n])) if line.periodic else 0
+    w0 = depth + line.height[top]
+    u, touching = max(w0, 0.0), w0 > 0
+    free = 0.0
+    for _ in range(turns if line.periodic else 1):
+        copy_into(last, arms[0])
+        before = u
+        for cell in range(n):
+            i = (top + cell) % n
+            if not touching:
+                free = u
+                copy_into(free_arms[0], arms[0])
+            if i % every == 0:
+                j = i // every
+                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
+                copy_into(state.arms[j], arms[0])
+                copy_into(state.free_arms[j], free_arms[0])
+            w0, w1 = depth + line.height[i], depth + line.height[i + 1]
+            part, leaves = 0.0, u
+            if touching:
+                rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
+                part, leaves = release(solid, lapse, rise, arms, 0)
+            after = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
+            free = fly(solid, free, free_arms, 0, lapse.decay, lapse.scratch.modes)
+            u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), arms, 0)
+        change = abs(u - before)
+        for m in range(arms.size):
+            change = max(change, abs(arms[0, m] - last[m]))
+        if line.periodic and change <= 1e-13 * abs(u):
+            return True, u
+    return not line.periodic, u
+
+
 def follow_line(
-    line: Line,
+    line: CubicLine,
     solid: Foundation,
     schedule: Schedule,
     state: State,
@@ -188,8 +229,9 @@ def follow_line(
 
     Parameters
     ----------
-    line : Line
-        From :func:`closed_nodes` or :func:`indented_nodes`; elements enter the latter undeformed.
+    line : CubicLine
+        Elements enter one that does not close undeformed. Forces are straight between elements: a line
+        :func:`~mdr_dask.physics.surfaces.cubic_line.without_kinks` is followed with the smallest error.
     solid : Foundation
     schedule : Schedule
         Travel, velocity and load at every moment.
@@ -219,7 +261,7 @@ def follow_kelvin(
     Parameters
     ----------
     height, slope : array, shape (n,)
-        Profile of unit length, as in :func:`mdr_dask.physics.transients.patches.cubic_profile`.
+        Profile of unit length, as in :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line`.
     schedule : Schedule
         As in :func:`follow_line`; time in tau.
     displacement : array, shape (n,)
@@ -227,7 +269,7 @@ def follow_kelvin(
     depth : float
         Depth at the first moment.
     """
-    line = closed_nodes(height, slope)
+    line = periodic_line(height, slope)
     under, grade = np.empty(height.size), np.empty(height.size)
     under_elements(line, float(schedule.travels[0]), under, grade)
     w = depth + under

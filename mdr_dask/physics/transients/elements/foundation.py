@@ -10,11 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, inlined, kernel
 from mdr_dask.physics.solids import recovery_times
 
 
@@ -86,11 +85,37 @@ class Scratch(NamedTuple):
     arms: FloatArray
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def scratch_for(solid: Foundation) -> Scratch:
     """Return the workspace of one element."""
     modes, arms = solid.rates.size, solid.times.size
     return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
+
+
+class Lapse(NamedTuple):
+    """A time that passes: how long it is, how modes decay and arms fade over it, and the workspace of one element."""
+
+    time: float
+    decay: FloatArray
+    fades: FloatArray
+    scratch: Scratch
+
+
+class Rise(NamedTuple):
+    """The line over one element while a time passes: where it begins and ends, and its rates there."""
+
+    w0: float
+    w1: float
+    rise0: float
+    rise1: float
+
+
+class Release(NamedTuple):
+    """After which part of a time an element is let go if it is, where, and where it would then end."""
+
+    part: float
+    leaves: float
+    after: float
 
 
 @compiled
@@ -179,87 +204,62 @@ def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     return float(force)
 
 
-@compiled
-def release(
-    solid: Foundation,
-    w0: float,
-    w1: float,
-    rise0: float,
-    rise1: float,
-    arms: FloatArray,
-    i: int,
-    step: float,
-    fades: FloatArray,
-    workspace: FloatArray,
-) -> tuple[float, float]:
-    """Return the part of a step after which an element pressed from w0 to w1 is let go, and where; 1 if it is not.
+@inlined
+def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: int) -> tuple[float, float]:
+    """Return the part of a time after which an element pressed to its rise is let go, and where; 1 if it is not.
 
-    `rise0` and `rise1` are the rates of w at both ends; the force is taken as linear between them, w as cubic.
+    The force is taken as linear in time, the rise as cubic.
     """
-    begin = pull(solid, w0, arms, i) + solid.viscosity * rise0
+    begin = pull(solid, rise.w0, arms, i) + solid.viscosity * rise.rise0
     if begin <= 0:
-        return 0.0, w0
+        return 0.0, rise.w0
+    strains = lapse.scratch.arms
     for m in range(solid.times.size):
-        workspace[0, m] = arms[i, m]
-    press(solid, w0, w1, workspace, 0, step, fades)
-    end = pull(solid, w1, workspace, 0) + solid.viscosity * rise1
+        strains[0, m] = arms[i, m]
+    press(solid, rise.w0, rise.w1, strains, 0, lapse.time, lapse.fades)
+    end = pull(solid, rise.w1, strains, 0) + solid.viscosity * rise.rise1
     if end >= 0:
-        return 1.0, w1
-    part, change = begin / (begin - end), w1 - w0
-    bend = (1 - part) * (rise0 * step - change) - part * (rise1 * step - change)
-    return part, w0 + part * change + part * (1 - part) * bend
+        return 1.0, rise.w1
+    part, change = begin / (begin - end), rise.w1 - rise.w0
+    bend = (1 - part) * (rise.rise0 * lapse.time - change) - part * (rise.rise1 * lapse.time - change)
+    return part, rise.w0 + part * change + part * (1 - part) * bend
 
 
-@compiled
-def flight(
-    solid: Foundation,
-    u0: float,
-    arms: FloatArray,
-    i: int,
-    part: float,
-    leaves: float,
-    step: float,
-    decay: FloatArray,
-    scratch: Scratch,
-) -> float:
-    """Return where an element is after a step if it is pressed to `leaves` for a part of it and free for the rest."""
+@inlined
+def flight(solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int) -> float:
+    """Return where an element ends if it is pressed to `leaves` for a part of a time and free for the rest."""
+    scratch = lapse.scratch
     for m in range(solid.times.size):
         scratch.arms[0, m] = arms[i, m]
     if part <= 0:
-        return fly(solid, u0, scratch.arms, 0, decay, scratch.modes)
-    fading(solid, part * step, scratch.decay, scratch.fades)
-    press(solid, u0, leaves, scratch.arms, 0, part * step, scratch.fades)
-    fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
+        return fly(solid, u0, scratch.arms, 0, lapse.decay, scratch.modes)
+    fading(solid, part * lapse.time, scratch.decay, scratch.fades)
+    press(solid, u0, leaves, scratch.arms, 0, part * lapse.time, scratch.fades)
+    fading(solid, (1 - part) * lapse.time, scratch.decay, scratch.fades)
     return fly(solid, leaves, scratch.arms, 0, scratch.decay, scratch.modes)
 
 
-@compiled
+@inlined
 def advance(
     solid: Foundation,
-    u0: float,
+    lapse: Lapse,
+    w: tuple[float, float],
+    element: tuple[float, bool],
+    let_go: Release,
     arms: FloatArray,
     i: int,
-    touching: bool,
-    part: float,
-    leaves: float,
-    free: float,
-    w0: float,
-    w1: float,
-    step: float,
-    decay: FloatArray,
-    fades: FloatArray,
-    scratch: Scratch,
 ) -> tuple[float, bool, float, float]:
-    """Move one element through a step; return displacement, contact, work and loss. `arms` is overwritten.
+    """Move one element through a time; return displacement, contact, work and loss. `arms` is overwritten.
 
-    `part` is after which part of the step it is let go if it is, `leaves` where, and `free` where it then ends.
+    `w` is where the line begins and ends, `element` the displacement and contact at the start.
     """
+    (w0, w1), (u0, touching), step, scratch = w, element, lapse.time, lapse.scratch
     before = stored(solid, u0, arms, i)
-    if w1 > free:
+    if w1 > let_go.after:
         if touching:
-            work, lost = press(solid, u0, w1, arms, i, step, fades)
+            work, lost = press(solid, u0, w1, arms, i, step, lapse.fades)
             return w1, True, work, lost
-        part = (u0 - w0) / ((u0 - w0) + (w1 - free)) if u0 > w0 else 0.0
+        part = (u0 - w0) / ((u0 - w0) + (w1 - let_go.after)) if u0 > w0 else 0.0
         fading(solid, part * step, scratch.decay, scratch.fades)
         u = fly(solid, u0, arms, i, scratch.decay, scratch.modes) if part > 0 else u0
         loss = before - stored(solid, u, arms, i) if part > 0 else 0.0
@@ -267,8 +267,9 @@ def advance(
         fading(solid, rest, scratch.decay, scratch.fades)
         work, lost = press(solid, u, w1, arms, i, rest, scratch.fades)
         return w1, True, work, lost + loss
+    part, leaves = let_go.part, let_go.leaves
     if not touching or part <= 0:
-        u = fly(solid, u0, arms, i, decay, scratch.modes)
+        u = fly(solid, u0, arms, i, lapse.decay, scratch.modes)
         return u, False, 0.0, before - stored(solid, u, arms, i)
     fading(solid, part * step, scratch.decay, scratch.fades)
     work, lost = press(solid, u0, leaves, arms, i, part * step, scratch.fades)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.elements.edges import Line
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.follow import Response, follow_line, steady_start
 from mdr_dask.physics.transients.elements.foundation import Foundation
 from mdr_dask.physics.transients.elements.steps import Schedule, State
@@ -144,7 +144,7 @@ class _Stand(NamedTuple):
 
 
 def trace(
-    line: Line, solid: Foundation, before: float, pieces: Sequence[Piece], times: FloatArray, per_decade: float
+    line: CubicLine, solid: Foundation, before: float, pieces: Sequence[Piece], times: FloatArray, per_decade: float
 ) -> Trace:
     """Follow every element of a body through a history.
 
@@ -200,13 +200,13 @@ def _failed(times: FloatArray, outcome: Outcome) -> Trace:
     return Trace(np.nan, np.nan, np.nan, nothing, nothing, outcome)
 
 
-def _still(line: Line, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
+def _still(line: CubicLine, solid: Foundation, velocity: float, load: float, state: State, depth: float) -> Response:
     """Return the response at one moment."""
     one = np.ones(1)
     return follow_line(line, solid, Schedule(0 * one, 0 * one, velocity * one, load * one), state, depth)
 
 
-def _end(line: Line, solid: Foundation, piece: Piece) -> float:
+def _end(line: CubicLine, solid: Foundation, piece: Piece) -> float:
     """Return the friction of the steady state in which a history ends; NaN if it does not or ends at rest."""
     velocity, load = piece.velocity[1], piece.force[1]
     if piece.swing[2] or velocity <= 0:

@@ -8,13 +8,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.transients.elements.edges import Edges, Line, carrying_rate, depth_for, under_elements
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
+from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
     Foundation,
+    Lapse,
+    Release,
+    Rise,
     Scratch,
     advance,
     at_rest,
@@ -54,7 +58,7 @@ class State(NamedTuple):
     edges: Edges
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
     """Return the mean displacement that the course of the load decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
@@ -85,7 +89,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     return (next_load + total) / glass
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
@@ -105,7 +109,7 @@ def _instant(
     return depth, work / n, good
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
     n, lost = state.displacement.size, 0.0
@@ -169,7 +173,7 @@ class StepWorkspace(NamedTuple):
     scratch: Scratch
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     rows = np.empty((11, n))
     return StepWorkspace(
@@ -191,10 +195,11 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     )
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
     for j in range(workspace.under.size):
         if not state.touching[j]:
             continue
@@ -203,19 +208,18 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         if plain and u + damping * rise0 > 0 and w1 + damping * rise1 >= 0:
             workspace.parts[j], workspace.leaves[j], workspace.after[j] = 1.0, w1, u * workspace.decay[0]
             continue
-        arms, scratch = state.arms, workspace.scratch
-        part, leaves = release(solid, u, w1, rise0, rise1, arms, j, step.time, workspace.fades, scratch.arms)
+        part, leaves = release(solid, lapse, Rise(u, w1, rise0, rise1), state.arms, j)
         if part < 1 or workspace.parts[j] < 1:
-            pressed = part if part < 1 else 0.0
-            workspace.after[j] = flight(solid, u, arms, j, pressed, leaves, step.time, workspace.decay, scratch)
+            workspace.after[j] = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, state.arms, j)
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
     work, lost = 0.0, 0.0
     for j in range(n):
         w0, w1, was = step.depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
@@ -242,22 +246,8 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
             lost += gone
             u[j] = w1
             continue
-        u[j], touching[j], done, gone = advance(
-            solid,
-            u[j],
-            state.arms,
-            j,
-            was,
-            workspace.parts[j],
-            workspace.leaves[j],
-            after[j],
-            w0,
-            w1,
-            step.time,
-            workspace.decay,
-            workspace.fades,
-            workspace.scratch,
-        )
+        let_go = Release(workspace.parts[j], workspace.leaves[j], after[j])
+        u[j], touching[j], done, gone = advance(solid, lapse, (w0, w1), (u[j], was), let_go, state.arms, j)
         if not touching[j]:
             state.free[j] = u[j]
         work += done
@@ -265,7 +255,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
     return work / n, lost / n
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _step(
     solid: Foundation,
     state: State,
@@ -299,7 +289,7 @@ def _step(
     return depth, work, lost, True
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _state_energy(solid: Foundation, state: State) -> float:
     energy, n = 0.0, state.displacement.size
     if solid.times.size == 0:
@@ -311,16 +301,9 @@ def _state_energy(solid: Foundation, state: State) -> float:
     return energy
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def forces_now(
-    solid: Foundation,
-    state: State,
-    workspace: StepWorkspace,
-    depth: float,
-    rate: float,
-    deborah: float,
-    load: float,
-    first: int,
+    solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
     """Return the depth and its rate at which the load is carried, drag and fraction in contact; note the edges.
 
@@ -332,45 +315,27 @@ def forces_now(
         w = depth + workspace.under[j]
         workspace.pulls[j] = w if plain else pull(solid, w, state.arms, j)
         workspace.gaps[j] = w - state.free[j] if solid.viscosity > 0 else workspace.pulls[j]
-    edges, force, power = state.edges, workspace.force, workspace.power
-    if solid.viscosity > 0:
-        rate, drag, length = carrying_rate(
-            solid.viscosity,
-            workspace.gaps,
-            workspace.pulls,
-            workspace.slope,
-            state.touching,
-            edges,
-            rate,
-            deborah,
-            load,
-            first,
-            force,
-            power,
-        )
-        return depth, rate, drag, length
-    glass = 1 + solid.moduli.sum()
-    more, drag, length = carrying_rate(
-        glass,
+    contact = Contact(
         workspace.gaps,
         workspace.pulls,
         workspace.slope,
+        workspace.force,
+        workspace.power,
         state.touching,
-        edges,
-        0.0,
-        0.0,
-        load,
-        first,
-        force,
-        power,
+        state.edges,
     )
+    if solid.viscosity > 0:
+        rate, drag, length = carrying_rate(contact, solid.viscosity, rate, drive)
+        return depth, rate, drag, length
+    still = Drive(0.0, drive.load, drive.first)
+    more, drag, length = carrying_rate(contact, 1 + solid.moduli.sum(), 0.0, still)
     return depth + more, rate, drag, length
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def follow_elements(
     solid: Foundation,
-    line: Line,
+    line: CubicLine,
     schedule: Schedule,
     state: State,
     depth: float,
@@ -389,8 +354,8 @@ def follow_elements(
     for now in range(moments.size):
         if now > 0:
             time = moments[now] - moments[now - 1]
-            workspace.old_under[:] = workspace.under
-            workspace.old_slope[:] = workspace.slope
+            copy_into(workspace.old_under, workspace.under)
+            copy_into(workspace.old_slope, workspace.slope)
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
@@ -407,64 +372,16 @@ def follow_elements(
         first = -1 if line.periodic else (-shift) % n
         if not line.periodic and (state.touching[first] or state.touching[(first - 1) % n]):
             return Outcome.OUTSIDE_LINE
-        exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, deborahs[now], loads[now], first)
+        drive = Drive(deborahs[now], loads[now], first)
+        exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
     return Outcome.CONVERGED
 
 
-@njit(nogil=True, cache=True)
-def orbit(solid: Foundation, line: Line, deborah: float, depth: float, state: State, turns: int) -> tuple[bool, float]:
-    """Carry one element along the line at constant depth until it comes back as it was; fill all elements from it.
-
-    The line may have a multiple of the nodes that there are elements.
-
-    Return whether it did, and its displacement at the end.
-    """
-    n, scratch = line.height.size - 1, scratch_for(solid)
-    every = n // state.displacement.size
-    step = 1 / (n * deborah)
-    decay, fades = np.empty(solid.rates.size), np.empty(solid.times.size)
-    fading(solid, step, decay, fades)
-    arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
-    top = int(np.argmax(line.height[:n])) if line.periodic else 0
-    w0 = depth + line.height[top]
-    u, touching = max(w0, 0.0), w0 > 0
-    free = 0.0
-    for _ in range(turns if line.periodic else 1):
-        last[:] = arms[0]
-        before = u
-        for cell in range(n):
-            i = (top + cell) % n
-            if not touching:
-                free = u
-                free_arms[0, :] = arms[0]
-            if i % every == 0:
-                j = i // every
-                state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.arms[j, :] = arms[0]
-                state.free_arms[j, :] = free_arms[0]
-            w0, w1 = depth + line.height[i], depth + line.height[i + 1]
-            rise0, rise1 = deborah * line.slope[i], deborah * line.slope[i + 1]
-            part, leaves = 0.0, u
-            if touching:
-                part, leaves = release(solid, w0, w1, rise0, rise1, arms, 0, step, fades, scratch.arms)
-            after = flight(solid, u, arms, 0, part if part < 1 else 0.0, leaves, step, decay, scratch)
-            free = fly(solid, free, free_arms, 0, decay, scratch.modes)
-            u, touching, _, _ = advance(
-                solid, u, arms, 0, touching, part, leaves, after, w0, w1, step, decay, fades, scratch
-            )
-        change = abs(u - before)
-        for m in range(arms.size):
-            change = max(change, abs(arms[0, m] - last[m]))
-        if line.periodic and change <= 1e-13 * abs(u):
-            return True, u
-    return not line.periodic, u
-
-
-@njit(nogil=True, cache=True)
-def note_edges(solid: Foundation, line: Line, state: State, depth: float, deborah: float, load: float) -> None:
+@kernel
+def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)
     under_elements(line, 0.0, workspace.under, workspace.slope)
-    forces_now(solid, state, workspace, depth, 0.0, deborah, load, -1 if line.periodic else 0)
+    forces_now(solid, state, workspace, depth, 0.0, Drive(deborah, load, -1 if line.periodic else 0))

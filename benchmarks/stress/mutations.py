@@ -1,0 +1,319 @@
+"""Do the tests see a change of the code? ``python -m benchmarks stress mutations [NUMBER] [SEED] [FILE]``.
+
+A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
+place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. Each mutant stands in a copy of
+the checkout and meets the tests that lie nearest to its module by imports, up to `SECONDS` of processor time. What is
+found is appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import math
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+#: Processor time that the tests have for a mutant.
+SECONDS = 100
+USAGE = 4  # exit code of pytest
+#: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
+APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
+
+Change = tuple[str, int, int, str]
+
+ARITHMETIC = {ast.Add: "+-", ast.Sub: "-+", ast.Mult: "*/", ast.Div: "/*"}
+COMPARISONS = {
+    ast.Lt: ("<", "<="),
+    ast.LtE: ("<=", "<"),
+    ast.Gt: (">", ">="),
+    ast.GtE: (">=", ">"),
+    ast.Eq: ("==", "!="),
+    ast.NotEq: ("!=", "=="),
+    ast.In: ("in", "not in"),
+    ast.NotIn: ("not in", "in"),
+    ast.Is: ("is", "is not"),
+    ast.IsNot: ("is not", "is"),
+}
+
+
+class Mutant(NamedTuple):
+    """A change of the bytes of a module: what stood there, and what stands there now."""
+
+    module: str
+    kind: str
+    line: int
+    start: int
+    end: int
+    old: str
+    new: str
+
+
+class Source:
+    """A module as text, and the changes that can be made in it."""
+
+    def __init__(self, module: str, path: Path) -> None:
+        self.module, self.raw = module, path.read_bytes()
+        self.tree = ast.parse(self.raw)
+        self.starts = [0]
+        for line in self.raw.splitlines(keepends=True):
+            self.starts.append(self.starts[-1] + len(line))
+
+    def place(self, node: ast.AST) -> tuple[int, int]:
+        return self.starts[node.lineno - 1] + node.col_offset, self.starts[node.end_lineno - 1] + node.end_col_offset
+
+    def text(self, node: ast.AST) -> str:
+        return self.raw[slice(*self.place(node))].decode()
+
+    def mutants(self) -> list[Mutant]:
+        """Return every change that can be made: beyond annotations, messages and declarations of settings."""
+        left_out = {id(part) for node in ast.walk(self.tree) for part in _parts_left_out(node)}
+        nodes = [node for node in ast.walk(self.tree) if id(node) not in left_out]
+        found = [
+            Mutant(self.module, kind, node.lineno, start, end, self.raw[start:end].decode(), new)
+            for node in nodes
+            for kind, start, end, new in self._changes(node)
+        ]
+        return [mutant for mutant in found if mutant.new != mutant.old]
+
+    def compiles(self, mutant: Mutant) -> bool:
+        try:
+            compile(self.raw[: mutant.start] + mutant.new.encode() + self.raw[mutant.end :], self.module, "exec")
+        except SyntaxError:
+            return False
+        return True
+
+    def _between(self, kind: str, left: ast.AST, right: ast.AST, old: str, new: str) -> Iterator[Change]:
+        start, end = self.place(left)[1], self.place(right)[0]
+        between = self.raw[start:end].decode()
+        if between.count(old) == 1 and "#" not in between:
+            yield kind, start, end, between.replace(old, new)
+
+    def _changes(self, node: ast.AST) -> Iterator[Change]:
+        """Yield kind, place and text of the changes of one node."""
+        if hasattr(node, "end_col_offset"):
+            for changes in (self._of_signs, self._of_conditions, self._of_constants, self._of_statements):
+                yield from changes(node, *self.place(node))
+
+    def _of_signs(self, node: ast.AST, start: int, end: int) -> Iterator[Change]:
+        match node:
+            case ast.BinOp(left, operator, right) if type(operator) in ARITHMETIC:
+                yield from self._between("operator", left, right, *ARITHMETIC[type(operator)])
+            case ast.Compare(left, [comparison], [right]):
+                yield from self._between("comparison", left, right, *COMPARISONS[type(comparison)])
+            case ast.UnaryOp(ast.USub(), operand) if not isinstance(operand, ast.Constant):
+                yield "sign", start, end, self.text(operand)
+
+    def _of_conditions(self, node: ast.AST, start: int, end: int) -> Iterator[Change]:
+        match node:
+            case ast.BoolOp(operator, [first, second]):
+                words = ("and", "or") if isinstance(operator, ast.And) else ("or", "and")
+                yield from self._between("condition", first, second, *words)
+            case ast.UnaryOp(ast.Not(), operand):
+                yield "condition", start, end, f"bool({self.text(operand)})"
+            case ast.If(test) | ast.IfExp(test):
+                yield "condition", *self.place(test), f"(not ({self.text(test)}))"
+
+    def _of_constants(self, node: ast.AST, start: int, end: int) -> Iterator[Change]:
+        match node:
+            case ast.Constant(bool(value)):
+                yield "constant", start, end, str(not value)
+            case ast.Constant(int(value)) if abs(value) < 10**6:
+                yield "off by one", start, end, str(value + 1)
+            case ast.Constant(float(value)):
+                yield "constant", start, end, repr(1.05 * value if value else 0.05)
+                if value and math.log10(abs(value)).is_integer():
+                    yield "unit", start, end, repr(1e3 * value)
+
+    def _of_statements(self, node: ast.AST, start: int, end: int) -> Iterator[Change]:
+        match node:
+            case ast.Call(args=[*_, first, second]) if not isinstance(first, ast.Starred | ast.Constant):
+                (start, middle), (other, end) = self.place(first), self.place(second)
+                between = self.raw[middle:other].decode()
+                yield "swap", start, end, self.text(second) + between + self.text(first)
+            case ast.Expr(value) if not isinstance(value, ast.Constant):
+                yield "statement", start, end, "pass"
+            case ast.AugAssign() | ast.Assign(targets=[ast.Subscript()]) | ast.Continue() | ast.Break():
+                yield "statement", start, end, "pass"
+
+
+def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield all below a node that no test of numbers can see."""
+    match node:
+        case ast.FunctionDef():
+            arguments = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            parts = [*(each.annotation for each in arguments), node.returns, *node.decorator_list]
+        case ast.AnnAssign():
+            parts = [node.annotation]
+        case ast.ClassDef() if node.name.endswith("Settings"):
+            parts = [node]
+        case ast.Raise() | ast.JoinedStr() | ast.Assert():
+            parts = [node]
+        case ast.If(ast.Name("TYPE_CHECKING")):
+            parts = [node]
+        case _:
+            return
+    for part in filter(None, parts):
+        yield from ast.walk(part)
+
+
+class Checkout:
+    """Modules and tests of a checkout, and how far they lie apart."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.modules = {_name(path, root): path for path in sorted((root / "mdr_dask").rglob("*.py"))}
+        self.tests = [path for path in sorted((root / "tests").rglob("test_*.py")) if not APART.search(path.name)]
+
+    @cached_property
+    def leaves(self) -> dict[str, set[str]]:
+        """Modules by the last part of their name: models, figures and fits are loaded by it."""
+        found = defaultdict(set)
+        for module in self.modules:
+            found[module.rpartition(".")[2]].add(module)
+        return found
+
+    def named(self, path: Path) -> set[str]:
+        """Return the modules that a file imports, or names in a text."""
+        found: set[str] = set()
+        for node in ast.walk(ast.parse(path.read_text())):
+            match node:
+                case ast.Import(names):
+                    found |= {each.name for each in names}
+                case ast.ImportFrom(module=str(module)):
+                    found |= {module} | {f"{module}.{each.name}" for each in node.names}
+                    if (path.parent / f"{module}.py").exists() or (self.root / f"tests/{module}.py").exists():
+                        found |= self.named_by_helper(module)
+                case ast.Constant(str(text)):
+                    for word in set(re.findall(r"[\w.]+", text)):
+                        found |= {word} if "." in word else self._loaded(word, path)
+        return found & set(self.modules)
+
+    def named_by_helper(self, name: str) -> set[str]:
+        path = self.root / f"tests/{name}.py"
+        return self.named(path) if path.exists() else set()
+
+    def _loaded(self, word: str, path: Path) -> set[str]:
+        beside = _name(path.parent / "__init__.py", self.root)
+        near = {f"{beside}.{word}", f"mdr_dask.models.{word}", f"mdr_dask.cli.{word}"}
+        return self.leaves.get(word, set()) & near
+
+    @cached_property
+    def users(self) -> dict[str, set[str]]:
+        """Modules that name a module."""
+        found = defaultdict(set)
+        for module, path in self.modules.items():
+            for other in self.named(path) - {module}:
+                found[other].add(module)
+        return found
+
+    @cached_property
+    def named_by(self) -> dict[Path, set[str]]:
+        return {path: self.named(path) for path in self.tests}
+
+    def nearest(self, module: str) -> list[str]:
+        """Return the tests by their distance from a module: those that name it, that name one that names it, ..."""
+        parts = {part.rstrip("s") for part in module.split(".")[1:]}
+        reached, edge, found = {module}, {module}, {}
+        while edge:
+            here = [path for path, names in self.named_by.items() if names & edge]
+            found |= dict.fromkeys(sorted(here, key=lambda path: -sum(part in str(path) for part in parts)))
+            edge = {user for each in edge for user in self.users[each]} - reached
+            reached |= edge
+        return [str(path.relative_to(self.root)) for path in found]
+
+    def forget_kernels(self, module: str) -> None:
+        """Remove the compiled kernels that may hold code of a module."""
+        reached, edge = {module}, {module}
+        while edge := {user for each in edge for user in self.users[each]} - reached:
+            reached |= edge
+        for path in (self.modules[each] for each in reached):
+            for kernel in (path.parent / "__pycache__").glob(f"{path.stem}.*.nb?"):
+                kernel.unlink()
+
+
+def _name(path: Path, root: Path) -> str:
+    return ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
+
+
+def drawn(checkout: Checkout, number: int, seed: int) -> list[Mutant]:
+    """Return mutants: rooms by their lines, kinds evenly."""
+    sources = {module: Source(module, path) for module, path in checkout.modules.items()}
+    rooms: dict[str, dict[str, list[Mutant]]] = defaultdict(lambda: defaultdict(list))
+    lines: dict[str, int] = defaultdict(int)
+    for module, source in sources.items():
+        room = ".".join(module.split(".")[:2])
+        for mutant in source.mutants():
+            rooms[room][mutant.kind].append(mutant)
+        lines[room] += len(source.starts)
+    chance = random.Random(seed)
+    found: dict[Mutant, None] = {}
+    names = [room for room in rooms if rooms[room]]
+    while len(found) < number:
+        kinds = rooms[chance.choices(names, [lines[room] for room in names])[0]]
+        mutant = chance.choice(kinds[chance.choice(sorted(kinds))])
+        if sources[mutant.module].compiles(mutant):
+            found[mutant] = None
+    return list(found)
+
+
+def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
+    """Run tests on a mutant in place; return the verdict, and the first that failed."""
+    path = checkout.modules[mutant.module]
+    before = path.read_bytes()
+    path.write_bytes(before[: mutant.start] + mutant.new.encode() + before[mutant.end :])
+    checkout.forget_kernels(mutant.module)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests],
+            cwd=checkout.root,
+            env={**os.environ, "PYTHONPATH": str(checkout.root), "OPENBLAS_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
+        )
+    finally:
+        path.write_bytes(before)
+        checkout.forget_kernels(mutant.module)
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.M)
+    if done.returncode in (0, -signal.SIGXCPU, -signal.SIGKILL):
+        return "lives" if done.returncode == 0 else "time is up", ""
+    if done.returncode == USAGE:
+        raise RuntimeError(done.stderr)
+    return "killed", failed[1] if failed else done.stdout[-200:]
+
+
+def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> None:
+    log = Path(file).resolve()
+    there = len(log.read_text().splitlines()) if log.exists() else 0
+    with tempfile.TemporaryDirectory(prefix="mutations-") as folder:
+        for part in ("mdr_dask", "tests", "benchmarks", "docs", "campaigns", "pyproject.toml", "README.md"):
+            copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
+            copy(ROOT / part, Path(folder, part))
+        checkout = Checkout(Path(folder))
+        for mutant in drawn(checkout, int(number), int(seed))[there:]:
+            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module))
+            with log.open("a") as lines:
+                lines.write(json.dumps({**mutant._asdict(), "verdict": verdict, "test": test}) + "\n")
+            print(
+                f"{verdict:10s} {mutant.module}:{mutant.line} {mutant.kind}: {mutant.old!r} -> {mutant.new!r}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

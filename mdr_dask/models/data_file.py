@@ -1,0 +1,68 @@
+"""Files that a campaign names."""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
+
+from mdr_dask.errors import DataError
+from mdr_dask.tables import decoded, described
+
+#: Bytes of a file beyond which it is no table to tell of.
+LARGEST_TABLE = 10**7
+
+
+class DataFile(BaseModel):
+    """A file named by a campaign: found when the campaign is read, recognised by its digest when it is used."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+    name: str
+    path: str
+    sha256: str
+
+    def read_bytes(self) -> bytes:
+        """Return the file's content; DataError if it has changed since the campaign was read."""
+        content = Path(self.path).read_bytes()
+        if hashlib.sha256(content).hexdigest() != self.sha256:
+            raise DataError(f"{self.path}: changed since the campaign was read")
+        return content
+
+    def read_text(self) -> str:
+        """Return the file's text.
+
+        Raises
+        ------
+        DataError
+            If the file has changed since the campaign was read, or is no text.
+        """
+        return decoded(self.read_bytes(), self.path)
+
+    def notes(self) -> tuple[str, ...]:
+        """Return columns and ranges of a table, as it has them; nothing of any other file."""
+        return _notes_of_file(self) if Path(self.path).stat().st_size < LARGEST_TABLE else ()
+
+
+@lru_cache(maxsize=64)
+def _notes_of_file(file: DataFile) -> tuple[str, ...]:
+    try:
+        return (f"table {file.name}: {described(file.read_text(), file.name)}",)
+    except DataError:
+        return ()
+
+
+def _find_file(value: Any, info: ValidationInfo) -> Any:
+    if not isinstance(value, str):
+        return value
+    directory = info.context["directory"] if info.context else "."
+    path = Path(directory, value).resolve()
+    if not path.is_file():
+        raise ValueError(f"no such file: {path}")
+    return DataFile(name=value, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+#: A parameter that names a file, relative to the campaign file.
+NamedFile = Annotated[DataFile, BeforeValidator(_find_file, json_schema_input_type=str)]

@@ -1,0 +1,125 @@
+"""Clusters: runs of points of a closed line that reach beyond the film."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.compiling import compiled
+
+
+class Excursions(NamedTuple):
+    """The points of a closed line above some level: all that higher levels need.
+
+    Parameters
+    ----------
+    place : int array, shape (n,)
+        Their numbers on the line, ascending.
+    height : array, shape (n,)
+        Their heights in m.
+    points : int
+        Number of points of the whole line.
+    """
+
+    place: IntArray
+    height: FloatArray
+    points: int
+
+    def above(self, level: float) -> Excursions:
+        """Return those above a higher level."""
+        keep = self.height > level
+        return Excursions(self.place[keep], self.height[keep], self.points)
+
+    def every_second(self) -> Excursions:
+        """Return the excursions of the line made of the even points, for an estimate of the grid's error."""
+        keep = (self.place % 2 == 0) & (self.place < self.points // 2 * 2)
+        return Excursions(self.place[keep] // 2, self.height[keep], self.points // 2)
+
+
+def excursions(line: FloatArray, level: float) -> Excursions:
+    """Return the points of a closed line (heights in m) that lie above a level (m)."""
+    place = np.flatnonzero(line > level)
+    return Excursions(place, line[place], line.size)
+
+
+class Clusters(NamedTuple):
+    """Clusters of overlapping points of a closed line, in the order of their starts.
+
+    Parameters
+    ----------
+    start, length : int array, shape (n,)
+        First point and number of points; a cluster across the seam has ``start + length > points``.
+    total : array, shape (n,)
+        Sum of ``z - h0`` over its points in m.
+    overlap : array, shape (length.sum(),)
+        ``z - h0`` of all points in m, cluster after cluster.
+    limit : float
+        ``s dx^2`` in m: the layer breaks where ``total > limit length^3``.
+    points : int
+        Number of points of the line.
+    """
+
+    start: IntArray
+    length: IntArray
+    total: FloatArray
+    overlap: FloatArray
+    limit: float
+    points: int
+
+    @property
+    def broken(self) -> NDArray[np.bool_]:
+        """Whether each cluster, taken whole, breaks the layer (thesis eq. 5.6)."""
+        return self.total > self.limit * self.length.astype(np.float64) ** 3
+
+
+@compiled
+def _scan(
+    place: IntArray,
+    height: FloatArray,
+    points: int,
+    level: float,
+    start: IntArray,
+    length: IntArray,
+    total: FloatArray,
+    overlap: FloatArray,
+) -> int:
+    """Fill the clusters of excursions in the order of their starts; return their number."""
+    first = 0
+    while first < place.size and (place[first - 1] + 1) % points == place[first]:
+        first += 1
+    count = -1
+    for k in range(place.size):
+        j = (first + k) % place.size
+        if k == 0 or (place[j - 1] + 1) % points != place[j]:
+            count += 1
+            start[count] = place[j]
+            length[count] = 0
+            total[count] = 0.0
+        length[count] += 1
+        overlap[k] = height[j] - level
+        total[count] += overlap[k]
+    return count + 1
+
+
+def find_clusters(above: Excursions, level: float, spacing: float, strength: float) -> Clusters:
+    """Return the clusters at a film thickness.
+
+    Parameters
+    ----------
+    above : Excursions
+        The line's points above some level not higher than `level`.
+    level : float
+        Film thickness h0 in m.
+    spacing : float
+        Distance dx of the points in m.
+    strength : float
+        From `layer_strength`, in 1/m.
+    """
+    place, height, points = above.above(level)
+    start, length = np.empty(place.size, np.int64), np.empty(place.size, np.int64)
+    total, overlap = np.empty(place.size), np.empty(place.size)
+    n = _scan(place, height, points, level, start, length, total, overlap)
+    return Clusters(start[:n], length[:n], total[:n], overlap, strength * spacing**2, points)

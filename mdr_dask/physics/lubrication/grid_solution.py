@@ -1,0 +1,92 @@
+"""The film of a line contact on one grid, and what is read from it between the nodes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.lubrication.deformation import film as film_at
+
+#: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
+_SPIKE = 0.01
+#: Positions between two cells at which the lowest film is looked for.
+_SUBDIVISION = 41
+
+
+class GridSolution(NamedTuple):
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, and the steps taken.
+
+    Between two nodes the pressure is straight and the film sags; :meth:`film_between` goes through the nodes instead.
+    """
+
+    nodes: FloatArray
+    pressure: FloatArray
+    film: FloatArray
+    central: float
+    steps: int
+
+    def film_between(self, positions: FloatArray) -> FloatArray:
+        """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
+        film = _cubic(self.nodes, self.film, positions)
+        behind = positions > self.nodes[-1]
+        film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
+        return np.where(positions < self.nodes[0], np.nan, film)
+
+    def pressure_between(self, positions: FloatArray) -> FloatArray:
+        """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
+        inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
+        return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
+
+    @property
+    def central_film(self) -> float:
+        """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
+        return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
+
+    @property
+    def minimum(self) -> tuple[float, float]:
+        """Position and height of the lowest film, between the nodes around the lowest one."""
+        i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
+        positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
+        heights = _cubic(self.nodes, self.film, positions)
+        k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
+        left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
+        if not right > left:
+            return float(positions[k]), float(heights[k])
+        offset = -(left + right) / (2 * (right - left))  # the vertex of a parabola
+        width = positions[1] - positions[0]
+        return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
+
+    @property
+    def spike(self) -> tuple[float, float]:
+        """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
+        P = self.pressure
+        peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
+        if peaks.size < 2:
+            return float("nan"), float("nan")
+        last = peaks[-1]
+        if P[last] - P[peaks[-2] : last].min() < _SPIKE * P.max():
+            return float("nan"), float("nan")
+        return float(self.nodes[last]), float(P[last])
+
+    @property
+    def rupture(self) -> float:
+        """Where the film ends, from the pressure's last two positive values: it goes out like a square."""
+        last = int(np.flatnonzero(self.pressure)[-1])
+        (x1, x2), (P1, P2) = self.nodes[last - 1 : last + 1], self.pressure[last - 1 : last + 1]
+        ratio = np.sqrt(P1 / P2)
+        end = (ratio * x2 - x1) / (ratio - 1) if ratio > 1 else np.inf
+        return float(min(end, self.nodes[min(last + 1, self.nodes.size - 1)]))
+
+
+def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the cubic through the two nodes before and the two behind each position (Lagrange)."""
+    first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
+    x = nodes[first[:, None] + np.arange(4)]
+    total = np.zeros(positions.size)
+    for k in range(4):
+        others = [m for m in range(4) if m != k]
+        weight = np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
+        total += weight * values[first + k]
+    return total
