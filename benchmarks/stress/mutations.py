@@ -2,8 +2,8 @@
 
 A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
 place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. Each mutant stands in a copy of
-the checkout and meets the tests that lie nearest to its module by imports, up to `SECONDS` of processor time. What is
-found is appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
+the checkout and meets the files of tests that lie nearest to its module by imports. What is found is appended to FILE,
+a line of JSON each; a run that is broken off goes on where it was.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
-#: Processor time that the tests have for a mutant.
-SECONDS = 100
+#: Files of tests that a mutant meets, and the processor time that they have.
+FILES, SECONDS = 10, 60
 USAGE = 4  # exit code of pytest
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
@@ -320,7 +320,7 @@ def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> 
             copy(ROOT / part, Path(folder, part))
         checkout = Checkout(Path(folder))
         for mutant in drawn(checkout, int(number), int(seed))[there:]:
-            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module))
+            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module)[:FILES])
             with log.open("a") as lines:
                 lines.write(json.dumps({**mutant._asdict(), "verdict": verdict, "test": test}) + "\n")
             print(
