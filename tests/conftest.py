@@ -9,6 +9,11 @@ hypothesis.settings.register_profile("search", deadline=None)
 hypothesis.settings.load_profile("repeatable")
 
 
+def pytest_collection_modifyitems(items):
+    """What waits or takes long begins first: other workers have the cores meanwhile, and none is idle in the end."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
 @pytest.fixture(autouse=True, scope="session")
 def disk_is_not_waited_for():
     """Stores of tests need not outlive a loss of power; that blocks are flushed has a test of its own."""

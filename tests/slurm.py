@@ -84,7 +84,7 @@ class Slurm:
         self._daemon("munged", "--force", "--num-threads=1", *options)
         self._daemon("slurmctld", "-f", conf)
         self._daemon("slurmd", "-f", conf)
-        self._until(lambda: "idle" in self.call("sinfo", "-h", "-o", "%T"), 60)
+        self._until(lambda: "idle" in self.call("sinfo", "-h", "-o", "%T"), 300)
 
     def stop(self) -> None:
         for file in ("slurmd.pid", "slurmctld.pid", "munge/pid"):
@@ -93,10 +93,10 @@ class Slurm:
 
     def _daemon(self, name: str, *arguments: str) -> None:
         path = shutil.which(name, path="/usr/sbin:/usr/bin")
-        subprocess.run([path, *arguments], check=True, env=self.environment, timeout=60, capture_output=True)
+        subprocess.run([path, *arguments], check=True, env=self.environment, timeout=300, capture_output=True)
 
     def call(self, *command: str) -> str:
-        done = subprocess.run(command, env=self.environment, timeout=60, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, env=self.environment, timeout=300, capture_output=True, text=True, check=False)
         return done.stdout
 
     def _until(self, true, seconds: float) -> None:

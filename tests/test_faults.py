@@ -74,7 +74,7 @@ def two_series(campaign, positions=(1.0, 2.0)):
 
 def adaptive(toy):
     axis = toy.axis("noise", [0.01, 0.4])
-    return toy.campaign(axis, realisations=Replication(3, 9, {"height": Tolerance(relative=0.05)}))
+    return toy.campaign(axis, realisations=Replication(3, 6, {"height": Tolerance(relative=0.05)}))
 
 
 #: Steps of a study by name, each a list of campaigns run one after the other, the last one with faults.

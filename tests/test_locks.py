@@ -78,7 +78,8 @@ def test_of_many_that_want_a_study_at_once_one_gets_it(bucket):
         try:
             with store.lock(bucket) as hold:
                 held.append(hold)
-                time.sleep(0.5)
+                while len(held) + len(refused) < 8:  # nobody comes late, however busy the machine is
+                    time.sleep(0.01)
         except StoreBusyError as error:
             refused.append(str(error))
 
@@ -92,10 +93,10 @@ def test_of_many_that_want_a_study_at_once_one_gets_it(bucket):
 
 def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, bucket, monkeypatch, caplog):
     monkeypatch.setattr(locks, "BEAT", 0.05)
-    monkeypatch.setattr(locks, "SILENCE", 0.4)
+    monkeypatch.setattr(locks, "SILENCE", 2.0)
     caplog.set_level(logging.WARNING)
     run(small(toy), bucket)
-    gone = {"owner": "a" * 32, "who": "process 1 on node7", "time": time.time() - 1.0}
+    gone = {"owner": "a" * 32, "who": "process 1 on node7", "time": time.time() - 3.0}
     files.write_bytes(bucket, ".claims/alone/000004.json", json.dumps(gone).encode())
     with store.lock(bucket) as hold:
         assert hold.claim == 5
@@ -105,7 +106,7 @@ def test_a_silent_claim_is_taken_over_and_its_owner_writes_nothing_more(toy, buc
             store.holding(bucket, Hold("", "a" * 32, 4)),
         ):
             pass
-        time.sleep(0.6)  # longer than anybody may be silent: it is the signs of life that keep it
+        time.sleep(2.2)  # longer than anybody may be silent: it is the signs of life that keep it
         with pytest.raises(StoreBusyError, match="is running on this store"), store.lock(bucket):
             pass
 

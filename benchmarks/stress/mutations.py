@@ -16,6 +16,7 @@ import random
 import re
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -27,7 +28,8 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 #: Processor time that the tests have for a mutant.
-SECONDS = 150
+SECONDS = 100
+USAGE = 4  # exit code of pytest
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
 
@@ -276,7 +278,7 @@ def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, s
     checkout.forget_kernels(mutant.module)
     try:
         done = subprocess.run(
-            [sys.executable, "-P", "-m", "pytest", "-xqn0", "-p", "no:cacheprovider", "--tb=line", *tests],
+            [sys.executable, "-P", "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests],
             cwd=checkout.root,
             env={**os.environ, "PYTHONPATH": str(checkout.root), "OPENBLAS_NUM_THREADS": "1"},
             capture_output=True,
@@ -288,9 +290,11 @@ def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, s
         path.write_bytes(before)
         checkout.forget_kernels(mutant.module)
     failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.M)
-    return {0: "lives", 1: "killed"}.get(done.returncode, "killed" if failed else "time is up"), failed[
-        1
-    ] if failed else ""
+    if done.returncode in (0, -signal.SIGXCPU, -signal.SIGKILL):
+        return "lives" if done.returncode == 0 else "time is up", ""
+    if done.returncode == USAGE:
+        raise RuntimeError(done.stderr)
+    return "killed", failed[1] if failed else done.stdout[-200:]
 
 
 def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> None:

@@ -6,6 +6,7 @@ import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -185,9 +186,14 @@ def _attrs(unit: str | None, long_name: str) -> dict[str, Any]:
     return {"units": unit, "long_name": long_name} if unit else {"long_name": long_name}
 
 
+@cache
+def _packages() -> dict[str, str]:
+    """Return the versions of the packages that a store names: looked up once, which takes as long as laying out."""
+    return {name: version(name) for name in ("numpy", "scipy", "numba", "dask", "zarr", "xarray")}
+
+
 def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[str, Any]:
     now = datetime.now(UTC).isoformat(timespec="seconds")
-    packages = ("numpy", "scipy", "numba", "dask", "zarr", "xarray")
     what = "grown" if "history" in earlier else "laid out"
     history = [*earlier.get("history", []), f"{now} {what} on {platform.node()}"]
     return {
@@ -203,7 +209,7 @@ def _study_attributes(campaign: Campaign, earlier: Mapping[str, Any]) -> dict[st
         "source": Path(campaign.source).name,
         "host": platform.node(),
         "python": platform.python_version(),
-        "versions": {"mdr_dask": __version__, **{name: version(name) for name in packages}},
+        "versions": {"mdr_dask": __version__, **_packages()},
         "created": earlier.get("created", now),
         "history": history,
     }

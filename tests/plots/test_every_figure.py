@@ -20,9 +20,9 @@ from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import available, curves, page, style
 
-V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 11]}\n"
+V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 8]}\n"
 FEW_V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 8]}\n"
-F = "  normal_force: {geometric: [1 mN, 100 N, 10]}\n"
+F = "  normal_force: {geometric: [1 mN, 100 N, 8]}\n"
 OPERATION = (
     "  normal_force: [200 N, 800 N]\n  rotation_speed: {geometric: [10 rpm, 1000 rpm, 4]}\n"
     "  temperature: [40 degC, 60 degC]\n"
@@ -52,7 +52,6 @@ SHAPES = {"wear_development", "wear_profiles", "wear_growth"}
 
 #: Shape of a study: model and parameters, what is special, and the figures that it can hold.
 TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
-    "hurst, force, velocity": (planted.SLIDING + F + V + "  hurst: {linear: [0.2, 0.8, 3]}\n", {}, LAWS),
     "force, velocity": (planted.SLIDING + F + V, {}, LAWS),
     "velocity": (planted.SLIDING + V + "  normal_force: 1 N\n", {}, {"regions", "velocity", "plateau", "collapse"}),
     "force, velocity, roughness": (
@@ -213,7 +212,8 @@ def stores(tmp_path_factory):
     def of(shape):
         if shape not in made:
             text, special, _ = TABLE[shape]
-            made[shape] = planted.make(tmp_path_factory.mktemp("store"), text, **special)
+            groups = planted.make(tmp_path_factory.mktemp("store"), text, **special)
+            made[shape] = {series: data.load() for series, data in groups.items()}
         return made[shape]
 
     return of
