@@ -7,6 +7,7 @@ from collections import Counter
 from concurrent import futures
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import numpy as np
@@ -114,6 +115,46 @@ def test_blocks_go_out_together_that_would_drown_the_scheduler_one_by_one(monkey
 
     assert workers.take(refill)[0] == ("first block",)
     assert (rooms, workers.together) == ([2 * threads + 1], together)
+
+
+SILENT = {
+    "no worker yet": ({}, {}),
+    "all workers are gone": ({"first": 1}, {}),
+    "no answer of the scheduler yet": ({"first": 1}, None),
+}
+
+
+@pytest.mark.parametrize("what", SILENT)
+def test_within_five_seconds_a_user_is_told_what_is_waited_for_and_within_the_limit_it_ends(monkeypatch, what):
+    clock, told, central = SimpleNamespace(now=0.0), [], Central()
+    monkeypatch.setattr(crew, "time", SimpleNamespace(monotonic=lambda: clock.now))
+
+    def answer(*_, callback_timeout):
+        if central.threads is None:
+            clock.now += callback_timeout
+            raise TimeoutError
+        return central.threads
+
+    central.sync = answer
+    central.threads, after = SILENT[what]
+    workers = crew.Crew(central, lambda event: told.append((clock.now, event.sentence)), 30.0, 0, lambda: None, str)
+    workers.look()
+    central.threads = after
+
+    def look_on():
+        while True:
+            clock.now += crew.LOOK
+            workers.look()
+
+    with pytest.raises(ClusterError, match=r"for \d+ s; what is in the store is kept: run the campaign again"):
+        look_on()
+    assert told[0][0] <= 5
+    assert told[0][1].startswith(f"{what}, waiting for ")
+    assert told[0][1].endswith("; giving up after 30 s")
+    assert clock.now <= 35
+    central.status = "closed"
+    with pytest.raises(ClusterError, match="the scheduler went away; what is in the store is kept"):
+        workers.look()
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 A model that sleeps, so that a machine of two cores can stand for many. A scheduler, a process that holds all workers
 (each with its own connection on the loopback) and the driver are processes of their own. Efficiency is the time slept
 over workers x time on the wall. Processor time of driver and scheduler for each block says where they saturate, however
-busy the machine is. At last the same study of sliding friction on two threads and on two processes, in turns.
+busy the machine is.
 """
 
 from __future__ import annotations
@@ -28,8 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 import toy
 
 from benchmarks.measures import print_table
-from mdr_dask.campaign import loads
-from mdr_dask.execute import Progress, Resources, run
+from mdr_dask.execute import Resources, run
 from mdr_dask.models.base import Block, Result
 
 TESTS = Path(__file__).parents[2] / "tests"
@@ -37,21 +36,6 @@ TESTS = Path(__file__).parents[2] / "tests"
 STRAGGLER = 20
 #: Seconds between two workers that go away, where workers are lost.
 LOSS = 0.5
-FRICTION = """
-name: turns
-model: sliding_friction
-seed: 1
-realisations: 40
-parameters:
-  length: 20 mm
-  points: 2000
-  hurst: 0.7
-  rms_roughness: 0.5 um
-  shear_modulus: 10 MPa
-  relaxation_time: 1 ms
-  normal_force: [0.1 N, 1.5 N, 20 N]
-  velocity: {geometric: [0.1 mm/s, 100 m/s, 25]}
-"""
 
 
 @dataclass(frozen=True)
@@ -147,29 +131,6 @@ def measure(setting: Setting, folder: Path) -> tuple[str, ...]:
     return (*map(str, what), f"{efficiency:.0%}", f"{driver:.1f} ms", f"{central:.1f} ms", f"{worker:.1f} ms")
 
 
-def turns(folder: Path, count: int = 3) -> None:
-    """Run a study on two threads and on two processes in turns; print time on the wall and the ratio."""
-    study = loads(FRICTION, "turns.yaml", ".")
-    run(study, str(folder / "warm.zarr"), Resources(threads=2), lambda _: None)
-    walls: dict[str, list[float]] = {"threads": [], "workers": []}
-    computing: dict[str, list[float]] = {"threads": [], "workers": []}
-    for turn in range(count):
-        for kind in walls:
-            states: list[tuple[float, Progress]] = []
-            resources = Resources(**{kind: 2})
-            run(
-                study,
-                str(folder / f"{kind}{turn}.zarr"),
-                resources,
-                lambda p, kept=states: kept.append((time.monotonic(), p)),
-            )
-            walls[kind].append(states[-1][0] - states[0][0])
-            computing[kind].append(states[-1][1].compute_seconds - states[-1][1].compile_seconds)
-    rows = [(f"two {kind}", f"{min(walls[kind]):.2f} s", f"{min(computing[kind]):.2f} s") for kind in walls]
-    print_table(("on", "wall, best turn", "in the model, both"), rows)
-    print(f"\nprocesses / threads: {min(walls['workers']) / min(walls['threads']):.3f} on the wall")
-
-
 def main(*workers: int) -> None:
     head = ("trouble", "workers", "a block", "blocks", "wall", "efficiency", "driver", "scheduler", "workers, a block")
     memory = Path("/dev/shm")  # a disk that others use would be measured instead
@@ -186,8 +147,6 @@ def main(*workers: int) -> None:
             print(*rows[-1], sep=" | ", flush=True)
         print()
         print_table(head, rows)
-        print()
-        turns(folder)
 
 
 if __name__ == "__main__":

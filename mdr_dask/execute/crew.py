@@ -25,7 +25,7 @@ LOOK = 1.0
 #: Seconds after which a user is told that there is no worker, and between two such words.
 SILENCE = 3.0
 #: Seconds that a scheduler is given for a short answer.
-ANSWER = 5.0
+ANSWER = 3.0
 #: Tasks that a scheduler is given in a second: half of what it can take.
 PACE = 80
 #: Most blocks of a task.

@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
 
 
 class Factors(NamedTuple):
@@ -33,7 +33,7 @@ def factorise(matrix: FloatArray) -> Factors | None:
     return Factors(triangles, pivots) if status == 0 and np.all(np.isfinite(diagonal)) else None
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def solve_in_place(matrix: FloatArray, right: FloatArray) -> bool:
     """Solve matrix @ x = right by elimination with row pivots; `right` becomes x, `matrix` is spent.
 

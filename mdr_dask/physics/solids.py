@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, kernel
 
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant, J / (mol K)."""
@@ -354,7 +354,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     return Recovery(zeros, stretch, amplitude)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
     """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
     total, rate = 1.0, 0.0
@@ -365,7 +365,7 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
     return total, rate
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the times lambda_k of free recovery, the zeros of 1 + sum weight_m / (tau_m - lambda).
 
@@ -398,7 +398,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     return zeros, distance
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
     """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
     high = np.log(gap)

@@ -12,11 +12,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.lubrication.clusters import Clusters
 
 #: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
@@ -71,7 +70,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, value: int) -> None
     jumps[end] -= value
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _add_parts(
     overlap: FloatArray, limit: float, window: int, start: int, always: bool, judged: bool, jumps: NDArray[np.int32]
 ) -> None:
@@ -99,7 +98,7 @@ def _add_parts(
             _block(jumps, start + n - j, 1, j)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _collect(
     start: IntArray,
     length: IntArray,

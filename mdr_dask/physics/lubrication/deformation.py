@@ -8,10 +8,9 @@ from __future__ import annotations
 from math import log, pi
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 
 
 @compiled
@@ -35,7 +34,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
     row[-1] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def influence_matrix(points: FloatArray, nodes: FloatArray) -> FloatArray:
     """Return the matrix that turns nodal pressures into deformations relative to that of ``X = 0``.
 
@@ -62,7 +61,7 @@ def influence_matrix(points: FloatArray, nodes: FloatArray) -> FloatArray:
     return matrix
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
     """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points (thesis eq. B.19).
 

@@ -15,11 +15,10 @@ from math import exp
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
@@ -111,7 +110,7 @@ def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
     return liquid.alpha * liquid.pole / liquid.exponent * (power * ratio - 1.0), liquid.alpha * power
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
     result = np.empty_like(pressure)
@@ -237,7 +236,7 @@ def _fill_active(
     return count
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _fill_equations(
     grid: Grid,
     P: FloatArray,
@@ -270,7 +269,7 @@ def _fill_equations(
     A[count, count] = 0.0
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
     """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
     for i in range(P.size):
@@ -280,7 +279,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
         H[i] = total
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
@@ -294,7 +293,7 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
     return share
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _take_step(
     grid: Grid, pace: Pace, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
 ) -> tuple[int, float]:

@@ -11,10 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, kernel
 
 ITERATIONS = 200
 COARSENING = 8
@@ -37,7 +37,7 @@ U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
     """Go on by one node: return u, its derivative by the depth, and the drag times 1 - lambda."""
     free = decay * u
@@ -47,7 +47,7 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
     return now, 1.0 if touches else decay * fade, (now - free) * t
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     """Return what is known of every block, shape (n // BLOCK, KNOWN)."""
     blocks = np.empty((height.size // BLOCK, KNOWN))
@@ -70,7 +70,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     return blocks
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _pass_block(
     block: FloatArray,
     last: float,
@@ -104,7 +104,7 @@ def _pass_block(
     return queued
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
     """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4
@@ -131,7 +131,7 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
             workspace[LOSS, k] += x0
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _walk_some(
     height: FloatArray,
     rise: FloatArray,
@@ -160,7 +160,7 @@ def _walk_some(
         sums[DRAG, k] += near[LOSS, q]
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _sweep(
     height: FloatArray,
     rise: FloatArray,
@@ -210,7 +210,7 @@ def _sweep(
     _walk_some(height[first:], rise[first:], decay, depth, workspace, sums, queue[: depth.size], near)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _newton(
     height: FloatArray,
     rise: FloatArray,
@@ -264,7 +264,7 @@ def _newton(
             return
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def contact(
     height: FloatArray,
     periodic: bool,

@@ -12,9 +12,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, inlined, kernel
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
@@ -44,7 +44,7 @@ def blocks_of(cells: Cells) -> Blocks:
     return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def write_barriers(
     height: FloatArray,
     enter: FloatArray,
@@ -72,7 +72,7 @@ def write_barriers(
     block_barriers[block] = every
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
     if x > 1 / 32:
@@ -80,7 +80,7 @@ def _decayed(x: float) -> float:
     return x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5 * (1 - x / 6 * (1 - x / 7))))))
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return where w + deborah w' falls through 0 first between start and 1, or `NONE`."""
     # the force is a cubic itself, cut into its monotone pieces
@@ -102,7 +102,7 @@ def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: floa
     return NONE
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
     """Return the root of a cubic that falls monotonously from low to high."""
     x = low + (high - low) * 0.5
@@ -120,7 +120,7 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
     return x
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _touching(
     w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, high: float
 ) -> float:
@@ -143,7 +143,7 @@ def _touching(
     return x
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _touch(
     w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, stop: float
 ) -> float:
@@ -165,7 +165,7 @@ def _touch(
     return NONE
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
     """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
@@ -180,7 +180,7 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
     return half * (2 * w0 + area / 9), half * stretch / 9
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
 
@@ -192,7 +192,7 @@ def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float
     return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / deborah + slope)
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inlined
 def _flown_over(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
@@ -210,7 +210,7 @@ def _flown_over(
     return i, free
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def sweep_cells(
     cells: Cells,
     every: Blocks,
@@ -338,7 +338,7 @@ def sweep_cells(
     return patches + 1
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def patches_at(
     cells: Cells,
     every: Blocks,

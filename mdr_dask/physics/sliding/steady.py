@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.kelvin import (
@@ -86,21 +86,27 @@ def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
     return good
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _floor(depth: float) -> float:
     """Return the lattice depth at or below a positive depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.floor(math.ldexp(mantissa, LATTICE_BITS)), exponent - LATTICE_BITS)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _next(depth: float) -> float:
     """Return the lattice depth above one."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.ldexp(mantissa, LATTICE_BITS) + 1, exponent - LATTICE_BITS)
 
 
-@njit(nogil=True, cache=True)
+@inlined
+def _begin(trail: FloatArray, depth: float, load: float) -> None:
+    """Begin a `trail` where nothing but a depth for a load is known."""
+    trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), 0.7, 0.0
+
+
+@compiled
 def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
     """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before."""
     carried = sums[DISPLACEMENT]
@@ -110,7 +116,7 @@ def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
     trail[0], trail[1], trail[2], trail[3] = np.log(depth), load, slope, bend
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _guess(trail: FloatArray, load: float) -> float:
     """Extrapolate log depth over log load to a load."""
     ahead = np.log(load) - trail[1]
@@ -119,7 +125,7 @@ def _guess(trail: FloatArray, load: float) -> float:
     return math.exp(trail[0] + ahead * (trail[2] + min(max(bend, -limit), limit)))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _solve(
     cells: Cells,
     blocks: Blocks,
@@ -148,13 +154,13 @@ def _solve(
         _follow(sums, depth, trail)
         if carried <= load:
             low = depth
-            best[:] = sums
+            copy_into(best, sums)
             if tangent < _next(depth):
                 return depth, True
         else:
             high = depth
         if low > 0 and _next(low) >= high:
-            sums[:] = best
+            copy_into(sums, best)
             return low, True
         proposal = min(_guess(trail, load), tangent) if carried <= load else _guess(trail, load)
         if iteration > PATIENCE and high < np.inf:
@@ -168,7 +174,7 @@ def _solve(
     return depth, False
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _states(
     cells: Cells,
     blocks: Blocks,
@@ -188,16 +194,16 @@ def _states(
     barriers, block_barriers = np.empty(n), np.empty(n // BLOCK + 1)
     sums, trail, first, unwritten = np.empty(SUMS), np.zeros(4), np.zeros(4), np.empty(0)
     deborah = -1.0
-    first[:] = math.log(loads[0] / n), math.log(loads[0]), 0.7, 0.0
+    _begin(first, loads[0] / n, loads[0])
     for k in range(loads.size):
         starts = deborahs[k] != deborah
         if starts:
             deborah = deborahs[k]
             block_barriers[:] = np.nan
-            trail[:] = first
+            copy_into(trail, first)
         depth, converged = guesses[k], False
         if guesses[k] > 0:
-            trail[:] = math.log(guesses[k]), math.log(loads[k]), 0.7, 0.0
+            _begin(trail, guesses[k], loads[k])
             if close > 0:
                 sweep_cells(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
@@ -205,10 +211,10 @@ def _states(
             depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
         if not converged:
             status[k] = Outcome.DEPTH_NOT_FOUND
-            trail[:] = first
+            copy_into(trail, first)
             continue
         if starts:
-            first[:] = trail
+            copy_into(first, trail)
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]

@@ -11,12 +11,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, IN_A_TILE, Nodes, nodes, summit_rise, weights
+from mdr_dask.physics.sliding.nodes import (
+    AFTER,
+    BEFORE,
+    BLOCK,
+    IN_A_TILE,
+    NO_ENDS,
+    Nodes,
+    ends_of,
+    nodes,
+    summit_rise,
+    weights,
+)
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
@@ -92,7 +103,7 @@ class Sampled:
         return Steady(drag, depth, fraction, slope, status)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _solve(
     line: Nodes,
     weights: FloatArray,
@@ -101,7 +112,6 @@ def _solve(
     loads: FloatArray,
     near_step: float,
     trusted: float,
-    settings: Settings,
     depths: FloatArray,
     rates: FloatArray,
     results: FloatArray,
@@ -130,7 +140,7 @@ def _solve(
     """
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    workspace, tile = np.zeros(ROWS * LANES), np.empty((IN_A_TILE, cells + 3))
+    workspace, tile = np.empty(ROWS * LANES), np.empty((IN_A_TILE, cells + 3))
     queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
     last_step, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
     for begin in range(0, loads.size, LANES):
@@ -140,37 +150,39 @@ def _solve(
             last_step[k], last[k] = np.nan, np.nan
             load_case(workspace, k, depths[begin + k] - rise, deborah[begin + k] * n, cells)
             results[begin + k] = np.nan
-        for _ in range(settings.iterations):
+        for _ in range(SETTINGS.iterations):
             if count == 0:
                 break
             sweep(line, weights, tile, workspace, queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]
-                depth = workspace[DEPTH * LANES + k] + rise
-                step = (loads[case] * n - workspace[LOAD * LANES + k]) / workspace[RATE * LANES + k]
+                depth = workspace[DEPTH + k] + rise
+                step = (loads[case] * n - workspace[LOAD + k]) / workspace[RATE + k]
                 size = abs(step) / depth
-                length, stretch = workspace[LENGTH * LANES + k], workspace[STRETCH * LANES + k]
-                now[DRAG], now[FRACTION] = workspace[LOSS * LANES + k], length / n
+                length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
+                now[DRAG], now[FRACTION] = workspace[LOSS + k], length / n
                 now[SLOPE] = n * math.sqrt(stretch / length) if length > 0 else 0.0
                 for j in range(SECANTS):
                     rate[j] = (1 - last[k, j] / now[j]) / last_step[k]
                     rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
-                    if size < settings.exact_step and not math.isfinite(rate[j]):
+                    if size < SETTINGS.exact_step and not math.isfinite(rate[j]):
                         rate[j] = 0.0
-                doubt = settings.doubted * abs(rate[DRAG] * step)
+                doubt = SETTINGS.doubted * abs(rate[DRAG] * step)
                 if size <= near_step and doubt <= trusted and closed(workspace, k):
-                    depths[case], rates[case] = depth + step, rate
+                    depths[case] = depth + step
+                    copy_into(rates[case], rate)
                     for j in range(SECANTS):
                         results[case, j] = now[j] * (1 + rate[j] * step)
-                        results[case, DOUBTS + j] = settings.doubted * abs(rate[j] * step) + settings.rounding
-                    results[case, DOUBT_OF_DEPTH] = (settings.doubted_rate + 0.5 * size) * abs(
+                        results[case, DOUBTS + j] = SETTINGS.doubted * abs(rate[j] * step) + SETTINGS.rounding
+                    results[case, DOUBT_OF_DEPTH] = (SETTINGS.doubted_rate + 0.5 * size) * abs(
                         step
-                    ) + settings.rounding * depth
+                    ) + SETTINGS.rounding * depth
                     continue
                 ahead = depth + step if step > -0.7 * depth else 0.3 * depth
-                last_step[kept], last[kept], lanes[kept] = ahead - depth, now, case
-                load_case(workspace, kept, ahead - rise, workspace[DEBORAH * LANES + k], cells)
+                last_step[kept], lanes[kept] = ahead - depth, case
+                copy_into(last[kept], now)
+                load_case(workspace, kept, ahead - rise, workspace[DEBORAH + k], cells)
                 kept += 1
             count = kept
 
@@ -197,11 +209,11 @@ def begin(
     rates = np.full((loads.size, SECANTS), np.nan)
     highest, cases = int(np.argmax(height)), (deborah, loads)
     for stride in reversed(strides):
-        line = nodes(height, slope, highest, stride, stride == strides[0])
-        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, SETTINGS, depths, rates, results)
+        line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
+        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, depths, rates, results)
     coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
-    line = nodes(height, slope, (cell + 1) % height.size, 1, True)
+    line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
     return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, rates, trusted)
 
 
@@ -249,7 +261,7 @@ def _settled(
     top, results = line.top + rise, np.empty((depths.size, RESULTS))
     depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
     bounds = SETTINGS.answer_step, trusted
-    _solve(line, weights(refinement), rise, *cases, *bounds, SETTINGS, depths, rates, results)
+    _solve(line, weights(refinement), rise, *cases, *bounds, depths, rates, results)
     return _sampled(top, depths, rates, results)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, kernel
 from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
@@ -35,7 +35,7 @@ class Swept(NamedTuple):
     solid: Travelling
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
@@ -62,7 +62,7 @@ def follow(
     depth, glass = direction[arms], 1.0 + moduli.sum()
     stretch, modes, integral = workspace[0], workspace[1], workspace[2]
     product[:] = 0.0
-    stretch[:] = direction[:arms]
+    copy_into(stretch, direction[:arms])
     for piece in range(pieces):
         if piece % 2 == 1:
             product[arms] += depth * lengths[piece]
@@ -85,7 +85,7 @@ def follow(
                 stretch[m] += depth - strain
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
     if stretch.size == 0:
@@ -100,7 +100,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
     stretch[0] = -balance / moduli[0]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
     """Return what modes lose in every flight and arms in every contact, shape (pieces, arms)."""
     decayed = np.empty((lengths.size, deborah.size))
@@ -127,7 +127,7 @@ class Krylov(NamedTuple):
     workspace: FloatArray
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def newton_step(
     residual: FloatArray,
     scale: FloatArray,
@@ -177,7 +177,7 @@ def newton_step(
         step += right[i] * basis[i]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
     """Take the earlier rows out of row j + 1, twice against rounding, and leave the coefficients in column j."""
     column = basis[j + 1]
@@ -193,7 +193,7 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
         column /= norm
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
     """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]
@@ -208,7 +208,7 @@ def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pra
     right[j] *= cosine[j]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
     """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0): Newton, falling from above."""
     depth = 0.0
@@ -231,7 +231,7 @@ def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: n
     return depth
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def solve_sliding(
     profile: FloatArray,
     strain_area: float,
@@ -277,7 +277,8 @@ def solve_sliding(
     residual, scale, step, product = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
     triangle, rotations = np.empty((size + 1, size)), np.empty((3, size + 1))
     krylov = Krylov(np.empty((size + 1, size)), triangle, rotations, workspace)
-    scale[:arms] = -deborah * np.expm1(-(nodes - 1) / deborah)
+    for m in range(arms):
+        scale[m] = -deborah[m] * np.expm1(-(nodes - 1) / deborah[m])
     steepest = 0.0
     for i in range(nodes - 1):
         steepest = max(steepest, abs(profile[i + 1] - profile[i]))
@@ -290,7 +291,9 @@ def solve_sliding(
         found = lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
-            residual[:arms], residual[arms] = -imbalance, strain_area - totals[0]
+            for m in range(arms):
+                residual[m] = -imbalance[m]
+            residual[arms] = strain_area - totals[0]
             scale[arms] = totals[3]
             newton_step(residual, scale, swept, krylov, step)
         else:

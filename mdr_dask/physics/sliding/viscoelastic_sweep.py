@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
 
 CLOSED, OPEN_END = 0, 1
 
@@ -41,7 +41,7 @@ SURFACE_LAYER = 1e-7
 """Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
     """Fill a matrix times a vector; the matrix is given by its columns, which the compiler can add as vectors."""
     product[:] = 0.0
@@ -51,7 +51,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
             product[m] += columns[k, m] * factor
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
@@ -69,7 +69,7 @@ def step_factors(
             area[m] = deborah[m] * (length - gain[m])
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
@@ -82,7 +82,7 @@ def _pressure_inside(
     return pressure, rate
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def leaving_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
@@ -104,7 +104,7 @@ def leaving_point(
     return point
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def touching_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
@@ -127,7 +127,7 @@ def touching_point(
     return point
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
     strain, rate = 0.0, 0.0
     for k in range(times.size):
@@ -137,7 +137,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
     return strain, rate
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _fly(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
@@ -167,7 +167,7 @@ def _fly(
     return -1.0
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def sweep_arms(
     penetration: FloatArray,
     start: FloatArray,
@@ -244,7 +244,7 @@ def sweep_arms(
         flying = True
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _contact(
     begin: float,
     penetration: FloatArray,
@@ -302,7 +302,7 @@ def _contact(
     return place, strain, pressure, left
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
@@ -314,7 +314,7 @@ def _stretch(
     return pressure
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _into_flight(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
@@ -330,7 +330,7 @@ def _into_flight(
         multiply(amplitude_of, e, modes)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _add_flight(
     length: float,
     modes: FloatArray,

@@ -15,10 +15,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, fused, inlined
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -41,16 +41,13 @@ LANES = 64  # cases that go along the line together
 SMALL, LARGE = 1e-300, 1e12
 CLOSED = 1e-9  # relative difference of the displacement before and after a turn
 
-# What a sweep holds of a case, in this order: its state, sums, and what does not change
-U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(8)
-DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN = range(8, 14)
-CALM = 14
 ROWS = 15
+# Where what a sweep holds of its cases begins, in this order: their state, sums, and what does not change
+U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
+DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 
-_inlined = njit(nogil=True, cache=True, error_model="numpy", forceinline=True, fastmath={"contract", "nsz"})
 
-
-@njit(nogil=True, cache=True, inline="always")
+@fused
 def _fading(time: float) -> float:
     """Return exp(-time), to 1e-4 up to 1 and small where it is small."""
     y = time * 0.125
@@ -72,7 +69,7 @@ class Cell(NamedTuple):
     s1: float
 
 
-@_inlined
+@fused
 def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     """Return a case in cell i of a tile."""
     h0, h1, s0, s1 = tile[HEIGHT, i + 1], tile[HEIGHT, i + 2], tile[SLOPE, i + 1], tile[SLOPE, i + 2]
@@ -80,19 +77,19 @@ def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     return Cell(depth + h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, depth + h1, s1)
 
 
-@_inlined
+@fused
 def _at(cell: Cell, x: float) -> float:
     """Return w at a place."""
     return cell.w0 + x * (cell.s0 + x * (cell.a + x * cell.b))
 
 
-@_inlined
+@fused
 def _tilt(cell: Cell, x: float) -> float:
     """Return w' at a place."""
     return cell.s0 + x * (2 * cell.a + x * 3 * cell.b)
 
 
-@_inlined
+@fused
 def _leaves(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
@@ -113,7 +110,7 @@ def _leaves(
     return x, crest, _fading((1 - x) * inverse)
 
 
-@_inlined
+@fused
 def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return where the gap closes before a place where it is known to be, and what is left of u there.
 
@@ -133,7 +130,7 @@ def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float)
     return root + step, waited * max(1 - step * inverse, 0.0)
 
 
-@_inlined
+@fused
 def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple[bool, float, float, float, float]:
     """Return whether an element in flight meets the line in a cell, and where that piece of contact ends.
 
@@ -154,13 +151,13 @@ def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple
     return gap < 0, stop, crest, held, gap
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Take a case over the cells of a tile."""
-    d, r = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k]
-    decay, inverse = workspace[DECAY * LANES + k], workspace[INVERSE * LANES + k]
-    u, fade = workspace[U * LANES + k], workspace[FADE * LANES + k]
-    contact = workspace[CONTACT * LANES + k] > 0
+    d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
+    decay, inverse = workspace[DECAY + k], workspace[INVERSE + k]
+    u, fade = workspace[U + k], workspace[FADE + k]
+    contact = workspace[CONTACT + k] > 0
     load, rate, loss, length, stretch = 0.0, 0.0, 0.0, 0.0, 0.0
     flown, flown_rate, flown_loss = 0.0, 0.0, 0.0
     i = 0
@@ -209,16 +206,16 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
         loss += 0.5 * (u * u * forgets * (1 + keeps) + w_stop * w_stop * loses * (1 + held))
         u, fade = w_stop * held, held
     lost = 1 - decay
-    workspace[U * LANES + k], workspace[FADE * LANES + k] = u, fade
-    workspace[CONTACT * LANES + k] = 1.0 if contact else 0.0
-    workspace[LOAD * LANES + k] += load + r * lost * flown
-    workspace[RATE * LANES + k] += rate + r * lost * flown_rate
-    workspace[LOSS * LANES + k] += loss + r * stretch + 0.5 * lost * (1 + decay) * flown_loss
-    workspace[LENGTH * LANES + k] += length
-    workspace[STRETCH * LANES + k] += stretch
+    workspace[U + k], workspace[FADE + k] = u, fade
+    workspace[CONTACT + k] = 1.0 if contact else 0.0
+    workspace[LOAD + k] += load + r * lost * flown
+    workspace[RATE + k] += rate + r * lost * flown_rate
+    workspace[LOSS + k] += loss + r * stretch + 0.5 * lost * (1 + decay) * flown_loss
+    workspace[LENGTH + k] += length
+    workspace[STRETCH + k] += stretch
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
@@ -227,35 +224,35 @@ def _pass_block(
     steepest /= refinement
     cells, heights, squares = BLOCK * refinement, block[HEIGHTS] * refinement, block[SQUARES] / refinement
     for k in range(count):
-        d, r, was = workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k], workspace[CONTACT * LANES + k] > 0
-        u, fade, through = workspace[U * LANES + k], workspace[FADE * LANES + k], workspace[THROUGH * LANES + k]
+        d, r, was = workspace[DEPTH + k], workspace[DEBORAH + k], workspace[CONTACT + k] > 0
+        u, fade, through = workspace[U + k], workspace[FADE + k], workspace[THROUGH + k]
         kept, lost = u * through, 1 - through
         memory = r * lost
         flies = (not was) & (peak + d <= kept)
         stays = was & (lowest + d + r * steepest > 0)
-        load, rate, loss = workspace[LOAD * LANES + k], workspace[RATE * LANES + k], workspace[LOSS * LANES + k]
-        length, stretch = workspace[LENGTH * LANES + k], workspace[STRETCH * LANES + k]
+        load, rate, loss = workspace[LOAD + k], workspace[RATE + k], workspace[LOSS + k]
+        length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
         flown_load = load + u * memory if flies else load
         flown_rate = rate + fade * memory if flies else rate
         flown_loss = loss + 0.5 * u * u * lost * (1 + through) if flies else loss
         kept = kept if kept > SMALL else 0.0
         flown, faded = kept if flies else u, fade * through if flies else fade
-        workspace[LOAD * LANES + k] = load + (heights + cells * d) if stays else flown_load
-        workspace[RATE * LANES + k] = rate + cells if stays else flown_rate
-        workspace[LOSS * LANES + k] = loss + r * squares if stays else flown_loss
-        workspace[LENGTH * LANES + k] = length + cells if stays else length
-        workspace[STRETCH * LANES + k] = stretch + squares if stays else stretch
-        workspace[U * LANES + k] = last + d if stays else flown
-        workspace[FADE * LANES + k] = 1.0 if stays else faded
-        workspace[CALM * LANES + k] = 1.0 if stays | flies else 0.0
+        workspace[LOAD + k] = load + (heights + cells * d) if stays else flown_load
+        workspace[RATE + k] = rate + cells if stays else flown_rate
+        workspace[LOSS + k] = loss + r * squares if stays else flown_loss
+        workspace[LENGTH + k] = length + cells if stays else length
+        workspace[STRETCH + k] = stretch + squares if stays else stretch
+        workspace[U + k] = last + d if stays else flown
+        workspace[FADE + k] = 1.0 if stays else faded
+        workspace[CALM + k] = 1.0 if stays | flies else 0.0
     queued = 0
     for k in range(count):
         queue[queued] = k
-        queued += 0 if workspace[CALM * LANES + k] > 0 else 1
+        queued += 0 if workspace[CALM + k] > 0 else 1
     return queued
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def sweep(
     line: Nodes,
     weights: FloatArray,
@@ -273,13 +270,13 @@ def sweep(
     # the summit, where every case touches, lies in the cell before the first one
     for k in range(count):
         queue[k] = k
-        w = workspace[DEPTH * LANES + k] + line.height[BEFORE - 1]
-        force = w + workspace[DEBORAH * LANES + k] / refinement * line.slope[BEFORE - 1]
-        workspace[U * LANES + k], workspace[FADE * LANES + k] = max(w, 0.0), 1.0
-        workspace[CONTACT * LANES + k] = 1.0 if w > 0 and force > 0 else 0.0
+        w = workspace[DEPTH + k] + line.height[BEFORE - 1]
+        force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
+        workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
+        workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
     _walk_some(tile, fill(line, BEFORE - 1, 1, weights, tile), workspace, queue, count)
-    workspace[BEGAN * LANES : CALM * LANES] = workspace[U * LANES : FADE * LANES]
-    workspace[LOAD * LANES : DEPTH * LANES] = 0.0
+    copy_into(workspace[BEGAN:CALM], workspace[U:FADE])
+    workspace[LOAD:DEPTH] = 0.0
     for j in range(blocks.shape[0]):
         first, end = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
         queued = _pass_block(blocks[j], line.height[end], refinement, workspace, count, queue)
@@ -291,23 +288,23 @@ def sweep(
     _walk_some(tile, fill(line, BEFORE + first, n - first, weights, tile), workspace, queue, count)
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def _walk_some(tile: FloatArray, cells: int, workspace: FloatArray, queue: NDArray[np.int64], queued: int) -> None:
     """Take the cases of a queue over the cells of a tile."""
     for q in range(queued):
         _walk(tile, cells, workspace, queue[q])
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write what does not change of a case on a grid."""
-    workspace[DEPTH * LANES + k], workspace[DEBORAH * LANES + k] = depth, deborah
-    workspace[INVERSE * LANES + k] = min(1 / deborah, LARGE)
-    workspace[DECAY * LANES + k], workspace[THROUGH * LANES + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
+    workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
+    workspace[INVERSE + k] = min(1 / deborah, LARGE)
+    workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inlined
 def closed(workspace: FloatArray, k: int) -> bool:
     """Return whether a case ended its turn as it began it: not so where the first cell is not touched."""
-    same: bool = abs(workspace[U * LANES + k] - workspace[BEGAN * LANES + k]) <= CLOSED * workspace[U * LANES + k]
+    same: bool = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
     return same

@@ -11,9 +11,9 @@ from math import erf, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.superposition.least_squares import (
     DEGREE,
     Knots,
@@ -82,7 +82,7 @@ class Steps(NamedTuple):
     common: Common
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no cover
     """Return the trace of the squared second differences times the inverse of a factorised band.
 
@@ -102,7 +102,7 @@ def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  # pragma: no cover
     """Return what the border adds to the trace of the penalties times the inverse, after `solve_border`.
 
@@ -122,8 +122,8 @@ def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  #
             inner[k, other] += weight * np.sum(bent[k] * bent[other])
     found, column = 0.0, np.empty(unknowns)
     for j in range(unknowns):
-        column[:] = inner[:, j]
         for i in range(unknowns):
+            column[i] = inner[i, j]
             for k in range(i):
                 column[i] -= border[i, k] * column[k]
             column[i] /= border[i, i]
@@ -135,7 +135,7 @@ def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  #
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def likelihoods(
     points: Points, ways: FloatArray, step: float, weight: float, variance: float, rises: FloatArray
 ) -> FloatArray:  # pragma: no cover
@@ -174,7 +174,7 @@ def likelihoods(
     return found
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _given(
     places: FloatArray, shares: FloatArray, window: FloatArray, means: FloatArray, scatters: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
@@ -233,7 +233,7 @@ def _averaged(scan: Scan, problem: ShiftProblem, powers: FloatArray) -> Steps:
     return Steps(mean, own, (apart * share.ravel()) @ apart.T, told, common)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@kernel
 def _smoothing(points: Points, shifts: Shifts, grid: Knots, usual: float, variance: float) -> float:  # pragma: no cover
     """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)

@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # a position in a cell that is not there
@@ -117,7 +117,7 @@ class Cells(NamedTuple):
     periodic: bool
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inlined
 def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i, by rising power."""
     first, last = enter[i], leave[i]
@@ -125,7 +125,7 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     return height[i], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def summit(a: float, b: float, c: float) -> float:
     """Return where between 0 and 1 a cubic has its maximum, or `NONE`."""
     discriminant = b * b - 3 * a * c
@@ -136,7 +136,7 @@ def summit(a: float, b: float, c: float) -> float:
     return place if 0 < place < 1 else NONE
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
     """Return the highest point of every cell, and the cell and place of the highest of all."""
     peaks = np.empty(enter.size)
@@ -177,18 +177,18 @@ def running(integrals: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(integrals)])
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _closed(array: FloatArray, first: int) -> FloatArray:
     """Return an array turned to begin at a place, with that place once more at the end."""
     n = array.size
     turned = np.empty(n + 1)
-    turned[: n - first] = array[first:]
-    turned[n - first : n] = array[:first]
+    copy_into(turned[: n - first], array[first:])
+    copy_into(turned[n - first : n], array[:first])
     turned[n] = turned[0]
     return turned
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _integrals(nodes: FloatArray, enter: FloatArray, leave: FloatArray, top: float) -> tuple[FloatArray, FloatArray]:
     """Return the integrals over every cell of the height, from the top, and of the slope squared."""
     mean, stretch = np.empty(enter.size), np.empty(enter.size)
@@ -199,7 +199,7 @@ def _integrals(nodes: FloatArray, enter: FloatArray, leave: FloatArray, top: flo
     return mean, stretch
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
     """Return the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
 
@@ -219,7 +219,7 @@ def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
     return summed
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
     """Return the cell of the highest point of a periodic line of cubic cells, the place in it, 0..1, and the height.
 
@@ -228,8 +228,10 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, fl
     height, slope : array, shape (n,)
         Heights and derivatives by position over the length of the line.
     """
-    n = height.size
-    best, best_place, highest, node, rise = 0, 0.0, -np.inf, np.max(height), STEEPEST_RISE / n
+    n, node = height.size, -np.inf
+    for i in range(n):
+        node = max(node, height[i])
+    best, best_place, highest, rise = 0, 0.0, -np.inf, STEEPEST_RISE / n
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
         after = height[following]

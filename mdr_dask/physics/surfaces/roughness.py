@@ -6,10 +6,10 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
@@ -99,7 +99,7 @@ def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return pairs
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _turn(share: FloatArray, factors: FloatArray) -> None:
     """Write cosine and sine of shares 0..1 of a turn, to rounding: series about the nearest quarter, vectorised."""
     for k in range(share.size):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
@@ -145,7 +145,7 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
     return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, outcome)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
     """Return the displacements with which elements leave patches."""
     pressed = np.empty(end.size)
@@ -154,7 +154,7 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
     return pressed
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:

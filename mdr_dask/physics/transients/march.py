@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
 from mdr_dask.physics.transients.free_flight import Instant
@@ -142,7 +141,7 @@ def _weights(found: Trajectory, now: int) -> tuple[float, float]:
     return 2 / taken, -2 * found.depth[0] / taken - found.rate[0]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three.
 
@@ -196,7 +195,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
     return now, Outcome.CONVERGED
 
 
-@njit(nogil=True, cache=True)
+@compiled
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
     """March through given moments along depths that are nearly right, by one step of Newton for each.
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
@@ -347,7 +347,7 @@ class _Relaxation(NamedTuple):
         return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _reachable(track: Track, slowest: Patches, high: float) -> Reachable:
     """Return where elements can be in contact up to a depth, from the steady state at the least depth and speed."""
     floor = np.empty(track.height.size)

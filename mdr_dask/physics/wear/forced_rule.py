@@ -14,9 +14,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled, kernel
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.rules import THESIS_XI, limit_radius
@@ -112,15 +112,15 @@ def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tu
     return step, stages, load
 
 
-@njit(nogil=True, cache=True)
-def _rate(y):  # type: ignore[no-untyped-def]
+@compiled
+def _rate(y: float) -> float:
     if y >= 1.0:
         return 1.0 - y
     return max(y, 0.0) * (1.0 - y)
 
 
-@njit(nogil=True, cache=True)
-def _growth(y, weights):  # type: ignore[no-untyped-def]
+@compiled
+def _growth(y: FloatArray, weights: FloatArray) -> float:
     total = 0.0
     for k in range(y.size):
         if y[k] < 1.0:
@@ -128,8 +128,8 @@ def _growth(y, weights):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(nogil=True, cache=True)
-def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
+@kernel
+def _advance(y: FloatArray, weights: FloatArray, step: float, stages: FloatArray) -> None:
     """Advance y at the places by the classical Runge-Kutta rule; keep the four rates of the depth of every step."""
     middle, slopes = np.empty_like(y), np.empty((4, y.size))
     for number in range(stages.shape[0]):
@@ -147,8 +147,8 @@ def _advance(y, weights, step, stages):  # type: ignore[no-untyped-def]
         s[4] = step / 6.0 * (s[0] + 2.0 * (s[1] + s[2]) + s[3])
 
 
-@njit(nogil=True, cache=True)
-def _follow(stages, step, y):  # type: ignore[no-untyped-def]
+@compiled
+def _follow(stages: FloatArray, step: float, y: FloatArray) -> None:
     """Advance y at any places under the depths found."""
     for number in range(stages.shape[0]):
         s = stages[number]

@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, periodic_line
 from mdr_dask.physics.transients.elements.edges import Edges, under_elements
@@ -166,7 +166,7 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
     return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _orbit(
     solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, turns: int
 ) -> tuple[bool, float]:
@@ -186,18 +186,18 @@ def _orbit(
     u, touching = max(w0, 0.0), w0 > 0
     free = 0.0
     for _ in range(turns if line.periodic else 1):
-        last[:] = arms[0]
+        copy_into(last, arms[0])
         before = u
         for cell in range(n):
             i = (top + cell) % n
             if not touching:
                 free = u
-                free_arms[0, :] = arms[0]
+                copy_into(free_arms[0], arms[0])
             if i % every == 0:
                 j = i // every
                 state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                state.arms[j, :] = arms[0]
-                state.free_arms[j, :] = free_arms[0]
+                copy_into(state.arms[j], arms[0])
+                copy_into(state.free_arms[j], free_arms[0])
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             part, leaves = 0.0, u
             if touching:

@@ -10,11 +10,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, kernel
 from mdr_dask.physics.solids import recovery_times
 
 
@@ -86,7 +85,7 @@ class Scratch(NamedTuple):
     arms: FloatArray
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def scratch_for(solid: Foundation) -> Scratch:
     """Return the workspace of one element."""
     modes, arms = solid.rates.size, solid.times.size

@@ -8,10 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
@@ -174,7 +173,7 @@ class StepWorkspace(NamedTuple):
     scratch: Scratch
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     rows = np.empty((11, n))
     return StepWorkspace(
@@ -333,7 +332,7 @@ def forces_now(
     return depth + more, rate, drag, length
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def follow_elements(
     solid: Foundation,
     line: CubicLine,
@@ -355,8 +354,8 @@ def follow_elements(
     for now in range(moments.size):
         if now > 0:
             time = moments[now] - moments[now - 1]
-            workspace.old_under[:] = workspace.under
-            workspace.old_slope[:] = workspace.slope
+            copy_into(workspace.old_under, workspace.under)
+            copy_into(workspace.old_slope, workspace.slope)
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
@@ -380,7 +379,7 @@ def follow_elements(
     return Outcome.CONVERGED
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)

@@ -1,0 +1,1 @@
+"""Benchmarks of kernels against the roofs of the processor they run on."""
