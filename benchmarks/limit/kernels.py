@@ -155,7 +155,7 @@ def search_after_jump() -> Work:
     from mdr_dask.physics.transients.contact_search import touch
     from mdr_dask.physics.transients.ends import PreparedLine, ends_on
     from mdr_dask.physics.transients.free_flight import Instant
-    from mdr_dask.physics.transients.march import Finish, march
+    from mdr_dask.physics.transients.march import Finish, march_depth
     from mdr_dask.physics.transients.patches import History
 
     line, loads, deborah = PreparedLine.of(periodic_line(*_nodes(4))), np.array([0.3]), np.array([[0.02, 0.024]])
@@ -164,7 +164,7 @@ def search_after_jump() -> Work:
     case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, course)
     marching, found, work = case.begun(next(case.limits(case.depth)), 3000)
     finish = Finish(case.depth[1], case.after, 1e-3 * abs(case.depth[1] - case.depth[0]), 1e-3)
-    now = march(marching, case.pace, finish, found, work)[0] // 2
+    now = march_depth(marching, case.pace, finish, found, work)[0] // 2
     history = History(found.time, found.depth, found.rate, now + 1, 1.0)
     time = float(found.time[now])
     moment = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
@@ -173,12 +173,12 @@ def search_after_jump() -> Work:
 
 def elements() -> Work:
     """A Kelvin foundation of two elements for every Nyquist point, sixty-four steps at one speed."""
-    from mdr_dask.physics.transients.elements.follow import closed_nodes, follow_line, steady_start
+    from mdr_dask.physics.transients.elements.follow import follow_line, steady_start
     from mdr_dask.physics.transients.elements.foundation import KELVIN
     from mdr_dask.physics.transients.elements.steps import Schedule
 
     height, slope = _nodes(2)
-    line, steps = closed_nodes(height, slope), 64
+    line, steps = periodic_line(height, slope), 64
     state, depth, _ = steady_start(line, KELVIN, 0.0, 0.3)
     moments, one = np.arange(steps + 1) / height.size / 0.1, np.ones(steps + 1)
     schedule = Schedule(moments, 0.1 * moments, 0.1 * one, 0.3 * one)
@@ -251,13 +251,14 @@ def film_factors() -> Work:
 def breakthrough() -> Work:
     """Clusters of a line and the contact points of every window."""
     from mdr_dask.physics.lubrication import breakthrough as layers
+    from mdr_dask.physics.lubrication import clusters
 
     line = 0.2e-6 * _nodes(2)[0]
     strength = float(layers.layer_strength(1e6, 115.385e9, 5e-9))
-    above = layers.excursions(line, 2e-7)
+    above = clusters.excursions(line, 2e-7)
 
     def call() -> object:
-        return layers.contact_points(layers.find_clusters(above, 2e-7, 3e-7, strength), 47)
+        return layers.contact_points(clusters.find_clusters(above, 2e-7, 3e-7, strength), 47)
 
     return Work(call, line.size)
 
