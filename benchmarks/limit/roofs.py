@@ -16,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 
+from benchmarks.limit import operations
 from benchmarks.limit.kernels import KERNELS, Kernel, Work
 from benchmarks.limit.machine import roofs
 from benchmarks.measures import print_table, timed
@@ -25,7 +26,8 @@ NUMBER = 8  # bytes
 
 def counts(part: str) -> dict[str, dict[str, float]]:
     """Return the operations of every kernel for each unit, counted in another process."""
-    code = f"from benchmarks.limit.roofs import count; count({part!r})"
+    first = "from benchmarks.limit import operations; operations.count_kernels()"
+    code = f"{first}; from benchmarks.limit.roofs import count; count({part!r})"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     found: dict[str, dict[str, float]] = json.loads(done.stdout)
@@ -33,10 +35,7 @@ def counts(part: str) -> dict[str, dict[str, float]]:
 
 
 def count(part: str) -> None:
-    """Print the operations of every kernel for each unit; in a process without compiling."""
-    from benchmarks.limit import operations
-
-    operations.count_kernels()
+    """Print the operations of every kernel for each unit; in a process that counts them."""
     found = {}
     for kernel in KERNELS:
         if part not in kernel.name:
