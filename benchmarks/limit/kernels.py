@@ -34,18 +34,12 @@ class Kernel(NamedTuple):
         Returns its `Work`.
     is_wide : bool
         Whether its loops are vector instructions.
-    branches : float
-        Wrong guesses of branches for each unit that the case itself asks for: what an element does next is random.
-    chain : dict of str and float
-        Operations for each unit that wait for one another.
     """
 
     name: str
     unit: str
     prepare: Callable[[], Work]
     is_wide: bool = False
-    branches: float = 0.0
-    chain: dict[str, float] = {}  # noqa: RUF012
 
 
 def _nodes(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
@@ -248,15 +242,6 @@ def film_equations() -> Work:
     return Work(lambda: _fill_equations(*fixed), A.size)
 
 
-def film_factors() -> Work:
-    """Their triangular factors, by LAPACK."""
-    from mdr_dask.physics.linear import factorise
-
-    matrix = np.random.default_rng(0).random((300, 300))
-    flops = matrix.shape[0] ** 3 / 3
-    return Work(lambda: factorise(matrix.copy()), flops, {"add": flops, "multiply": flops})
-
-
 def breakthrough() -> Work:
     """Clusters of a line and the contact points of every window."""
     from mdr_dask.physics.lubrication import breakthrough as layers
@@ -315,7 +300,6 @@ KERNELS = (
     Kernel("exact wear: memory", "node", exact_wear),
     Kernel("film: balance", "node", film_balance),
     Kernel("film: equations", "entry", film_equations, is_wide=True),
-    Kernel("film: factors", "n^3 / 3", film_factors, is_wide=True),
     Kernel("breakthrough", "point", breakthrough),
     Kernel("phase factors", "wave", phase_factors, is_wide=True),
     Kernel("line from waves", "node", fourier_line, is_wide=True),

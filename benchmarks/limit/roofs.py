@@ -3,7 +3,7 @@
 Operations are counted by running each kernel as plain Python with every operation counted, in a process of its own.
 The roof of a kernel is the time of its busiest part: additions and comparisons, multiplications, divisions and roots,
 or loads and stores, each at the measured throughput, of vector instructions where its loops are such; elementary
-functions come on top. Where operations wait for one another, or the case makes branches random, that is a roof too.
+functions come on top.
 
     python -m benchmarks limit roofs [PART OF A NAME]
 """
@@ -62,8 +62,6 @@ def roof(kernel: Kernel, work: Mapping[str, float], machine: Mapping[str, float]
         "products": spent("multiply") + functions,
         "quotients": spent("divide") + spent("root") + functions,
         "bytes": NUMBER * (work.get("load", 0.0) + work.get("store", 0.0)) * machine["byte in cache"],
-        "one after the other": sum(number * machine[name] for name, number in kernel.chain.items()),
-        "branches": kernel.branches * machine["wrong guess of a branch"],
     }
     what = max(bounds, key=lambda name: bounds[name])
     return bounds[what], what
