@@ -105,21 +105,33 @@ def place(x: FloatArray, stack: FloatArray) -> FloatArray:
     x, stack
         As for `highest`.
     """
+    x, stack = _joined(x, stack)
     whole = np.linspace(x[0], x[-1], 20 * PLACES)
     curve = _curve(x, stack[:1], whole)[0]
     top, high = int(np.argmax(curve)), np.flatnonzero(curve > UPPER * curve.max())
-    if curve[[0, -1]].max() > (1 - FLAT) * curve[top]:
+    if curve[top] <= 0 or curve[[0, -1]].max() > (1 - FLAT) * curve[top]:
         return np.full(len(stack), np.inf if curve[-1] > curve[0] else -np.inf)
     parts = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
     first, last = next((part[0], part[-1]) for part in parts if part[0] <= top <= part[-1])
     near = np.linspace(whole[first], whole[last], PLACES)
-    rows = np.log(np.maximum(_curve(x, stack, near), np.finfo(float).tiny))
+    known = np.isfinite(stack).all(axis=1)  # one realisation has no resamples
+    rows = np.log(np.maximum(_curve(x, stack[known], near), np.finfo(float).tiny))
     own = float(np.clip(whole[top], near[0], near[-1]))
-    places = _maximum(near, rows, 3, own)
+    places = np.full(len(stack), np.nan)
+    places[known] = _maximum(near, rows, 3, own)
+    if np.isinf(places[0]):
+        return places
     other = float(_maximum(near, rows[:1], 4, own)[0])
     shape = abs(other - places[0]) if np.isfinite(other) else np.ptp(near) / 2
     found: FloatArray = np.concatenate([places, places[0] + shape * np.array([1.0, -1.0])])
     return found
+
+
+def _joined(x: FloatArray, stack: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a stack with the mean of what lies at the same place: v tau of other v and other tau."""
+    places, group = np.unique(np.round(x, 9), return_inverse=True)
+    member = np.equal.outer(group, np.arange(places.size)).astype(np.float64)
+    return places, stack @ (member / member.sum(axis=0))
 
 
 def _maximum(near: FloatArray, rows: FloatArray, degree: int, own: float) -> FloatArray:

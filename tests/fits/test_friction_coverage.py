@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from mdr_dask.fits import top
 from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
@@ -120,6 +121,9 @@ def test_the_velocity_of_the_top_does_not_depend_on_where_the_velocities_lie():
         places.append(float(FIT["plateau"].compute({"": data})["plateau_velocity"].item()))
     assert max(places) / min(places) < 1.03
     assert places[0] == pytest.approx(velocity_of_top(skew), rel=0.03)
+    x = np.log(np.geomspace(1e-2, 1e4, 19))
+    twice, curve = np.repeat(x, 2), skew(None, np.exp(x))[None]  # v tau of other v and other tau
+    np.testing.assert_allclose(top.place(twice, np.repeat(curve, 2, axis=1)), top.place(x, curve), rtol=1e-9)
 
 
 PLANE = {"normal_force": np.geomspace(0.3, 30, 4) * G * RMS * LENGTH, "velocity": np.geomspace(1e-6, 1e-2, 7)}
