@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models
-from mdr_dask.campaign import Axis, Campaign, Series
+from mdr_dask.campaign import Axis, Campaign, Series, measured
 from mdr_dask.errors import CampaignError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, replaced
 
@@ -33,8 +33,6 @@ REPEATED_WORK = 1.15
 RECORDS_TOGETHER = 1000
 #: Largest chunk of one array.
 CHUNK_BYTES = 64 * 2**20
-#: Most values of an axis that are asked for notes.
-NOTED = 64
 #: More cases than this are a mistake in the file, not a study.
 MOST_CASES = 10**9
 
@@ -96,7 +94,7 @@ class Template:
     def notes(self) -> tuple[str, ...]:
         """What parts and model say of the parameters, each sentence once, every axis by itself."""
         base = self.series.parameters
-        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in _noted(axis))]
+        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         told = [note for parameters in sets for note in notes_of(parameters)]
         return tuple(dict.fromkeys((*told, *models.load(self.campaign.model).notes(sets))))
 
@@ -180,12 +178,6 @@ class Template:
             start = round(position * (size - chunks[dim]))
             region[dim] = slice(start, start + chunks[dim])
         return self._block(region)
-
-
-def _noted(axis: Axis) -> list[Any]:
-    """Return some values of an axis, the first and the last among them."""
-    places = np.linspace(0, len(axis.values) - 1, min(len(axis.values), NOTED)).round().astype(int)
-    return [axis.values[place] for place in places]
 
 
 def _numbers(tree: Mapping[str, Any]) -> int:
@@ -393,7 +385,7 @@ def estimate(campaign: Campaign) -> Estimate:
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
         files=1 + sum(part.files for part in parts),
-        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
         compiling=model.compiling,
         growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),
     )

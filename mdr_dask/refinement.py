@@ -33,6 +33,8 @@ WORSE = 3.0
 FINEST = 2.0**-10
 #: Fewest values that are interpolated.
 FEWEST = 3
+#: Spaces beside the top on each side that are no wider than the narrowest of them, or than this part of the interval.
+BESIDE, NARROW = 2, 2.0**-4
 
 
 @dataclass(frozen=True)
@@ -248,10 +250,28 @@ def _spaces(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Spa
             lines = means[name].at(place)
             missed = _missed(_places(refinement, shares), _lines(lines, number), tolerance)
             excess = np.maximum(excess, missed)
+        if excess.max(initial=0.0) <= 1.0:
+            tops = (_beside_tops(shares, _lines(means[name].at(place), number)) for name in refinement.until)
+            excess = 2.0 * np.logical_or.reduce(list(tops))
         width = np.diff(shares)
         for k in np.flatnonzero(excess > 1.0):
             if not np.any((width >= width[k]) & (width > FINEST) & (excess > WORSE * excess[k])):
                 yield _Space(case, float(shares[k] + shares[k + 1]) / 2, float(width[k]), float(excess[k]))
+
+
+def _beside_tops(shares: FloatArray, lines: Mean) -> BoolArray:
+    """Return which spaces are halved for the sake of where the largest value lies, once interpolation is good enough.
+
+    It is known as well as the widest space beside it allows. A top at an end of the axis lies beyond it.
+    """
+    width = np.diff(shares)
+    wide = np.zeros(width.size, dtype=bool)
+    for line in np.nan_to_num(lines.groups[0], nan=-np.inf):
+        top = int(np.argmax(line))
+        if 0 < top < line.size - 1:
+            near = np.arange(max(top - BESIDE, 0), min(top + BESIDE, width.size))
+            wide[near] |= width[near] > max(width[near].min(), NARROW)
+    return wide
 
 
 def _places(refinement: Refinement, shares: FloatArray) -> FloatArray:

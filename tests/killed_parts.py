@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import random
 import time
 from contextlib import suppress
@@ -27,7 +28,8 @@ def study(blocks: int):
     return replace(toy.campaign(axis), blocks={"position": 1})
 
 
-def run_part(url: str, part: Part, blocks: int, pause: float) -> None:
+def run_part(url: str, part: Part, blocks: int, pause: float, server: dict[str, str]) -> None:
+    os.environ.update(server)
     toy.install(pause)
     assert "toy" in models.NAMES
     if files.local(url) is None:
@@ -43,9 +45,10 @@ def run_part(url: str, part: Part, blocks: int, pause: float) -> None:
 def run_with_kills(url: str, parts: int, kills: int, blocks: int, pause: float, seed: int = 1) -> int:
     """Start all parts at once, kill one after the other and start it again; return how many kills hit one at work."""
     chance = random.Random(seed)
+    server = {name: value for name, value in os.environ.items() if name.startswith("AWS_")}
 
     def start(number: int):
-        process = PROCESSES.Process(target=run_part, args=(url, Part(number, parts), blocks, pause))
+        process = PROCESSES.Process(target=run_part, args=(url, Part(number, parts), blocks, pause, server))
         process.start()
         return process
 

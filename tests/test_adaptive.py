@@ -76,6 +76,17 @@ def test_what_jumps_or_bends_ends_and_starves_no_other_curve(study, url, shape, 
     assert ("misses its tolerance" in last.sentence) == (shape == "jump")
 
 
+def test_the_spaces_beside_a_top_are_alike(study, url):
+    """Where the top lies is known as well as the widest space beside it allows, down to a 16th of the axis."""
+    run(study("shape: bump, shift: [-0.6, 0.9]", AXIS.replace("1 %", "30 %")), url)
+    x, curves_ = means(url)
+    for curve in curves_:
+        known = np.isfinite(curve)
+        place, top = np.log10(x[known]), int(np.argmax(curve[known]))
+        near = np.diff(place)[max(top - 2, 0) : top + 2]
+        assert near.max() <= max(near.min(), 6 / 16) * (1 + 1e-9)
+
+
 def test_scatter_is_not_chased(study, url):
     run(study("shape: flat, noise: 0.05", more="realisations: 10"), url)
     assert means(url)[0].size <= 12

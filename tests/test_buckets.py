@@ -12,13 +12,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from killed_parts import run_with_kills, study
 from test_execute import run
 from test_locks import small
 
 from mdr_dask import execute, store
 from mdr_dask.cli import main
 from mdr_dask.errors import StoreBusyError, StoreError
-from mdr_dask.execute import Resources
+from mdr_dask.execute import Part, Resources
 from mdr_dask.store import files, locks
 
 moto = pytest.importorskip("moto.server")
@@ -219,6 +220,18 @@ def test_a_runner_that_is_killed_is_taken_over_when_it_is_silent(toy, bucket, ur
     assert progress.kept > 0
     assert progress.kept + progress.done == 80
     assert f"sign of life of process {first.pid}" in caplog.text
+    assert chunks(bucket) == chunks(url)
+    assert store.verify(bucket).findings == []
+
+
+def test_parts_in_a_bucket_are_kept_apart_and_may_be_killed(toy, bucket, url):
+    with store.beside(bucket, Part(1, 2)), store.beside(bucket, Part(2, 2)):
+        assert store.at_work(bucket) == (None, [Part(1, 2), Part(2, 2)])
+        with pytest.raises(StoreBusyError, match="part 1/2 is running on this store"):
+            execute.run(study(12), bucket, Resources(threads=1), lambda _: None, part=Part(1, 2))
+    assert run_with_kills(bucket, parts=2, kills=1, blocks=12, pause=0.05) == 1
+    assert run(study(12), bucket).done == 0
+    run(study(12), url)
     assert chunks(bucket) == chunks(url)
     assert store.verify(bucket).findings == []
 

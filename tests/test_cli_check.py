@@ -170,3 +170,26 @@ def test_sizes_are_for_people(size, told):
 )
 def test_even_spacing_is_named(values, told):
     assert spacing(values) == told
+
+
+def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("rig.csv").write_text(
+        "# of a rig\nvelocity [mm/s], relaxation_times, friction_coefficient, standard_error\n"
+        "1, 0.01, 0.3, 0.01\n20, 1, 0.2, 0.01\n1, 100, 0.2, 0.01\n"
+    )
+    Path("rig.yaml").write_text(
+        "name: rig\nmodel: velocity_jump\nmeasured: {table: rig.csv}\nparameters:\n"
+        "  {length: 5 mm, rms_roughness: 1 um, normal_force: 1 N, velocity: [1 mm/s, 10 mm/s],\n"
+        "   material: {kelvin: {shear_modulus: 1 MPa, relaxation_time: [1 ms, 2 ms]}}}\n"
+    )
+    assert main(["check", "rig.yaml"]) == 0
+    told = capsys.readouterr().out
+    for line in (
+        "measured rig.csv: 3 rows of friction_coefficient, standard_error",
+        "measured rig.csv: conditions velocity 1 mm/s to 20 mm/s, relaxation_times 0.01 to 100",
+        "measured rig.csv: unknowns material_kelvin_relaxation_time",
+        "measured rig.csv: outside the study, and refused by the fit: line 4, velocity 20 mm/s; "
+        "line 5, relaxation_times 100",
+    ):
+        assert f"  {line}\n" in told

@@ -28,6 +28,7 @@ HOSTILE = {
     "a unit of many letters": HEAD + "parameters: {position: 1 " + "m" * 100_000 + "}\n",
     "a unit with a large power": HEAD + "parameters: {position: 1 mm^200/m^199}\n",
     "a key that holds itself": HEAD + "parameters: {}\n? &a [*a]\n: 1\n",
+    "a million values": HEAD + f"parameters: {{position: {list(range(10**6))}}}\n",
     "a number beyond all bounds": HEAD + "parameters: {position: 1e999999999 m}\n",
     "a null character": HEAD + 'parameters: {}\nstore: {path: "a\\0b"}\n',
     "a null character in a table": HEAD + 'parameters: {}\nsampling: {table: "a\\0b"}\n',

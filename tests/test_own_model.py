@@ -32,7 +32,7 @@ def example(tmp_path, monkeypatch):
 
 
 def test_the_example_of_the_page_goes_through_every_command(example, capsys):
-    assert main(["models", "wear_rate:MODEL"]) == 0
+    assert main(["models", "wear_rate:MODEL", "--json"]) == 0
     assert "wear_volume_error" in capsys.readouterr().out
     assert main(["check", "pin.yaml"]) == 0
     assert main(["run", "pin.yaml", "--quiet"]) == 0

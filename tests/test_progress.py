@@ -1,13 +1,14 @@
 """Progress: nothing is silent, compiling is no pace, and the time left does not lie."""
 
 import re
+import sys
 import time
 
 import pytest
 
 from mdr_dask import compile_clock as clocks
 from mdr_dask.cli import progress as shown
-from mdr_dask.cli.progress import describe, reporter
+from mdr_dask.cli.progress import at_work, describe, reporter
 from mdr_dask.execute import Progress
 from mdr_dask.models.base import Status
 from mdr_dask.task import Outcome
@@ -72,6 +73,16 @@ def test_lines_come_though_nothing_ends(monkeypatch, capsys):
         _wait_for(capsys, r"preparing, \d+ s")
         report(Progress(total=50))
         _wait_for(capsys, r"0 %, \d+ s, 0 of 50 results, 0 failed")
+
+
+def test_a_terminal_is_told_what_takes_long_and_a_pipe_is_not(monkeypatch, capsys):
+    monkeypatch.setattr(shown, "PAUSE", 0.02)
+    with at_work("drawing"):
+        time.sleep(0.2)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with at_work("drawing"):
+        _wait_for(capsys, r"drawing, \d+ s")
 
 
 def _wait_for(capsys, line):

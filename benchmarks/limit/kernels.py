@@ -218,27 +218,27 @@ def _films() -> tuple[Any, Any, Any]:
 
 def film_balance() -> Work:
     """Balance of the lubricant in every volume with its derivatives."""
-    from mdr_dask.physics.lubrication.newton import balance
+    from mdr_dask.physics.lubrication.newton import Imbalance, balance
 
     case, state, _ = _films()
     n = state.nodes.size
-    workspace = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
+    workspace = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     fixed = state.nodes, case.liquid, case.film_number, state.pressure, state.film
     return Work(lambda: balance(*fixed, *workspace), n)
 
 
 def film_equations() -> Work:
     """The dense equations of a Newton step."""
-    from mdr_dask.physics.lubrication.newton import _fill_active, _fill_equations, balance
+    from mdr_dask.physics.lubrication.newton import Imbalance, _fill_active, _fill_equations, balance
 
     case, state, grid = _films()
     n = state.nodes.size
-    numbers, R, by_pressure, by_film = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
-    balance(grid.nodes, case.liquid, case.film_number, state.pressure, state.film, numbers, R, by_pressure, by_film)
+    found = Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
+    balance(grid.nodes, case.liquid, case.film_number, state.pressure, state.film, np.empty((4, n)), found)
     listed = np.empty(n, np.int64)
-    active = listed[: _fill_active(grid.influence, state.pressure, R, by_pressure, by_film, listed)]
+    active = listed[: _fill_active(grid.influence, state.pressure, found, listed)]
     A, b = np.empty((active.size + 1, active.size + 1)), np.empty(active.size + 1)
-    fixed = grid, state.pressure, R, active, by_pressure, by_film, A, b
+    fixed = grid, state.pressure, found, active, A, b
     return Work(lambda: _fill_equations(*fixed), A.size)
 
 

@@ -2,8 +2,8 @@
 
 A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
 place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. Each mutant stands in a copy of
-the checkout and meets the tests that lie nearest to its module by imports, up to `SECONDS` of processor time. What is
-found is appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
+the checkout and meets the files of tests that lie nearest to its module by imports. What is found is appended to FILE,
+a line of JSON each; a run that is broken off goes on where it was.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
-#: Processor time that the tests have for a mutant.
-SECONDS = 100
+#: Files of tests that a mutant meets, and the processor time that they have.
+FILES, SECONDS = 10, 60
 USAGE = 4  # exit code of pytest
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
@@ -235,14 +236,33 @@ class Checkout:
             reached |= edge
         return [str(path.relative_to(self.root)) for path in found]
 
-    def forget_kernels(self, module: str) -> None:
-        """Remove the compiled kernels that may hold code of a module."""
-        reached, edge = {module}, {module}
-        while edge := {user for each in edge for user in self.users[each]} - reached:
+    def kernels(self, module: str) -> list[Path]:
+        """Return the files of kernels that may hold code of a module: its own, and those of all that use it."""
+        reached, edge = set(), {module}
+        while edge:
             reached |= edge
-        for path in (self.modules[each] for each in reached):
-            for kernel in (path.parent / "__pycache__").glob(f"{path.stem}.*.nb?"):
+            edge = {user for each in edge for user in self.users[each] if "physics" in user} - reached
+        paths = [self.modules[each] for each in reached]
+        return [kernel for path in paths for kernel in (path.parent / "__pycache__").glob(f"{path.stem}.*.nb?")]
+
+    @contextmanager
+    def changed(self, mutant: Mutant) -> Iterator[None]:
+        """Hold a change, without the kernels that were compiled before it, and then what was there before."""
+        path = self.modules[mutant.module]
+        source, stat = path.read_bytes(), path.stat()
+        kept = {kernel: kernel.read_bytes() for kernel in self.kernels(mutant.module)}
+        for kernel in kept:
+            kernel.unlink()
+        path.write_bytes(source[: mutant.start] + mutant.new.encode() + source[mutant.end :])
+        try:
+            yield
+        finally:
+            path.write_bytes(source)
+            os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+            for kernel in self.kernels(mutant.module):
                 kernel.unlink()
+            for kernel, compiled in kept.items():
+                kernel.write_bytes(compiled)
 
 
 def _name(path: Path, root: Path) -> str:
@@ -272,23 +292,17 @@ def drawn(checkout: Checkout, number: int, seed: int) -> list[Mutant]:
 
 def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
     """Run tests on a mutant in place; return the verdict, and the first that failed."""
-    path = checkout.modules[mutant.module]
-    before = path.read_bytes()
-    path.write_bytes(before[: mutant.start] + mutant.new.encode() + before[mutant.end :])
-    checkout.forget_kernels(mutant.module)
-    try:
+    command = [sys.executable, "-P", "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests]
+    with checkout.changed(mutant):
         done = subprocess.run(
-            [sys.executable, "-P", "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests],
+            command,
             cwd=checkout.root,
-            env={**os.environ, "PYTHONPATH": str(checkout.root), "OPENBLAS_NUM_THREADS": "1"},
+            env={**os.environ, "PYTHONPATH": str(checkout.root)},
             capture_output=True,
             text=True,
             check=False,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
         )
-    finally:
-        path.write_bytes(before)
-        checkout.forget_kernels(mutant.module)
     failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.M)
     if done.returncode in (0, -signal.SIGXCPU, -signal.SIGKILL):
         return "lives" if done.returncode == 0 else "time is up", ""
@@ -306,7 +320,7 @@ def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> 
             copy(ROOT / part, Path(folder, part))
         checkout = Checkout(Path(folder))
         for mutant in drawn(checkout, int(number), int(seed))[there:]:
-            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module))
+            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module)[:FILES])
             with log.open("a") as lines:
                 lines.write(json.dumps({**mutant._asdict(), "verdict": verdict, "test": test}) + "\n")
             print(

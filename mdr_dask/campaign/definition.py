@@ -13,6 +13,8 @@ from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
+#: Most values of an axis that are looked at where all would take long.
+SOME = 64
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,12 @@ class Axis:
     unit: str | None
     long_name: str
     refinement: Refinement | None = None
+
+    @property
+    def some(self) -> list[Any]:
+        """At most `SOME` of its values, the first and the last among them."""
+        places = np.linspace(0, len(self.values) - 1, min(len(self.values), SOME)).round().astype(int)
+        return [self.values[place] for place in places]
 
 
 @dataclass(frozen=True)

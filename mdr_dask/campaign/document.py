@@ -19,7 +19,8 @@ from mdr_dask.errors import CampaignError
 
 _TAG = "tag:yaml.org,2002:"
 _DEEPEST = 50
-_LARGEST = 1_000_000
+_LARGEST = 200_000
+_LONGEST = 300_000  # about a second of reading
 _TOO_DEEP = "nested too deeply, or refers to itself"
 _MOST_DIGITS = 300
 _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
@@ -88,6 +89,10 @@ def parse(text: str, source: str, problems: Problems) -> Document:
         Receives what is not YAML, duplicate keys, keys that are not texts and unknown tags.
     """
     document = Document(source, text)
+    if len(text) > _LONGEST:
+        what = f"expected at most {_LONGEST} characters, got {len(text)}: a range or a table holds many values"
+        problems.add(Place(source, 1, 1), "", what)
+        return document
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ReusedAnchorWarning)

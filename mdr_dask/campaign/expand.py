@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import reduce
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from mdr_dask.campaign import fields, sampling, variation
@@ -18,7 +19,7 @@ from mdr_dask.campaign.remarks import remarks
 from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
 from mdr_dask.campaign.tolerances import refinement
 from mdr_dask.campaign.variation import Origin, Variation
-from mdr_dask.models.base import Model, Parameters
+from mdr_dask.models.base import Model, Parameters, replaced
 from mdr_dask.units import to_si
 
 #: Axes that a study refines itself, at most.
@@ -97,7 +98,24 @@ class _Expansion:
             self._axis(one, [_get(point, one.path) for point in column])
             for one, column in zip(variations, columns, strict=True)
         ]
+        for axis, one in zip(axes, variations, strict=True):
+            self._require_places(base, axis, one.origin, model, outputs)
         return Series(name, base, tuple(self._refined(axes, variations, model, outputs)))
+
+    def _require_places(
+        self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
+    ) -> None:
+        """Refuse an axis of what sets the places of an output: in one array all cases have the same."""
+        wanted = [model.output(name) for name in outputs]
+        if not any(output.dims for output in wanted):
+            return
+        first, *others = (model.coordinates(replaced(base, axis.path, value)) for value in axis.some)
+        for output in wanted:
+            for dim in first.keys() & set(output.dims):
+                if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):
+                    what = f"expected one value, for it sets at which {dim} {output.name} is stored"
+                    self._complain(origin, f"{what} (give each value a series of its own)")
+                    return
 
     def _variations(self) -> tuple[Variation, ...] | None:
         design = self.spec.sampling
@@ -150,7 +168,7 @@ class _Expansion:
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
             column.append(checked)
             value = None if checked is None else _get(checked, one.path)
-            key = value if isinstance(value, int | float) else item.label
+            key = value if isinstance(value, int | float | tuple) else item.label
             if checked is not None and key in seen:
                 self._complain(item.origin, f"this value is given twice: {item.label}")
             seen.add(key)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from mdr_dask import models
@@ -11,11 +11,16 @@ from mdr_dask.campaign.definition import Campaign, Series
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import Column, read_sheet, read_table
+from mdr_dask.units import shown
 
 ERROR = "standard_error"
 _ERRORS = ("error", "standard deviation", "uncertainty")
 #: Largest table that a study carries along, in bytes.
 LARGEST = 10**6
+#: Conditions that agree to this part are the same.
+SAME = 1e-6
+#: Most rows outside a study that are named.
+FEW = 3
 
 
 @dataclass(frozen=True)
@@ -94,6 +99,52 @@ def require_readable(text: str, source: str, model: str, outputs: Sequence[str],
         raise reasons[0]
 
 
+def notes(campaign: Campaign) -> tuple[str, ...]:
+    """Return how the table of a campaign meets each series: the output, conditions, unknowns, and rows outside."""
+    table = campaign.measured
+    told = []
+    for series in campaign.series if table else ():
+        assert table is not None
+        conditions, outputs = _of_series(campaign.model, campaign.outputs, series)
+        before = f"measured {table.name}{f', series {series.name}' if series.name else ''}"
+        try:
+            found = read_measured(table.read_text(), table.name, conditions, outputs)
+        except DataError:
+            told.append(f"{before}: no table of this series")
+            continue
+        told += [f"{before}: {sentence}" for sentence in _sentences(found, campaign.model, series, conditions)]
+    return tuple(told)
+
+
+def _sentences(found: Measured, model: str, series: Series, units: Mapping[str, str]) -> Iterator[str]:
+    errors = "standard_error" if found.errors is not None else "errors estimated by the fit"
+    yield f"{found.values.size} rows of {found.output}, {errors}"
+    ranges = {
+        name: f"{name} {' to '.join(dict.fromkeys(shown(float(end), units[name]) for end in (rows.min(), rows.max())))}"
+        for name, rows in found.conditions.items()
+    }
+    yield f"conditions {', '.join(ranges.values()) or 'none'}"
+    yield f"unknowns {', '.join(_unknown(found, series)) or 'none: every axis is a column of the table'}"
+    outside = [
+        f"line {line}, {name} {shown(float(value), units[name])}"
+        for name, (low, high) in _reach(model, series, found.conditions).items()
+        for line, value in zip(found.lines, found.conditions[name], strict=True)
+        if not low - SAME * abs(low) <= value <= high + SAME * abs(high)
+    ]
+    more = f", ... ({len(outside)} in all)" if len(outside) > FEW else ""
+    refused = f"outside the study, and refused by the fit: {'; '.join(outside[:FEW])}{more}"
+    yield refused if outside else "every row lies inside the study"
+
+
+def _reach(name: str, series: Series, conditions: Iterable[str]) -> dict[str, tuple[float, float]]:
+    """Return the ends of what a study holds of each condition; those of a fixed parameter are the same."""
+    held = {key: (value, value) for key, (value, _, _) in numbers_of(series.parameters).items()}
+    coordinates = models.load(name).coordinates(series.parameters)
+    held |= {key: (float(each.values.min()), float(each.values.max())) for key, each in coordinates.items()}
+    held |= {axis.name: (min(axis.values), max(axis.values)) for axis in series.axes if axis.unit is not None}
+    return {key: held[key] for key in conditions}
+
+
 def unknowns(campaign: Campaign) -> tuple[str, ...]:
     """Return the axes of a campaign that its table of measurements does not name; none where it has no table."""
     table = campaign.measured
@@ -105,8 +156,12 @@ def unknowns(campaign: Campaign) -> tuple[str, ...]:
             measured = read_measured(table.read_text(), table.name, *_of_series(campaign.model, campaign.outputs, one))
         except DataError:
             continue  # it is of another series
-        found += [axis.name for axis in one.axes if axis.unit is not None and axis.name not in measured.conditions]
+        found += _unknown(measured, one)
     return tuple(dict.fromkeys(found))
+
+
+def _unknown(measured: Measured, series: Series) -> list[str]:
+    return [axis.name for axis in series.axes if axis.unit is not None and axis.name not in measured.conditions]
 
 
 def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str]]:

@@ -49,7 +49,8 @@ _VARIATION = """\
 
 | written | means |
 |---|---|
-| `[1 N, 3 N, 10 N]` | these values, inside structured parameters too; not for a parameter that is itself a list |
+| `[1 N, 3 N, 10 N]` | these values, inside structured parameters too |
+| `[[1 ms], [1 ms, 1 s]]` | the same for a parameter that is itself a list, named in the store as they are written |
 | `{values: [...]}` | the same |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |

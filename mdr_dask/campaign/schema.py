@@ -82,12 +82,9 @@ def _choice(model: Model[Any]) -> Schema:
 
 
 def _varied(value: Schema) -> Schema:
-    is_list = "array" in (kind.get("type") for kind in (value, *value.get("anyOf", ())))
     outside: Schema = {key: value.pop(key) for key in ("description", "default") if key in value}
     branches = [value, {"$ref": "#/$defs/linear"}, {"$ref": "#/$defs/geometric"}, {"$ref": "#/$defs/values"}]
-    branches.append({"$ref": "#/$defs/adaptive"})
-    if not is_list:
-        branches.append({"type": "array", "items": value, "minItems": 1})
+    branches += [{"$ref": "#/$defs/adaptive"}, {"type": "array", "items": value, "minItems": 1}]
     return {**outside, "anyOf": branches}
 
 

@@ -109,7 +109,7 @@ class _Search:
         info = self._field(path)
         if info is None:
             return
-        if isinstance(value, list) and not fields.holds_list(info):
+        if isinstance(value, list) and (not fields.holds_list(info) or any(isinstance(one, list) for one in value)):
             yield self._variation(path, at, lambda: self._listed(value, at, at))
         if not isinstance(value, dict):
             return

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign
     from mdr_dask.models.base import Model
 
+#: Columns of a terminal: the fewest that tables are made for, and those of a pipe.
+NARROWEST, WIDEST = 80, 100
 CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
@@ -42,11 +46,12 @@ def models(name: str | None, form: str | None) -> None:
         print_json({"model": name, **parts, "numbers": number_rows(model)})
         return
     click.echo(f"{name}: {model.summary}\n\nparameters")
-    _print_left(parameter_rows(model), None)
+    _print_left([row | {"parameter": _indented(row["parameter"])} for row in parameter_rows(model)], None)
     if ways_told(model):
-        click.echo("\n".join(["", "what belongs together", *ways_told(model)]))
+        lines = (click.wrap_text(line, _width(), subsequent_indent="    ") for line in ways_told(model))
+        click.echo("\n".join(["", "what belongs together", *lines]))
     click.echo("\noutputs")
-    _print_left(output_rows(model), None)
+    _print_left([row | {"error": "yes" if row["error"] else ""} for row in output_rows(model)], None)
     if model.numbers:
         click.echo("\ndimensionless numbers")
         _print_left(number_rows(model), None)
@@ -90,9 +95,34 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
     if form == "json":
         print_json(rows)
         return
-    widths = {key: max(len(key), *(len(row[key]) for row in rows)) for key in rows[0]}
-    for row in [{key: key for key in rows[0]}, *rows]:
-        click.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for place, key in enumerate(rows[0]):
+        table.add_column(key, no_wrap=place == 0, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(_brief(cell)) for cell in row.values()))
+    console = Console(width=_width(), color_system=None)
+    with console.capture() as written:
+        console.print(table)
+    click.echo("\n".join(line.rstrip() for line in written.get().splitlines()))
+
+
+def _width() -> int:
+    return max(NARROWEST, shutil.get_terminal_size((WIDEST, 24)).columns)
+
+
+def _indented(path: str) -> str:
+    """Return the name of a parameter below the structures that it belongs to."""
+    return "  " * path.count(".") + path.rpartition(".")[2]
+
+
+def _brief(cell: str) -> str:
+    """Return a cell without the entries of structures, which have rows of their own, and the middle of lists."""
+    words = re.sub(r"\{[^{}]*\}", "{...}", cell).split(" or ")
+    return re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", " or ".join(dict.fromkeys(words)))
 
 
 @click.command()

@@ -43,7 +43,7 @@ def cases_that_narrow(
         fit = known[answer.partition(".")[0]]
         constant = answer.partition(".")[2]
         try:
-            wide = still_wide(fit, constant, groups, tolerance)
+            wide = still_wide(fit, constant, groups, tolerance, stage.campaign.replication.at_most)
         except FitError:
             continue  # `unanswered` says so at the end
         for result, flags in wide.items():
@@ -73,7 +73,7 @@ def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequen
                 most = max(int(each.max()) for each in taken)
                 rest = float(without_scatter(known[name], constant, groups)[series].where(wide.notnull()).max())
                 told = f"half of the interval is {float(wide.max()):.2g} after {most} realisations"
-                fixed = f"; {rest:.2g} of it is what the law misses and the error of the grid, which no more narrow"
+                fixed = f"; {rest:.2g} of it is what the law misses and the error of the grid, and stays"
                 yield f"{where}{answer}: {told}{fixed if rest > 0 else ''}"
             if not bool(np.isfinite(half).all()):
                 yield f"{where}{answer}: no interval, the law does not hold or its end is not reached"

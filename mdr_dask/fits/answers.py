@@ -18,8 +18,6 @@ STEP = 1e-3
 GROUPS = 32
 #: Part of the standard error of a constant below which a group of cases counts for nothing.
 NEGLIGIBLE = 0.01
-#: Part of the tolerance that scatter takes at most where no more realisations are spent on what else is too much.
-SPARE = 0.5
 #: Change of the scatter by which it is seen how much of an interval comes from it.
 LESS = 0.01
 
@@ -106,12 +104,12 @@ def _scattered(data: xr.Dataset, scale: float) -> xr.Dataset:
 
 
 def still_wide(
-    fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance
+    fit: Fit, constant: str, groups: Mapping[str, xr.Dataset], tolerance: Tolerance, at_most: int
 ) -> dict[str, xr.DataArray]:
-    """Return where an interval is too wide and more realisations may narrow it enough, by series.
+    """Return where an interval is too wide and so many realisations may narrow it enough, by series.
 
-    They are in vain where what is left without scatter is too much by itself, and scatter is little beside the
-    tolerance.
+    They are in vain where scatter alone is within the tolerance, and falling with the root of their number leaves too
+    much with what is left without it.
 
     Raises
     ------
@@ -123,9 +121,11 @@ def still_wide(
     if not any(bool(flags.any()) for flags in wide.values()):
         return wide
     left = without_scatter(fit, constant, groups)
+    count = max(data.sizes["realisation"] for data in groups.values())
     for name, (value, half) in found.items():
         allowed = _allowed(value, tolerance)
-        wide[name] = wide[name] & ~((left[name] > allowed) & (half - left[name] <= SPARE * allowed))
+        scatter, rest = half - left[name], left[name]
+        wide[name] = wide[name] & ~((scatter <= allowed) & (rest + (count / at_most) ** 0.5 * scatter > allowed))
     return wide
 
 

@@ -13,7 +13,8 @@ from mdr_dask import bootstrap
 from mdr_dask.aggregation import companion
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import DOUBTFUL, LAW_HOLDS, Fit, fitted, law_holds, require
+from mdr_dask.fits import top
+from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds, require
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces import shapes as indenter
@@ -24,8 +25,6 @@ Variables = dict[str, xr.Variable]
 MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
-FLAT = 0.05  # of the largest friction that still counts as plateau
-TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fits/test_friction_coverage.py chose them
 BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
@@ -241,8 +240,17 @@ def _zone_one(data: xr.Dataset) -> Variables:
     }
 
 
+def _velocity_of(top: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
+    """Return the velocity of the largest friction from the stack of its logarithm; no ends where it may lie beyond."""
+    beyond = np.isinf(top)
+    found = constant("plateau_velocity", np.exp(np.clip(top, x[0], x[-1])), count, meaning, positive=True)
+    if beyond[0] or beyond.mean() > bootstrap.TAILS[0]:
+        found |= {f"plateau_velocity_{end}": xr.Variable((), np.nan) for end in ("low", "high")}
+    return {name: xr.Variable((), each.values, {"units": unit, "long_name": meaning}) for name, each in found.items()}
+
+
 def _plateau(data: xr.Dataset) -> Variables:
-    """Return the top of a parabola through the points about the largest friction, over the logarithm of velocity."""
+    """Return how high friction comes against velocity, and where."""
     require(data, "shear_modulus", "relaxation_time")
     velocities, name, unit = _velocities(data)
     table = table_of(data, spectral_slope(data), velocities)
@@ -253,65 +261,21 @@ def _plateau(data: xr.Dataset) -> Variables:
     order = np.argsort(velocity)
     x, count = np.log(velocity[order]), table.count(known)
     stack = table.stack(known[order])
-    for drop in TOPS:
-        near = _about_the_top(stack[0], drop)
-        top, at, rise, left = _parabola(x[near], stack[:, near])
-        if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
-            continue
-        break
-    unbiased = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
-    if left.shape[1] > 3:
-        errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
-    else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest
-        errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
-    top = np.concatenate([top, errors]) + (unbiased - top[0])
-    ends = bootstrap.interval(rise, count)
-    verdict = _reached(x, float(at[0]), float(rise[0]), (float(ends[0]), float(ends[1])), f"{name} = {{:.2g}}{unit}")
-    flat = x[stack[0] > (1 - FLAT) * stack[0].max()]
-    found = constant("plateau", top, count, "largest friction coefficient over rms slope")
+    found = top.highest(x, stack, count)
+    ends = bootstrap.interval(found.rise, count)
+    place = f"{name} = {{:.2g}}{unit}"
+    verdict = _reached(x, float(found.place[0]), float(found.rise[0]), (float(ends[0]), float(ends[1])), place)
+    flat = x[stack[0] > (1 - top.FLAT) * stack[0].max()]
+    height = constant("plateau", found.height, count, "largest friction coefficient over rms slope")
     if verdict.startswith("no:"):
-        found |= {f"plateau_{end}": xr.Variable((), np.nan, found["plateau"].attrs) for end in ("low", "high")}
+        height |= {f"plateau_{end}": xr.Variable((), np.nan, height["plateau"].attrs) for end in ("low", "high")}
     return {
-        **found,
+        **height,
         **measure("plateau_stated", math.sqrt(2), "sqrt 2 (eq. 3.15)"),
-        **measure("plateau_velocity", float(np.exp(at[0])), f"{name} of the largest friction", unit.strip() or "1"),
-        **measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {FLAT:.0%} of it"),
+        **_velocity_of(top.place(x, stack), x, count, f"{name} of the largest friction", unit.strip() or "1"),
+        **measure("decades", float(np.ptp(flat) / np.log(10)), f"decades of velocity within {top.FLAT:.0%} of it"),
         **holds(verdict),
     }
-
-
-def _smoothed(mean: FloatArray) -> FloatArray:
-    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
-    smooth = mean.copy()
-    for _ in range(2):
-        smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
-    return smooth
-
-
-def _about_the_top(mean: FloatArray, drop: float) -> slice:
-    """Return the points about the largest friction that lie less than a part of it below, three at least."""
-    smooth = _smoothed(mean)
-    at = int(np.argmax(smooth))
-    low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
-    right = at + int(low[0]) if low.size else mean.size
-    low = np.flatnonzero(smooth[:at] <= (1 - drop) * smooth[at])
-    left = int(low[-1]) + 1 if low.size else 0
-    middle = min(max(at, 1), mean.size - 2)
-    return slice(min(left, middle - 1), max(right, middle + 2))
-
-
-def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the top of the parabola through every row, its place, its logarithmic slope there, and what is left."""
-    centre, half = x.mean(), np.ptp(x) / 2
-    u = (x - centre) / half
-    design = np.vstack([np.ones_like(u), u, u**2])
-    constants = rows @ np.linalg.pinv(design)
-    level, tilt, bend = constants.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inside = np.where(bend < 0, -tilt / (2 * bend), np.copysign(np.inf, tilt))
-    at = np.clip(inside, u.min(), u.max())
-    top = level + tilt * at + bend * at**2
-    return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
 
 
 def _velocities(data: xr.Dataset) -> tuple[xr.DataArray, str, str]:
@@ -327,7 +291,7 @@ def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float], p
     change = f"d ln mu / d ln v = {rise:.2g} ({ends[0]:.2g}, {ends[1]:.2g})"
     if inside:
         return f"yes: friction falls to both sides of {place.format(np.exp(at))}"
-    if abs(rise) <= FLAT:
+    if abs(rise) <= top.FLAT:
         return f"yes: friction is level at the end of the velocities, {change}"
     end = "still rises at the largest velocity" if rise > 0 else "still falls at the lowest velocity"
     if np.isfinite(ends[0]) and ends[0] <= 0 <= ends[1]:
@@ -374,7 +338,7 @@ def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
 def peak_velocity(velocity: FloatArray, mean: FloatArray) -> float:
     """Return the velocity of the largest friction, where region IV begins."""
     order = np.argsort(velocity)
-    return float(velocity[order][np.argmax(_smoothed(mean[order]))])
+    return float(velocity[order][np.argmax(top.smoothed(mean[order]))])
 
 
 def _interpolation(data: xr.Dataset) -> Variables:
@@ -523,7 +487,7 @@ FITS: tuple[Fit, ...] = (
         "largest mu / slope over the velocity: sqrt 2 on the plateau (eq. 3.15)",
         lambda series: each(series, lambda data: _varying(data, "velocity", "relaxation_time"), _plateau),
         apart=True,
-        constants=("plateau",),
+        constants=("plateau", "plateau_velocity"),
     ),
     Fit(
         "interpolation",

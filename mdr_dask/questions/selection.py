@@ -159,12 +159,24 @@ def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[n
 
 def _chosen_words(labels: list[str], name: str, wanted: str) -> NDArray[np.bool_]:
     folded = np.array([label.casefold() for label in labels])
-    words = [wanted] if wanted.casefold() in folded else [word.strip() for word in wanted.split(",")]
+    words = [wanted] if wanted.casefold() in folded else _words(wanted)
     for word in words:
         if word.casefold() not in folded:
             only = f": it is {labels[0]!r} everywhere" if len(labels) == 1 else did_you_mean(word, labels)
             raise DataError(f"no {name} {word!r}{only or '; known: ' + ', '.join(labels)}")
     return np.isin(folded, [word.casefold() for word in words])
+
+
+def _words(text: str) -> list[str]:
+    """Take words apart at commas; lists and structures keep their own."""
+    words, depth = [""], 0
+    for mark in text:
+        depth += (mark in "[{") - (mark in "]}")
+        if mark == "," and depth == 0:
+            words.append("")
+        else:
+            words[-1] += mark
+    return [word.strip() for word in words]
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:

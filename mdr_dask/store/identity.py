@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import operator
 from collections import Counter
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from mdr_dask import models
 from mdr_dask.arrays import IntArray
@@ -232,10 +232,10 @@ def _longer(series: Series, axis: Axis, stored: Mapping[str, Any], new: list[int
 
 
 def _restore(series: Series, path: str, plain: Any) -> Any:
-    """Return a value as it was before it was stored; one with structure by way of the model's own parameter set."""
+    """Return a value as it was before it was stored; one with structure by way of its field in the parameter set."""
     if not isinstance(plain, Mapping | list):
         return plain
-    tree = series.parameters.model_dump(mode="json")
     *above, last = path.split(".")
-    reduce(operator.getitem, above, tree)[last] = plain
-    return reduce(getattr, [*above, last], type(series.parameters).model_validate_json(json.dumps(tree)))
+    info = type(reduce(getattr, above, series.parameters)).model_fields[last]
+    kind: Any = Annotated[info.annotation, info]
+    return TypeAdapter(kind).validate_json(json.dumps(plain))

@@ -243,8 +243,13 @@ def _series_attributes(template: Template) -> dict[str, Any]:
 
 def plain_values(values: tuple[Any, ...]) -> list[Any]:
     """Return axis values as JSON holds them."""
-    plain = [value.model_dump(mode="json") if isinstance(value, BaseModel) else value for value in values]
-    return [list(value) if isinstance(value, tuple) else value for value in plain]
+    return [_plain(value) for value in values]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else value
 
 
 def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> bytes:

@@ -88,5 +88,6 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
 def test_models_tells_what_belongs_together(capsys):
     assert main(["models", "sliding_friction"]) == 0
     told = capsys.readouterr().out.splitlines()
+    assert all(len(line) <= 100 for line in told)
     assert "length with rms_roughness, or length with surface, or surface" in told
     assert any(line.startswith("material.kelvin, or material.standard_solid, or ") for line in told)

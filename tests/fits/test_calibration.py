@@ -119,6 +119,33 @@ def test_data_that_the_model_cannot_have_are_told_and_widen_the_interval():
     assert widths[1] > 2 * widths[0]
 
 
+def test_constants_of_wlf_from_friction_against_velocity_and_temperature():
+    """Temperatures in degrees are conditions; both constants are held, and near what the points can tell."""
+    temperature, velocity = np.linspace(273.15, 333.15, 5), np.geomspace(1e-3, 1.0, 9)
+    axes = {"temperature": (temperature, "K"), "velocity": (velocity, "m/s")}
+    axes |= {"c1": (np.geomspace(4, 16, 7), "1"), "c2": (np.geomspace(60.0, 240.0, 7), "K")}
+
+    def law(kelvin, speed, c1, c2):
+        shifted = np.log10(speed / 0.03) - c1 * (kelvin - 293.15) / (c2 + kelvin - 293.15)
+        return 0.3 / np.cosh(0.6 * shifted)
+
+    grid = np.meshgrid(*(values for values, _ in axes.values()), indexing="ij")
+    coords = {name: (name, values, {"units": unit}) for name, (values, unit) in axes.items()}
+    data = xr.Dataset({"mu": (tuple(axes), law(*grid), {"units": "1"})}, coords)
+    rng = np.random.default_rng(1)
+    rows = "".join(
+        f"{kelvin - 273.15:.2f},{speed:.6g},{mu * (1 + 0.03 * rng.normal()):.6g},{0.03 * mu:.6g}\n"
+        for kelvin in temperature
+        for speed in velocity[::2]
+        for mu in [law(kelvin, speed, 8.9, 110.0)]
+    )
+    text = f"temperature [degC],velocity [m/s],mu,standard_error\n{rows}"
+    found = calibration({"": data.assign_attrs(measured={"name": "rig.csv", "text": text})})
+    for name, true in {"c1": 8.9, "c2": 110.0}.items():
+        assert found[f"{name}_low"] < true < found[f"{name}_high"] < 1.2 * found[f"{name}_low"]
+    assert found["correlation_c1_c2"] > 0.5
+
+
 def test_ten_thousand_likelihoods_are_arrays():
     """Vectorised: far below a millisecond each, however slow the machine."""
     measured = table(np.random.default_rng(0), points=30)

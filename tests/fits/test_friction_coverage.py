@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from mdr_dask.fits import top
 from mdr_dask.fits.friction import FITS
 from mdr_dask.physics.sliding import laws
 
@@ -100,6 +101,29 @@ def test_plateau(law, lines, scatter):
     # no bias from taking a maximum: the largest of noisy means is up to 7 % too high here
     assert float(found["plateau"].mean()) == pytest.approx(truth, rel=0.025)
     assert judged(found, "yes") >= LEAST
+    place = velocity_of_top(law)
+    if law is saturating:  # friction is level at the end of the velocities: scatter of 2 % shows no top, of 10 % one
+        assert scatter[1] > 0.05 or bool(found["plateau_velocity_high"].isnull().all())
+    else:
+        assert coverage(found, "plateau_velocity", place) >= LEAST
+
+
+def velocity_of_top(law):
+    velocity = np.geomspace(1e-3, 1e4, 200001)
+    return float(velocity[np.argmax(law(None, velocity))])
+
+
+def test_the_velocity_of_the_top_does_not_depend_on_where_the_velocities_lie():
+    """Neither on how many there are nor on where they begin: within 3 %, as long as they show the curve."""
+    places = []
+    for velocities in (np.geomspace(1e-4, 1e2, 13), np.geomspace(1.7e-4, 1.7e2, 13), np.geomspace(1e-4, 1e2, 49)):
+        data = planted(skew, TOP | {"velocity": velocities}, 3, (0.0, 1e-3), studies=1)
+        places.append(float(FIT["plateau"].compute({"": data})["plateau_velocity"].item()))
+    assert max(places) / min(places) < 1.03
+    assert places[0] == pytest.approx(velocity_of_top(skew), rel=0.03)
+    x = np.log(np.geomspace(1e-2, 1e4, 19))
+    twice, curve = np.repeat(x, 2), skew(None, np.exp(x))[None]  # v tau of other v and other tau
+    np.testing.assert_allclose(top.place(twice, np.repeat(curve, 2, axis=1)), top.place(x, curve), rtol=1e-9)
 
 
 PLANE = {"normal_force": np.geomspace(0.3, 30, 4) * G * RMS * LENGTH, "velocity": np.geomspace(1e-6, 1e-2, 7)}

@@ -110,6 +110,17 @@ def test_scatter_has_the_asked_width_and_leaves_the_mean():
     assert np.mean(volume) == pytest.approx(plain, rel=5 * 0.3 / np.sqrt(4000))
 
 
+@pytest.mark.parametrize(("source", "power"), [("friction_scatter", -1), ("amplitude_scatter", 1)])
+def test_scatter_of_friction_and_of_the_amplitude_moves_the_border_of_stick(source, power):
+    """1 - c^2 is proportional to the amplitude over the friction, whose factors have the mean one."""
+    parameters = FrettingWear(wear_rule="fast", stick_radius=0.455, cycles=0.01, **{source: 0.02})
+    border = run(parameters, outputs=("stick_border",), realisations=tuple(range(4000))).values["stick_border"][0]
+    factor = ((1 - border**2) / (1 - 0.455**2)) ** power
+    # 5 standard errors of 4000 samples
+    assert np.std(factor) == pytest.approx(0.02, rel=5 / np.sqrt(8000))
+    assert np.mean(factor) == pytest.approx(1.0, abs=5 * 0.02 / np.sqrt(4000))
+
+
 def test_gross_slip_is_a_message_and_nothing_else_fails():
     result = run(FrettingWear(**STEEL), {"amplitude": np.array([1e-6, 1e-4])})
     assert result.status.ravel().tolist() == [Status.DONE, Status.FAILED]

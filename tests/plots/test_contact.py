@@ -74,6 +74,16 @@ def test_figures_say_what_they_hold(groups):
     figure.savefig(io.BytesIO(), dpi=20)
 
 
+def test_the_elastomer_fills_its_panels(groups):
+    figure = DRAW["contact"].figure({"plane": groups["plane"]})
+    for axes in figure.axes:
+        elastomer = axes.lines[1].get_ydata()
+        low, high = axes.get_ylim()
+        assert low < elastomer.min() < elastomer.max() < high
+        drawn = np.ptp(elastomer) if axes in figure.axes[::2] else np.ptp([*elastomer, *axes.lines[0].get_ydata()])
+        assert drawn > 0.7 * (high - low)
+
+
 def test_lines_have_the_height_of_the_campaign_and_the_same_phases(groups):
     figure = DRAW["lines"].figure({"plane": groups["plane"]})
     lines = [axes.lines[0].get_ydata() for axes in figure.axes]

@@ -168,7 +168,7 @@ class FrettingWear(Parameters):
     friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)
     amplitude_scatter: float = quantity("1", "relative scatter of the amplitude (log-normal)", ge=0, le=2, default=0.0)
     wear_coefficient_scatter: float = quantity("1", "relative scatter of the wear coefficient", ge=0, le=2, default=0.0)
-    history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load instead of `cycles`")] = ()
+    history: Annotated[tuple[LoadStep, ...], Field(strict=False, description="blocks of load in place of cycles")] = ()
     extent: float = quantity("1", "last radius of the profiles, over a0", gt=0, le=10, default=1.6)
     points: int = quantity("1", "points of the profiles", ge=2, le=10000, default=161)
 

@@ -17,6 +17,7 @@ BEFORE, AFTER = WING + 1, WING + 2  # nodes of the turns before and after, as ma
 ABOVE = 4 / 27  # of its slopes at both ends, that a cubic cell reaches above its ends at most
 SUMMIT = 64  # nodes in a cell that its highest point is taken from
 
+NO_ENDS: FloatArray = np.empty((2, 0))
 # What is known of a block of cells, in this order
 PEAK, LOWEST, STEEPEST, HEIGHTS, SQUARES = range(5)
 KNOWN = 5
@@ -32,6 +33,8 @@ class Nodes(NamedTuple):
     ----------
     height, slope : array, shape (BEFORE + n + AFTER,)
         With nodes of the turns before and after; heights from the first, rise over a cell.
+    ends : array, shape (2, BEFORE + n + AFTER) or (2, 0)
+        From `ends_of`, likewise.
     blocks : array, shape (n // BLOCK, KNOWN)
         Bounds and sums over the cells of a block.
     top : float
@@ -40,6 +43,7 @@ class Nodes(NamedTuple):
 
     height: FloatArray
     slope: FloatArray
+    ends: FloatArray
     blocks: FloatArray
     top: float
 
@@ -65,8 +69,22 @@ def _end_term(h: FloatArray, s: FloatArray, i: int) -> float:
     return term
 
 
+def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
+    """Return what the trapezia over nodes leave of the integrals of height and slope squared, shape (2, n).
+
+    At its first node less that at its last one, for any stretch; exact, and slopes are rises over a cell. Local
+    derivatives do not see the shortest waves, whose slopes are all that a clipped peak has.
+    """
+    n = height.size
+    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
+    parts = np.fft.rfft([height, (slope / n) ** 2])
+    parts[:, 0] = 0.0
+    parts[:, 1:] *= 1j * (1 / wave - 0.5 / np.tan(wave / 2))
+    return np.asarray(np.fft.irfft(parts, n), dtype=np.float64)
+
+
 @kernel
-def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool) -> Nodes:
+def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
     """Take every stride-th node of a line; differences for slopes if it is not resolved.
 
     Parameters
@@ -75,8 +93,14 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         Heights and derivatives by position over the length of the line.
     first : int
         The node to begin with; heights are from there.
+    ends : array, shape (2, n) or (2, 0)
+        From `ends_of`; integrals over cells come from the nodes beside without.
     """
     n = height.size // stride
+    terms = np.empty((2, ends.shape[1] and n + BEFORE + AFTER))
+    for i in range(terms.shape[1]):
+        place = (first + i - BEFORE) % n
+        terms[0, i], terms[1, i] = ends[0, place], ends[1, place]
     h, s = np.empty(n + BEFORE + AFTER), np.empty(n + BEFORE + AFTER)
     top = height[first]
     turned = min(-(-(height.size - first) // stride), n)  # nodes up to the end of the line as it is given
@@ -96,7 +120,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     for j in range(blocks.shape[0]):
         begin, last = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
         # cell by cell, so that these are vector instructions, and then their sums
-        _integrals(h, s, begin, BLOCK, mean, square)
+        _integrals(h, s, (terms[0], terms[1]), begin, BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
             above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
@@ -107,12 +131,27 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
             squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
-    return Nodes(h, s, blocks, top)
+    return Nodes(h, s, terms, blocks, top)
 
 
 @compiled
-def _integrals(h: FloatArray, s: FloatArray, first: int, cells: int, mean: FloatArray, square: FloatArray) -> None:
+def _integrals(
+    h: FloatArray,
+    s: FloatArray,
+    ends: tuple[FloatArray, FloatArray],
+    first: int,
+    cells: int,
+    mean: FloatArray,
+    square: FloatArray,
+) -> None:
     """Write the integrals of the height and of the slope squared over cells; `square` is one longer."""
+    of_height, of_square = ends
+    if of_height.size > 0:
+        for k in range(cells):
+            i = first + k
+            mean[k] = 0.5 * (h[i] + h[i + 1]) + of_height[i] - of_height[i + 1]
+            square[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + of_square[i] - of_square[i + 1]
+        return
     for k in range(cells + 1):
         square[k] = _end_term(h, s, first + k)
     for k in range(cells):
@@ -151,13 +190,16 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
         of the height and of the slope squared over each cell, and its highest point.
     """
     refinement = weights.shape[1]
+    # exact ones stand at the nodes of the line only
+    here = first - 1 if refinement == 1 else line.ends.shape[1]
+    ends = line.ends[0, here:], line.ends[1, here:]
     if refinement == 1:
         copy_into(tile[HEIGHT, : cells + 3], line.height[first - 1 : first + cells + 2])
         copy_into(tile[SLOPE, : cells + 3], line.slope[first - 1 : first + cells + 2])
     else:
         refine(line, first, cells, weights, tile[HEIGHT], tile[SLOPE])
     cells *= refinement
-    _integrals(tile[HEIGHT], tile[SLOPE], 1, cells, tile[MEAN], tile[SQUARE])
+    _integrals(tile[HEIGHT], tile[SLOPE], ends, 1, cells, tile[MEAN], tile[SQUARE])
     _peaks(tile[HEIGHT], tile[SLOPE], 1, cells, tile[TOP])
     return cells
 

@@ -16,7 +16,18 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.nodes import AFTER, BEFORE, BLOCK, IN_A_TILE, Nodes, nodes, summit_rise, weights
+from mdr_dask.physics.sliding.nodes import (
+    AFTER,
+    BEFORE,
+    BLOCK,
+    IN_A_TILE,
+    NO_ENDS,
+    Nodes,
+    ends_of,
+    nodes,
+    summit_rise,
+    weights,
+)
 from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
@@ -198,11 +209,11 @@ def begin(
     rates = np.full((loads.size, SECANTS), np.nan)
     highest, cases = int(np.argmax(height)), (deborah, loads)
     for stride in reversed(strides):
-        line = nodes(height, slope, highest, stride, stride == strides[0])
+        line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
         _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, depths, rates, results)
     coarse = _sampled(line.top, depths, rates.copy(), results)
     cell, _, _ = highest_point(height, slope)
-    line = nodes(height, slope, (cell + 1) % height.size, 1, True)
+    line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
     return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, rates, trusted)
 
 

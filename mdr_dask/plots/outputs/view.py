@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
 
 #: Settings of solvers, which no title names; the table beside the figure does.
 SETTINGS = {"oversampling", "steps_per_decade", "cells", "extent", "profile_start", "profile_end", "profile_points"}
+
+#: Most letters in a line of a name at a tick; lists and structures are longer.
+LONGEST_NAME = 20
 
 
 @dataclass(frozen=True)
@@ -169,7 +173,8 @@ def scale(axes: Axes, which: str, name: str, values: xr.DataArray, view: View) -
     label = style.meaning(values, name) if own else style.label(name, values)
     getattr(axes, f"set_{which}label")(style.broken(label))
     if values.dtype.kind not in "fiu":
-        getattr(axes, f"set_{which}ticks")(range(values.size), [str(each) for each in np.atleast_1d(values.values)])
+        names = [textwrap.fill(str(each), LONGEST_NAME) for each in np.atleast_1d(values.values)]
+        getattr(axes, f"set_{which}ticks")(range(values.size), names)
     elif view.is_log(which, style.shown(name, values)):
         style.logarithmic(axes, which)
 

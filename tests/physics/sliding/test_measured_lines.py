@@ -33,12 +33,15 @@ def test_the_truth_is_that_of_following_one_element():
 
 @pytest.mark.parametrize("accuracy", [0.05, 0.01, 0.002])
 def test_estimates_hold_and_the_accuracy_is_met(accuracy):
-    """19 of 20 within their estimates, 19 of 20 to the accuracy; before, 9 of 10 and 7 of 10 (1 %)."""
+    """19 of 20 within their estimates, 19 of 20 to the accuracy; before, 9 of 10 and 7 of 10 (1 %).
+
+    The largest error was 25 times its estimate where sums over cells wholly in contact did not see the shortest waves.
+    """
     rows = honesty_lines.kelvin(CASES, SEED, accuracy)
     covered, met = np.mean(rows[:, :, 0] <= 1, axis=0), np.mean(rows[:, 0, 2] <= accuracy)
     assert np.min(covered) >= 0.95
     assert met >= 0.95
-    assert np.max(rows[:, 0, 0]) < 30
+    assert np.max(rows[:, 0, 0]) < (8 if accuracy > 0.01 else 2)
 
 
 @pytest.mark.parametrize("oversampling", [8, "auto"])

@@ -5,7 +5,7 @@ from mdr_dask.physics.sliding import nodes as line_nodes
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.accuracy import COLUMNS, Ladder, relative
-from mdr_dask.physics.sliding.nodes import nodes, refine, weights
+from mdr_dask.physics.sliding.nodes import ends_of, nodes, refine, weights
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -72,7 +72,7 @@ def test_a_finer_grid_lies_on_the_line(hurst, refinement):
     height, slope, _ = line(hurst, oversampling=2)
     fine, fine_slope, _ = line(hurst, oversampling=2 * refinement)
     top = int(np.argmax(height))
-    whole = nodes(height, slope, top, 1, True)
+    whole = nodes(height, slope, top, 1, True, ends_of(height, slope))
     got_height, got_slope = np.empty((2, refinement * 50 + 3))
     refine(whole, line_nodes.BEFORE, 50, weights(refinement), got_height, got_slope)
     expected = np.arange(-1, refinement * 50 + 2) + refinement * top
@@ -81,6 +81,25 @@ def test_a_finer_grid_lies_on_the_line(hurst, refinement):
     assert got_height + whole.top == pytest.approx(np.take(fine, expected, mode="wrap"), abs=1e-6 * shortest)
     steep = 2 * np.pi * MODES * shortest
     assert got_slope * fine.size == pytest.approx(np.take(fine_slope, expected, mode="wrap"), abs=1e-5 * steep)
+
+
+def test_integrals_over_cells_see_the_shortest_waves():
+    """Of a line that is all shortest wave but for a tenth, over any stretch; to rounding, where slopes tell a tenth."""
+    modes, n = 32, 128
+    place = 2 * np.pi * np.arange(n + 1) / n
+
+    def square(x):  # of the slope cos(31 x) + 0.1 sin(32 x), integrated
+        return (
+            x / 2 + np.sin(62 * x) / 124 + 0.005 * (x - np.sin(64 * x) / 64) - 0.1 * (np.cos(63 * x) / 63 + np.cos(x))
+        )
+
+    height, slope = (
+        np.sin((modes - 1) * place[:-1]) / (modes - 1) - 0.1 * np.cos(modes * place[:-1]) / modes,
+        2 * np.pi * (np.cos((modes - 1) * place[:-1]) + 0.1 * np.sin(modes * place[:-1])),
+    )
+    found = nodes(height, slope, 0, 1, True, ends_of(height, slope)).blocks[:, line_nodes.SQUARES]
+    expected = np.diff(square(place)[::32]) * 2 * np.pi / n
+    assert found == pytest.approx(expected, rel=1e-10)
 
 
 @pytest.mark.parametrize("count", [1, 5, 42])

@@ -1,0 +1,151 @@
+"""The top of friction against velocity: how high it is, and where; curves come as stacks of `mdr_dask.bootstrap`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdr_dask import bootstrap
+from mdr_dask.arrays import FloatArray
+from mdr_dask.fits.base import DOUBTFUL
+from mdr_dask.fits.interpolation import Scale, cubic
+
+TOPS = (0.3, 0.2, 0.1, 0.05)  # drops below the largest friction; tests/fits/test_friction_coverage.py chose them
+FLAT = 0.05  # of the largest friction that still counts as plateau
+UPPER = 0.5  # of the largest friction, above which a cubic tells where the top lies
+PLACES = 96  # even on the logarithm of velocity, at which it is fitted
+
+
+def smoothed(mean: FloatArray) -> FloatArray:
+    """Return a course with less scatter, by which it is chosen what is fitted: not by the scatter itself."""
+    smooth = mean.copy()
+    for _ in range(2):
+        smooth[1:-1] = (smooth[:-2] + 2 * smooth[1:-1] + smooth[2:]) / 4
+    return smooth
+
+
+class Top(NamedTuple):
+    """The top of a parabola through the points about the largest friction.
+
+    Attributes
+    ----------
+    height : array, shape (rows,)
+        Stack without the bias of a maximum, with what the parabola leaves as an error.
+    place, rise : array, shape (rows,)
+        Logarithm of velocity, and the logarithmic slope there: not 0 at the ends.
+    """
+
+    height: FloatArray
+    place: FloatArray
+    rise: FloatArray
+
+
+def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
+    """Fit a parabola to as many points about the largest friction as scatter and errors explain the departures of.
+
+    Parameters
+    ----------
+    x : array, shape (velocities,)
+        Logarithms, ascending.
+    stack : array, shape (rows, velocities)
+        Friction.
+    count : int
+        Realisations.
+    """
+    for drop in TOPS:
+        near = _about_the_top(stack[0], drop)
+        top, at, rise, left = _parabola(x[near], stack[:, near])
+        if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
+            continue
+        break
+    unbiased = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
+    if left.shape[1] > 3:
+        errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
+    else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest
+        errors = bootstrap.moved(top[:1], top[:1] - stack[0, near].max()).ravel()
+    return Top(np.concatenate([top, errors]) + (unbiased - top[0]), at, rise)
+
+
+def _about_the_top(mean: FloatArray, drop: float) -> slice:
+    """Return the points about the largest friction that lie less than a part of it below, three at least."""
+    smooth = smoothed(mean)
+    at = int(np.argmax(smooth))
+    low = np.flatnonzero(smooth[at:] <= (1 - drop) * smooth[at])
+    right = at + int(low[0]) if low.size else mean.size
+    low = np.flatnonzero(smooth[:at] <= (1 - drop) * smooth[at])
+    left = int(low[-1]) + 1 if low.size else 0
+    middle = min(max(at, 1), mean.size - 2)
+    return slice(min(left, middle - 1), max(right, middle + 2))
+
+
+def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the top of the parabola through every row, its place, its logarithmic slope there, and what is left."""
+    centre, half = x.mean(), np.ptp(x) / 2
+    u = (x - centre) / half
+    design = np.vstack([np.ones_like(u), u, u**2])
+    constants = rows @ np.linalg.pinv(design)
+    level, tilt, bend = constants.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = np.where(bend < 0, -tilt / (2 * bend), np.copysign(np.inf, tilt))
+    at = np.clip(inside, u.min(), u.max())
+    top = level + tilt * at + bend * at**2
+    return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
+
+
+def place(x: FloatArray, stack: FloatArray) -> FloatArray:
+    """Return the stack of the logarithm of the velocity of the largest friction; infinite where it may lie beyond.
+
+    It is the top of a cubic through the logarithm of the upper half of the curve. The curve is a monotone cubic
+    through its points, and the fit is to even places on it, so that the top does not depend on where the points lie.
+    How far a polynomial of degree four puts it elsewhere is the error of that, in the last two rows.
+
+    Parameters
+    ----------
+    x, stack
+        As for `highest`.
+    """
+    x, stack = _joined(x, stack)
+    whole = np.linspace(x[0], x[-1], 20 * PLACES)
+    curve = _curve(x, stack[:1], whole)[0]
+    top, high = int(np.argmax(curve)), np.flatnonzero(curve > UPPER * curve.max())
+    if curve[top] <= 0 or curve[[0, -1]].max() > (1 - FLAT) * curve[top]:
+        return np.full(len(stack), np.inf if curve[-1] > curve[0] else -np.inf)
+    parts = np.split(high, np.flatnonzero(np.diff(high) > 1) + 1)
+    first, last = next((part[0], part[-1]) for part in parts if part[0] <= top <= part[-1])
+    near = np.linspace(whole[first], whole[last], PLACES)
+    known = np.isfinite(stack).all(axis=1)  # one realisation has no resamples
+    rows = np.log(np.maximum(_curve(x, stack[known], near), np.finfo(float).tiny))
+    own = float(np.clip(whole[top], near[0], near[-1]))
+    places = np.full(len(stack), np.nan)
+    places[known] = _maximum(near, rows, 3, own)
+    if np.isinf(places[0]):
+        return places
+    other = float(_maximum(near, rows[:1], 4, own)[0])
+    shape = abs(other - places[0]) if np.isfinite(other) else np.ptp(near) / 2
+    found: FloatArray = np.concatenate([places, places[0] + shape * np.array([1.0, -1.0])])
+    return found
+
+
+def _joined(x: FloatArray, stack: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a stack with the mean of what lies at the same place: v tau of other v and other tau."""
+    places, group = np.unique(np.round(x, 9), return_inverse=True)
+    member = np.equal.outer(group, np.arange(places.size)).astype(np.float64)
+    return places, stack @ (member / member.sum(axis=0))
+
+
+def _maximum(near: FloatArray, rows: FloatArray, degree: int, own: float) -> FloatArray:
+    """Return the maximum of the polynomial through every row that is next to a place; infinite where it has none."""
+    even, fine = np.linspace(-1.0, 1.0, near.size), np.linspace(-1.0, 1.0, 24 * near.size + 1)
+    curves = rows @ np.linalg.pinv(np.vander(even, degree + 1)).T @ np.vander(fine, degree + 1).T
+    left, middle, right = curves[:, :-2], curves[:, 1:-1], curves[:, 2:]
+    places = (near[0] + near[-1]) / 2 + (near[-1] - near[0]) / 2 * fine[1:-1]
+    away = np.where((middle > left) & (middle >= right), np.abs(places - own), np.inf)
+    at = np.argmin(away, axis=1)
+    end = np.where(curves[:, -1] > curves[:, 0], np.inf, -np.inf)
+    found: FloatArray = np.where(np.isfinite(away.min(axis=1)), places[at], end)
+    return found
+
+
+def _curve(x: FloatArray, rows: FloatArray, places: FloatArray) -> FloatArray:
+    return cubic(x, rows, places, 1, Scale(False))
