@@ -77,3 +77,10 @@ def test_a_campaign_finds_grid_and_lines_for_its_accuracy(benchmark_script, tmp_
     assert seconds > 0
     middle, most = script.picked(tmp_path, scene, 0.05)
     assert 0 < middle <= most <= 0.05
+
+
+def test_operations_are_counted_as_they_are_run(benchmark_script):
+    """Two numbers are written for each wave, after two polynomials of the square of one angle."""
+    (counted,) = benchmark_script("limit.roofs").counts("phase factors").values()
+    assert counted["store"] == 2
+    assert counted["multiply"] > counted["add"] > 10

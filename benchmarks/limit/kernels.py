@@ -12,7 +12,7 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
 from mdr_dask.physics.surfaces.waves import Waves, series
 
-POINTS = 1000
+POINTS = 200
 
 
 class Work(NamedTuple):
@@ -34,18 +34,12 @@ class Kernel(NamedTuple):
         Returns its `Work`.
     is_wide : bool
         Whether its loops are vector instructions.
-    branches : float
-        Wrong guesses of branches for each unit that the case itself asks for: what an element does next is random.
-    chain : dict of str and float
-        Operations for each unit that wait for one another.
     """
 
     name: str
     unit: str
     prepare: Callable[[], Work]
     is_wide: bool = False
-    branches: float = 0.0
-    chain: dict[str, float] = {}  # noqa: RUF012
 
 
 def _nodes(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
@@ -132,11 +126,11 @@ def papers_steps() -> Work:
 
 
 def general_solid() -> Work:
-    """Five arms, all sweeps of a solution."""
+    """Three arms, all sweeps of a solution."""
     from mdr_dask.physics.sliding import viscoelastic
     from mdr_dask.physics.solids import prony
 
-    solid = prony(1.0, np.full(5, 2.0), np.geomspace(1e-4, 1.0, 5))
+    solid = prony(1.0, np.full(3, 3.0), np.geomspace(1e-3, 1.0, 3))
     line = periodic_line(_nodes(2)[0], None)
     run = lambda: viscoelastic.steady_viscoelastic_sliding(line, solid, 0.3)  # noqa: E731
     fixed = _captured(viscoelastic, "solve_sliding", run)
@@ -146,7 +140,7 @@ def general_solid() -> Work:
         fixed[5][:] = start
         return viscoelastic.solve_sliding(*fixed)
 
-    return Work(call, fixed[0].size * 5 * call()[1])
+    return Work(call, fixed[0].size * 3 * call()[1])
 
 
 def search_after_jump() -> Work:
@@ -155,7 +149,7 @@ def search_after_jump() -> Work:
     from mdr_dask.physics.transients.contact_search import touch
     from mdr_dask.physics.transients.ends import PreparedLine, ends_on
     from mdr_dask.physics.transients.free_flight import Instant
-    from mdr_dask.physics.transients.march import Finish, march
+    from mdr_dask.physics.transients.march import Finish, march_depth
     from mdr_dask.physics.transients.patches import History
 
     line, loads, deborah = PreparedLine.of(periodic_line(*_nodes(4))), np.array([0.3]), np.array([[0.02, 0.024]])
@@ -164,7 +158,7 @@ def search_after_jump() -> Work:
     case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, course)
     marching, found, work = case.begun(next(case.limits(case.depth)), 3000)
     finish = Finish(case.depth[1], case.after, 1e-3 * abs(case.depth[1] - case.depth[0]), 1e-3)
-    now = march(marching, case.pace, finish, found, work)[0] // 2
+    now = march_depth(marching, case.pace, finish, found, work)[0] // 2
     history = History(found.time, found.depth, found.rate, now + 1, 1.0)
     time = float(found.time[now])
     moment = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
@@ -172,13 +166,13 @@ def search_after_jump() -> Work:
 
 
 def elements() -> Work:
-    """A Kelvin foundation of two elements for every Nyquist point, sixty-four steps at one speed."""
-    from mdr_dask.physics.transients.elements.follow import closed_nodes, follow_line, steady_start
+    """A Kelvin foundation of two elements for every Nyquist point, sixteen steps at one speed."""
+    from mdr_dask.physics.transients.elements.follow import follow_line, steady_start
     from mdr_dask.physics.transients.elements.foundation import KELVIN
     from mdr_dask.physics.transients.elements.steps import Schedule
 
     height, slope = _nodes(2)
-    line, steps = closed_nodes(height, slope), 64
+    line, steps = periodic_line(height, slope), 16
     state, depth, _ = steady_start(line, KELVIN, 0.0, 0.3)
     moments, one = np.arange(steps + 1) / height.size / 0.1, np.ones(steps + 1)
     schedule = Schedule(moments, 0.1 * moments, 0.1 * one, 0.3 * one)
@@ -199,65 +193,66 @@ def exact_wear() -> Work:
     from mdr_dask.physics.wear import forced_slip
     from mdr_dask.physics.wear.exact import exact
 
-    run = lambda: exact(PowerProfile(2.0), 0.455, [2.0], 1e-3, constant_force=True, errors=False)  # noqa: E731
+    run = lambda: exact(PowerProfile(2.0), 0.455, [0.1], 1e-2, constant_force=True, errors=False)  # noqa: E731
     fixed = _captured(forced_slip, "remember", run)
     return Work(lambda: forced_slip.remember(*fixed), fixed[4].size // 2)
 
 
+class _State(NamedTuple):
+    """Nodes of a grid with Hertz' pressure and a film over them."""
+
+    nodes: np.ndarray
+    pressure: np.ndarray
+    film: np.ndarray
+
+
 def _films() -> tuple[Any, Any, Any]:
-    from mdr_dask.physics.lubrication import line_contact
-    from mdr_dask.physics.lubrication.newton import Grid
+    from mdr_dask.physics.lubrication import grids, line_contact
+    from mdr_dask.physics.lubrication.newton import Grid, film_on
 
     case = line_contact.line_contact(2.0452e-5, 1e-11, 5007.0, 115.385e9)
-    state = line_contact._first_solution(case, line_contact.SETTINGS)[1]
-    return case, state, Grid.of(state.nodes)
+    nodes = grids.first_grid(0.1, grids.inlet_position(0.1), 121)
+    grid, pressure = Grid.of(nodes), line_contact._first_pressure(nodes, 0.1)
+    return case, _State(nodes, pressure, film_on(grid, pressure, 0.1)), grid
 
 
 def film_balance() -> Work:
     """Balance of the lubricant in every volume with its derivatives."""
-    from mdr_dask.physics.lubrication.newton import balance
+    from mdr_dask.physics.lubrication.newton import Imbalance, balance
 
     case, state, _ = _films()
     n = state.nodes.size
-    workspace = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
+    workspace = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     fixed = state.nodes, case.liquid, case.film_number, state.pressure, state.film
     return Work(lambda: balance(*fixed, *workspace), n)
 
 
 def film_equations() -> Work:
     """The dense equations of a Newton step."""
-    from mdr_dask.physics.lubrication.newton import _fill_active, _fill_equations, balance
+    from mdr_dask.physics.lubrication.newton import Imbalance, _fill_active, _fill_equations, balance
 
     case, state, grid = _films()
     n = state.nodes.size
-    numbers, R, by_pressure, by_film = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
-    balance(grid.nodes, case.liquid, case.film_number, state.pressure, state.film, numbers, R, by_pressure, by_film)
+    found = Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
+    balance(grid.nodes, case.liquid, case.film_number, state.pressure, state.film, np.empty((4, n)), found)
     listed = np.empty(n, np.int64)
-    active = listed[: _fill_active(grid.influence, state.pressure, R, by_pressure, by_film, listed)]
+    active = listed[: _fill_active(grid.influence, state.pressure, found, listed)]
     A, b = np.empty((active.size + 1, active.size + 1)), np.empty(active.size + 1)
-    fixed = grid, state.pressure, R, active, by_pressure, by_film, A, b
+    fixed = grid, state.pressure, found, active, A, b
     return Work(lambda: _fill_equations(*fixed), A.size)
-
-
-def film_factors() -> Work:
-    """Their triangular factors, by LAPACK."""
-    from mdr_dask.physics.linear import factorise
-
-    matrix = np.random.default_rng(0).random((300, 300))
-    flops = matrix.shape[0] ** 3 / 3
-    return Work(lambda: factorise(matrix.copy()), flops, {"add": flops, "multiply": flops})
 
 
 def breakthrough() -> Work:
     """Clusters of a line and the contact points of every window."""
     from mdr_dask.physics.lubrication import breakthrough as layers
+    from mdr_dask.physics.lubrication import clusters
 
     line = 0.2e-6 * _nodes(2)[0]
     strength = float(layers.layer_strength(1e6, 115.385e9, 5e-9))
-    above = layers.excursions(line, 2e-7)
+    above = clusters.excursions(line, 2e-7)
 
     def call() -> object:
-        return layers.contact_points(layers.find_clusters(above, 2e-7, 3e-7, strength), 47)
+        return layers.contact_points(clusters.find_clusters(above, 2e-7, 3e-7, strength), 47)
 
     return Work(call, line.size)
 
@@ -305,7 +300,6 @@ KERNELS = (
     Kernel("exact wear: memory", "node", exact_wear),
     Kernel("film: balance", "node", film_balance),
     Kernel("film: equations", "entry", film_equations, is_wide=True),
-    Kernel("film: factors", "n^3 / 3", film_factors, is_wide=True),
     Kernel("breakthrough", "point", breakthrough),
     Kernel("phase factors", "wave", phase_factors, is_wide=True),
     Kernel("line from waves", "node", fourier_line, is_wide=True),

@@ -101,20 +101,6 @@ def _vector_roots(n, x, y):
             y[i] = math.sqrt(x[i])
 
 
-@njit
-def _guessed(n, bit, x, y):
-    """Write to one array or the other, as a random bit says, which no processor foresees; with no bit to one."""
-    state = np.uint64(88172645463325252)
-    for i in range(n):
-        state ^= state << np.uint64(13)
-        state ^= state >> np.uint64(7)
-        state ^= state << np.uint64(17)
-        if state & np.uint64(bit):
-            x[i & 1023] += 1.0
-        else:
-            y[i & 1023] *= 0.5
-
-
 @njit(fastmath=True)
 def _summed(n, x):
     total = 0.0
@@ -151,6 +137,4 @@ def roofs() -> dict[str, float]:
     found["byte in cache"] = _seconds(_summed, REPEATS, x) / (8 * loops)
     long = np.ones(LONG)
     found["byte of memory"] = _seconds(np.sum, long) / (8 * LONG)
-    either, one = _seconds(_guessed, REPEATS, 1, x, y), _seconds(_guessed, REPEATS, 0, x, y)
-    found["wrong guess of a branch"] = 2 * max(either - one, 0.0) / REPEATS
     return found

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 COUNTS: Counter[str] = Counter()
-KERNELS = {"njit", "compiled", "inlined", "_inlined"}  # the decorators of what is compiled
+KERNELS = {"kernel", "compiled", "inlined", "fused"}  # the decorators of what is compiled
 OPERATIONS = {ast.Add: "add", ast.Sub: "add", ast.Mult: "multiply", ast.Div: "divide"}
 COMPARES = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 FUNCTIONS = {"sqrt": "root", "pow": "power"} | dict.fromkeys(
@@ -58,7 +58,9 @@ class _Counting(ast.NodeTransformer):
         names = {getattr(part, "id", None) for each in node.decorator_list for part in ast.walk(each)}
         if self.inside or names & KERNELS:
             self.inside = True
-            node.body = [self.visit(statement) for statement in node.body]
+            node.decorator_list, decorators = [], node.decorator_list
+            self.generic_visit(node)
+            node.decorator_list = decorators
             self.inside = False
         return node
 

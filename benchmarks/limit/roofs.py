@@ -3,7 +3,7 @@
 Operations are counted by running each kernel as plain Python with every operation counted, in a process of its own.
 The roof of a kernel is the time of its busiest part: additions and comparisons, multiplications, divisions and roots,
 or loads and stores, each at the measured throughput, of vector instructions where its loops are such; elementary
-functions come on top. Where operations wait for one another, or the case makes branches random, that is a roof too.
+functions come on top.
 
     python -m benchmarks limit roofs [PART OF A NAME]
 """
@@ -16,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 
+from benchmarks.limit import operations
 from benchmarks.limit.kernels import KERNELS, Kernel, Work
 from benchmarks.limit.machine import roofs
 from benchmarks.measures import print_table, timed
@@ -25,7 +26,8 @@ NUMBER = 8  # bytes
 
 def counts(part: str) -> dict[str, dict[str, float]]:
     """Return the operations of every kernel for each unit, counted in another process."""
-    code = f"from benchmarks.limit.roofs import count; count({part!r})"
+    first = "from benchmarks.limit import operations; operations.count_kernels()"
+    code = f"{first}; from benchmarks.limit.roofs import count; count({part!r})"
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     found: dict[str, dict[str, float]] = json.loads(done.stdout)
@@ -33,10 +35,7 @@ def counts(part: str) -> dict[str, dict[str, float]]:
 
 
 def count(part: str) -> None:
-    """Print the operations of every kernel for each unit; in a process without compiling."""
-    from benchmarks.limit import operations
-
-    operations.count_kernels()
+    """Print the operations of every kernel for each unit; in a process that counts them."""
     found = {}
     for kernel in KERNELS:
         if part not in kernel.name:
@@ -63,8 +62,6 @@ def roof(kernel: Kernel, work: Mapping[str, float], machine: Mapping[str, float]
         "products": spent("multiply") + functions,
         "quotients": spent("divide") + spent("root") + functions,
         "bytes": NUMBER * (work.get("load", 0.0) + work.get("store", 0.0)) * machine["byte in cache"],
-        "one after the other": sum(number * machine[name] for name, number in kernel.chain.items()),
-        "branches": kernel.branches * machine["wrong guess of a branch"],
     }
     what = max(bounds, key=lambda name: bounds[name])
     return bounds[what], what

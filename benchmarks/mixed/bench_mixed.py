@@ -31,7 +31,7 @@ def sliding(lines):
 
 def every_window(lines, stride=1, slip=0.0):
     positions = bt.creep_positions(np.arange(0, 10**6, stride), 10**6, slip)
-    return bt.judge_windows(*lines, LEVEL, SPACING, STRENGTH, WINDOW, positions)
+    return bt.judge_windows(bt.Pair(*lines, LEVEL, SPACING, STRENGTH), WINDOW, positions)
 
 
 def test_pure_rolling_by_sliding_sums(benchmark, lines):

@@ -36,7 +36,7 @@ def sliding(pair, window, level):
 def every_window(pair, window, level):
     points = pair[0].size
     positions = (np.arange(points), np.arange(points))
-    found = bt.judge_windows(*pair, level, PERIMETER / points, STRENGTH, window, positions)
+    found = bt.judge_windows(bt.Pair(*pair, level, PERIMETER / points, STRENGTH), window, positions)
     return float(np.mean(found > 0))
 
 

@@ -58,16 +58,10 @@ def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], coarser
     line_1, line_2 = (np.ascontiguousarray(line[:even:coarser]) for line in lines)
     stride = max(2, operation.window // STRIDES // 2 * 2) // coarser
     window = _window(operation, coarser)
-    contact_points = breakthrough.judge_windows(
-        line_1,
-        line_2,
-        operation.level,
-        coarser * operation.spacing,
-        operation.strength,
-        window,
-        breakthrough.creep_positions(np.arange(0, line_1.size, stride), line_1.size, operation.case.slide_roll_ratio),
-        operation.case.edge_rule,
-    )
+    pair = breakthrough.Pair(line_1, line_2, operation.level, coarser * operation.spacing, operation.strength)
+    way, creep = np.arange(0, line_1.size, stride), operation.case.slide_roll_ratio
+    positions = breakthrough.creep_positions(way, line_1.size, creep)
+    contact_points = breakthrough.judge_windows(pair, window, positions, operation.case.edge_rule)
     return Turn(contact_points, -(-window // stride))
 
 
@@ -107,15 +101,9 @@ def trace(operation: Operation, turn: Turn, lines: tuple[FloatArray, FloatArray]
     way = np.arange(case.trace_points) * points // case.trace_points
     if case.slide_roll_ratio == 0:
         return np.asarray(turn.contact_points[way] * operation.spacing, dtype=np.float64)
-    contact_points = breakthrough.judge_windows(
-        *lines,
-        operation.level,
-        operation.spacing,
-        operation.strength,
-        operation.window,
-        breakthrough.creep_positions(way, points, case.slide_roll_ratio),
-        case.edge_rule,
-    )
+    pair = breakthrough.Pair(*lines, operation.level, operation.spacing, operation.strength)
+    positions = breakthrough.creep_positions(way, points, case.slide_roll_ratio)
+    contact_points = breakthrough.judge_windows(pair, operation.window, positions, case.edge_rule)
     return np.asarray(contact_points * operation.spacing, dtype=np.float64)
 
 

@@ -99,23 +99,14 @@ def _add_parts(
 
 
 @kernel
-def _collect(
-    start: IntArray,
-    length: IntArray,
-    total: FloatArray,
-    overlap: FloatArray,
-    limit: float,
-    window: int,
-    rule: int,
-    jumps: NDArray[np.int32],
-    trace: NDArray[np.int32],
-) -> None:
+def _collect(clusters: Clusters, window: int, rule: int, jumps: NDArray[np.int32], trace: NDArray[np.int32]) -> None:
     """Gather the jumps of the trace cluster by cluster, then sum them up."""
+    limit, overlap = clusters.limit, clusters.overlap
     points = trace.size
     offset = 0
-    for c in range(start.size):
-        s, n = start[c], length[c]
-        broken = total[c] > limit * float(n) ** 3
+    for c in range(clusters.start.size):
+        s, n = clusters.start[c], clusters.length[c]
+        broken = clusters.total[c] > limit * float(n) ** 3
         if rule == _WHOLE and broken:
             _block(jumps, s - window + 1, min(n + window - 1, points), n)
         elif rule != _WHOLE and broken and n <= window and n < points:
@@ -147,23 +138,42 @@ def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArr
         Entry p belongs to the window over points p to p + window - 1. The share of entries above zero is the
         breakthrough probability; their mean times dx is the mean contact length.
     """
-    start, length, total, overlap, limit, points = clusters
-    jumps, trace = np.zeros(points + 1, dtype=np.int32), np.zeros(points, dtype=np.int32)
-    if start.size:
-        _collect(start, length, total, overlap, limit, window, EDGE_RULES.index(rule), jumps, trace)
+    jumps, trace = np.zeros(clusters.points + 1, dtype=np.int32), np.zeros(clusters.points, dtype=np.int32)
+    if clusters.start.size:
+        _collect(clusters, window, EDGE_RULES.index(rule), jumps, trace)
     return trace
 
 
+class Pair(NamedTuple):
+    """Two rough lines at a distance.
+
+    Parameters
+    ----------
+    line_1, line_2 : array, shape (points,)
+        Heights of the two closed lines in m.
+    level : float
+        Film thickness h0 in m.
+    spacing : float
+        Distance dx of the points in m.
+    strength : float
+        From `layer_strength`, in 1/m.
+    """
+
+    line_1: FloatArray
+    line_2: FloatArray
+    level: float
+    spacing: float
+    strength: float
+
+
 @compiled
-def _beyond(
-    line_1: FloatArray, line_2: FloatArray, level: float, p: int, q: int, step: int, most: int
-) -> tuple[int, float]:
+def _beyond(pair: Pair, p: int, q: int, step: int, most: int) -> tuple[int, float]:
     """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
-    points = line_1.size
+    points = pair.line_1.size
     n = 0
     total = 0.0
     while n < most:
-        overlap = line_1[(p + n * step) % points] + line_2[(q + n * step) % points] - level
+        overlap = pair.line_1[(p + n * step) % points] + pair.line_2[(q + n * step) % points] - pair.level
         if overlap <= 0.0:
             break
         total += overlap
@@ -172,32 +182,25 @@ def _beyond(
 
 
 @compiled
-def _fill(line_1: FloatArray, line_2: FloatArray, level: float, p: int, q: int, overlap: FloatArray) -> None:
+def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
     """Fill the overlaps of the window that stands at (p, q)."""
-    points = line_1.size
+    points = pair.line_1.size
     for k in range(overlap.size):
-        overlap[k] = line_1[p] + line_2[q] - level
+        overlap[k] = pair.line_1[p] + pair.line_2[q] - pair.level
         p = p + 1 if p + 1 < points else 0
         q = q + 1 if q + 1 < points else 0
 
 
 @compiled
 def _windows(
-    line_1: FloatArray,
-    line_2: FloatArray,
-    level: float,
-    limit: float,
-    first_1: IntArray,
-    first_2: IntArray,
-    rule: int,
-    overlap: FloatArray,
-    contact: IntArray,
+    pair: Pair, positions: tuple[IntArray, IntArray], rule: int, overlap: FloatArray, contact: IntArray
 ) -> None:
     """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` the workspace of a window."""
-    points, window = line_1.size, overlap.size
-    for w in range(first_1.size):
-        p, q = first_1[w], first_2[w]
-        _fill(line_1, line_2, level, p, q, overlap)
+    points, window = pair.line_1.size, overlap.size
+    limit = pair.strength * pair.spacing**2
+    for w in range(contact.size):
+        p, q = positions[0][w], positions[1][w]
+        _fill(pair, p, q, overlap)
         k = 0
         while k < window:
             if overlap[k] <= 0.0:
@@ -210,33 +213,23 @@ def _windows(
                 k += 1
             n = inside = k - begin
             if begin == 0 and rule != _PART:
-                more, extra = _beyond(line_1, line_2, level, p - 1, q - 1, -1, points - n)
+                more, extra = _beyond(pair, p - 1, q - 1, -1, points - n)
                 n, total = n + more, total + extra
             if k == window and rule != _PART:
-                more, extra = _beyond(line_1, line_2, level, p + k, q + k, 1, points - n)
+                more, extra = _beyond(pair, p + k, q + k, 1, points - n)
                 n, total = n + more, total + extra
             if total > limit * float(n) ** 3 and (rule != _INSIDE or n == inside):
                 contact[w] += inside if rule == _CLIP else n
 
 
 def judge_windows(
-    line_1: FloatArray,
-    line_2: FloatArray,
-    level: float,
-    spacing: float,
-    strength: float,
-    window: int,
-    positions: tuple[IntArray, IntArray],
-    rule: str = "part",
+    pair: Pair, window: int, positions: tuple[IntArray, IntArray], rule: str = "part"
 ) -> NDArray[np.int64]:
     """Judge windows one by one: the reference for pure rolling, and the way of rolling with creep.
 
     Parameters
     ----------
-    line_1, line_2 : array, shape (points,)
-        Heights of the two closed lines in m.
-    level, spacing, strength : float
-        As in `find_clusters`.
+    pair : Pair
     window : int
         Points in the window.
     positions : tuple of two int arrays, shape (n,)
@@ -249,11 +242,9 @@ def judge_windows(
     int array, shape (n,)
         Points in intimate contact of each window.
     """
-    first_1, first_2 = positions
-    contact = np.zeros(first_1.size, dtype=np.int64)
-    if line_1.max() + line_2.max() > level:
-        limit, overlap = strength * spacing**2, np.empty(window)
-        _windows(line_1, line_2, level, limit, first_1, first_2, EDGE_RULES.index(rule), overlap, contact)
+    contact = np.zeros(positions[0].size, dtype=np.int64)
+    if pair.line_1.max() + pair.line_2.max() > pair.level:
+        _windows(pair, positions, EDGE_RULES.index(rule), np.empty(window), contact)
     return contact
 
 

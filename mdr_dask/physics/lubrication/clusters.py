@@ -76,17 +76,9 @@ class Clusters(NamedTuple):
 
 
 @compiled
-def _scan(
-    place: IntArray,
-    height: FloatArray,
-    points: int,
-    level: float,
-    start: IntArray,
-    length: IntArray,
-    total: FloatArray,
-    overlap: FloatArray,
-) -> int:
+def _scan(above: Excursions, level: float, found: Clusters) -> int:
     """Fill the clusters of excursions in the order of their starts; return their number."""
+    place, points = above.place, above.points
     first = 0
     while first < place.size and (place[first - 1] + 1) % points == place[first]:
         first += 1
@@ -95,12 +87,12 @@ def _scan(
         j = (first + k) % place.size
         if k == 0 or (place[j - 1] + 1) % points != place[j]:
             count += 1
-            start[count] = place[j]
-            length[count] = 0
-            total[count] = 0.0
-        length[count] += 1
-        overlap[k] = height[j] - level
-        total[count] += overlap[k]
+            found.start[count] = place[j]
+            found.length[count] = 0
+            found.total[count] = 0.0
+        found.length[count] += 1
+        found.overlap[k] = above.height[j] - level
+        found.total[count] += found.overlap[k]
     return count + 1
 
 
@@ -118,8 +110,9 @@ def find_clusters(above: Excursions, level: float, spacing: float, strength: flo
     strength : float
         From `layer_strength`, in 1/m.
     """
-    place, height, points = above.above(level)
-    start, length = np.empty(place.size, np.int64), np.empty(place.size, np.int64)
-    total, overlap = np.empty(place.size), np.empty(place.size)
-    n = _scan(place, height, points, level, start, length, total, overlap)
-    return Clusters(start[:n], length[:n], total[:n], overlap, strength * spacing**2, points)
+    beyond = above.above(level)
+    most, limit = beyond.place.size, strength * spacing**2
+    start, length = np.empty(most, np.int64), np.empty(most, np.int64)
+    found = Clusters(start, length, np.empty(most), np.empty(most), limit, above.points)
+    n = _scan(beyond, level, found)
+    return found._replace(start=start[:n], length=length[:n], total=found.total[:n])

@@ -149,19 +149,23 @@ def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     return w0, 1.0 - w0 - w2, w2
 
 
+class Imbalance(NamedTuple):
+    """What flows into every volume less what flows out, shape (n,), and its derivatives, shape (n, 4).
+
+    Those are by pressure and film of the nodes i - 2 to i + 1.
+    """
+
+    value: FloatArray
+    by_pressure: FloatArray
+    by_film: FloatArray
+
+
 @compiled
 def balance(
-    nodes: FloatArray,
-    liquid: Liquid,
-    K: float,
-    P: FloatArray,
-    H: FloatArray,
-    state: FloatArray,
-    R: FloatArray,
-    by_pressure: FloatArray,
-    by_film: FloatArray,
+    nodes: FloatArray, liquid: Liquid, K: float, P: FloatArray, H: FloatArray, state: FloatArray, found: Imbalance
 ) -> None:
-    """Fill the balance R of every volume and its derivatives by P and H of the nodes i-2 to i+1, shape (n, 4)."""
+    """Fill the imbalance of every volume; `state` is workspace, shape (4, n)."""
+    R, by_pressure, by_film = found
     rho, rho_slope, viscosity, viscosity_slope = state
     for i in range(P.size):
         rho[i] = 1.0 + liquid.density_rise * P[i] / (1.0 + liquid.density_saturation * P[i])
@@ -216,15 +220,9 @@ def _fill_jacobian_row(
 
 
 @compiled
-def _fill_active(
-    influence: FloatArray,
-    P: FloatArray,
-    R: FloatArray,
-    by_pressure: FloatArray,
-    by_film: FloatArray,
-    active: NDArray[np.int64],
-) -> int:
+def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
     """List the inner nodes that carry pressure, ``P + R/d > 0`` with d the size of their own derivative; count them."""
+    R, by_pressure, by_film = found
     count = 0
     for i in range(1, P.size - 1):
         size = abs(by_pressure[i, 2])
@@ -238,16 +236,10 @@ def _fill_active(
 
 @kernel
 def _fill_equations(
-    grid: Grid,
-    P: FloatArray,
-    R: FloatArray,
-    active: NDArray[np.int64],
-    by_pressure: FloatArray,
-    by_film: FloatArray,
-    A: FloatArray,
-    b: FloatArray,
+    grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
     """Fill the Newton equations of the active pressures and the central film; the other pressures go to zero."""
+    R, by_pressure, by_film = found
     count = active.size
     released, row = P.copy(), np.empty(P.size)
     for k in range(count):
@@ -343,14 +335,14 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     """
     n = guess.size
     P, H = guess.copy(), film_on(grid, guess, central)
-    state, R, by_pressure, by_film = np.empty((4, n)), np.empty(n), np.empty((n, 4)), np.empty((n, 4))
-    listed, room = np.empty(n, np.int64), np.empty(n * n)
+    state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
+    listed, workspace = np.empty(n, np.int64), np.empty(n * n)
     for steps in range(1, pace.most + 1):
-        balance(grid.nodes, liquid, K, P, H, state, R, by_pressure, by_film)
-        active = listed[: _fill_active(grid.influence, P, R, by_pressure, by_film, listed)]
+        balance(grid.nodes, liquid, K, P, H, state, found)
+        active = listed[: _fill_active(grid.influence, P, found, listed)]
         order = active.size + 1
-        A, b = room[: order * order].reshape(order, order), np.empty(order)
-        _fill_equations(grid, P, R, active, by_pressure, by_film, A, b)
+        A, b = workspace[: order * order].reshape(order, order), np.empty(order)
+        _fill_equations(grid, P, found, active, A, b)
         factors = factorise(A)
         if factors is None:
             return Iterate(Outcome.SINGULAR, steps, P, central, H)

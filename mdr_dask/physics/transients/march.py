@@ -141,6 +141,22 @@ def _weights(found: Trajectory, now: int) -> tuple[float, float]:
     return 2 / taken, -2 * found.depth[0] / taken - found.rate[0]
 
 
+@compiled
+def _foretold(found: Trajectory, now: int) -> float:
+    """Extrapolate the depth to moment `now`: by a parabola, over the logarithm of time as soon as there are moments."""
+    time, depth, rate, _ = found
+    taken = time[now] - time[now - 1]
+    if now == 1:
+        return float(depth[0] + taken * rate[0])
+    if now <= 3:
+        bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
+        return float(depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend))
+    ahead = np.log(time[now] / time[now - 1])
+    one, two = np.log(time[now - 2] / time[now - 1]), np.log(time[now - 3] / time[now - 1])
+    to_one, to_two = (depth[now - 2] - depth[now - 1]) / one, (depth[now - 3] - depth[now - 1]) / two
+    return float(depth[now - 1] + ahead * (to_one + (ahead - one) * (to_two - to_one) / (two - one)))
+
+
 @kernel
 def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three.
@@ -170,12 +186,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
         if pace.until - time[now] < 0.1 * step:
             time[now] = pace.until
         taken = time[now] - time[now - 1]
-        weights = _weights(found, now)
-        if now == 1:
-            foretold = depth[0] + taken * rate[0]
-        else:
-            bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
-            foretold = depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend)
+        weights, foretold = _weights(found, now), _foretold(found, now)
         depth[now] = min(max(foretold, marching.low), marching.high)
         history = History(time, depth, rate, now + 1, weights[0])
         outcome, drag[now] = _balance(marching, history, weights, pace.close, work)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import kernel
@@ -16,6 +15,7 @@ from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
+from mdr_dask.physics.transients.makima import curve_through
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
@@ -379,7 +379,9 @@ def _reachable(track: Track, slowest: Patches, high: float) -> Reachable:
 def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray) -> FloatArray:
     """Interpolate over log time by modified Akima curves, which no kink makes overshoot; linear in the first step."""
     scale = moments[1]
-    curves = Akima1DInterpolator(np.log1p(moments / scale), rows, axis=1, method="makima")
-    traces: FloatArray = curves(np.log1p(times / scale))
+    x, places = np.log1p(moments / scale), np.log1p(times / scale)
+    traces = np.empty((len(rows), times.size))
+    for row, trace in zip(rows, traces, strict=True):
+        curve_through(x, row, places, trace)
     traces[:, times > moments[-1]] = after[:, None]
     return traces

@@ -93,7 +93,7 @@ def test_sliding_equals_judging_every_window(rule):
         strength = 10 ** generator.uniform(-3, -1)
         fast = bt.contact_points(clusters_of(line, level, 1.0, strength), window, rule)
         every = np.arange(points)
-        slow = bt.judge_windows(line, np.zeros(points), level, 1.0, strength, window, (every, every), rule)
+        slow = bt.judge_windows(bt.Pair(line, np.zeros(points), level, 1.0, strength), window, (every, every), rule)
         np.testing.assert_array_equal(fast, slow)
         contacts += int((fast > 0).sum())
     assert contacts > 300
@@ -229,7 +229,8 @@ def test_creep_leaves_the_expected_probability():
         line_2, _, _ = rough_line(points, 80, 4000, 0.7, 2 * seed + 1, rms=np.sqrt(0.5))
         for slip, found in values.items():
             positions = bt.creep_positions(np.arange(0, points, window // 8), points, slip)
-            found.append((bt.judge_windows(line_1, line_2, level, 1.0, strength, window, positions) > 0).mean())
+            pair = bt.Pair(line_1, line_2, level, 1.0, strength)
+            found.append((bt.judge_windows(pair, window, positions) > 0).mean())
     means = {slip: np.mean(v) for slip, v in values.items()}
     errors = {slip: np.std(v, ddof=1) / 4 for slip, v in values.items()}
     assert 0.1 < means[0.0] < 0.9
@@ -242,7 +243,7 @@ def test_sparse_windows_have_the_mean_of_all():
     found = clusters_of(line, 1.0, 1.0, 1e-3)
     every = bt.contact_points(found, 200) > 0
     positions = bt.creep_positions(np.arange(0, 100_000, 25), 100_000, 0.0)
-    sparse = bt.judge_windows(line, np.zeros(100_000), 1.0, 1.0, 1e-3, 200, positions) > 0
+    sparse = bt.judge_windows(bt.Pair(line, np.zeros(100_000), 1.0, 1.0, 1e-3), 200, positions) > 0
     # the trace changes state a few times a window at most: a grid of eighths misses part of an eighth each time
     assert sparse.mean() == pytest.approx(every.mean(), abs=0.01)
 

@@ -8,6 +8,7 @@ import pytest
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.lubrication.newton import (
     Grid,
+    Imbalance,
     Iterate,
     Liquid,
     Pace,
@@ -62,9 +63,9 @@ def test_derivatives_of_the_balance_are_its_differences(liquid: Liquid) -> None:
     H = 0.3 + 0.1 * nodes**2
 
     def balances(P: np.ndarray, H: np.ndarray) -> tuple[np.ndarray, ...]:
-        R, by_pressure, by_film = np.empty(n), np.empty((n, 4)), np.empty((n, 4))
-        balance(nodes, liquid, 0.2, P, H, np.empty((4, n)), R, by_pressure, by_film)
-        return R, by_pressure, by_film
+        found = Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
+        balance(nodes, liquid, 0.2, P, H, np.empty((4, n)), found)
+        return found
 
     _, by_pressure, by_film = balances(P, H)
     for j in range(n):
@@ -92,7 +93,7 @@ def test_result_is_complementary_and_carries_the_load() -> None:
     assert np.array_equal(film_on(GRID, P, found.central), H)
     assert H.min() > 0
     R = np.empty(n)
-    balance(GRID.nodes, BARUS, 0.2, P, H, np.empty((4, n)), R, np.empty((n, 4)), np.empty((n, 4)))
+    balance(GRID.nodes, BARUS, 0.2, P, H, np.empty((4, n)), Imbalance(R, np.empty((n, 4)), np.empty((n, 4))))
     carrying = P > 0
     carrying[[0, -1]] = False
     assert np.max(np.abs(R[carrying])) < 1e-9  # the step was below 1e-10 of the pressure
