@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from planted import SLIDING, make
+from planted import ROLLERS, SLIDING, make
 
 from mdr_dask.cli import main
 
@@ -123,6 +123,19 @@ def test_labelled_arrays_carry_units_numbers_and_states(study, tmp_path, capsys)
         assert found.load_number.dims == ("normal_force",)
         assert found.friction_coefficient_mean.isnull().sum() == 3 * 2
         assert found.state_counts.sel(state="failed").sum() == 1
+
+
+def test_a_table_to_read_has_the_units_of_the_campaign_and_a_file_has_those_of_si(tmp_path, capsys):
+    axes = "  rotation_speed: [10 rpm, 1000 rpm]\n  temperature: [40 degC, 60 degC]\n  normal_force: [1 kN, 200 N]\n"
+    make(tmp_path, ROLLERS + axes)
+    asked = ("show", str(tmp_path / "study.zarr"), "film_ratio")
+    head, first, *_ = told(capsys, *asked).out.splitlines()
+    assert head.split()[:6] == ["rotation_speed", "[rpm]", "temperature", "[degC]", "normal_force", "[N]"]
+    assert first.split()[:3] == ["10", "40", "200"]
+    assert told(capsys, *asked, "--units", "temperature=K").out.splitlines()[1].split()[:2] == ["10", "313.15"]
+    head, first, *_ = told(capsys, *asked, "--csv").out.splitlines()
+    assert head.startswith("rotation_speed [rad/s],temperature [K],normal_force [N],")
+    assert first.startswith("1.0471975511965976,313.15,200.0,")
 
 
 def test_a_study_with_series_says_which_there_are(tmp_path, capsys):

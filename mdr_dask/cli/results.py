@@ -149,7 +149,7 @@ def _answer(
         if form:
             raise click.UsageError(f"expected one of --{form} and --output, got both")
         check_target(output)
-    question = Question(outputs, statistics=statistics, **parts)
+    question = Question(outputs, statistics=statistics, written=output is None and not form, **parts)
     dataset = selection.group(room.datasets(store), series)
     if output is None:
         print_answer(table(dataset, question, 0 if form else limit, tell), form or "table", limit, join)

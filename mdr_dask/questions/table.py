@@ -19,7 +19,7 @@ from mdr_dask.questions.columns import COUNTS, REALISATIONS, STATUS, Columns, ne
 from mdr_dask.questions.expression import parse
 from mdr_dask.questions.groups import CASES, averaged
 from mdr_dask.questions.selection import Tell, outputs, select
-from mdr_dask.questions.units import in_units
+from mdr_dask.questions.units import as_written, in_units
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,6 +50,8 @@ class Question:
         Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; all axes and outputs if none.
     units : mapping of str to str
         Units of columns, others are SI.
+    written : bool
+        Whether axes and parameters without one of `units` are in the unit that the campaign writes them in.
     statistics : tuple of str, optional
         Over realisations; None for a row for each result.
     """
@@ -61,6 +63,7 @@ class Question:
     sort: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
+    written: bool = False
     statistics: tuple[str, ...] | None = MEANS
 
 
@@ -125,6 +128,7 @@ class _Maker:
         shown = outputs(dataset, question.outputs) if question.outputs or not question.columns else dataset[[]]
         errors = {shown[name].attrs.get("ancillary_variables") for name in shown.data_vars}
         self._question, self._raw = question, raw
+        self._written = as_written(dataset) if question.written else {}
         self._outputs = [str(name) for name in shown.data_vars if raw or name not in errors]
         used = [name for name in dict.fromkeys([*self._outputs, *needed(dataset, named)]) if name != STATUS]
         wanted = outputs(dataset, used).data_vars if used else ()
@@ -226,7 +230,8 @@ class _Maker:
                 found |= {str(key): array for key, array in reduced.data_vars.items()}
             else:
                 found[name] = columns.column(name)
-        wide = in_units(xr.Dataset({}, rows.coords).drop_vars(rows.coords).assign(found), self._question.units)
+        asked = {name: unit for name, unit in self._written.items() if name in found} | dict(self._question.units)
+        wide = in_units(xr.Dataset({}, rows.coords).drop_vars(rows.coords).assign(found), asked)
         flat = {key: value for name in found for key, value in _flattened(wide[name], name).items()}
         units = {key: str(value.attrs.get("units", "1")) for key, value in flat.items()}
         size = rows.sizes["row"]

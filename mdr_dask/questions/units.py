@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from mdr_dask.campaign.written import written_units
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import conversion
 
@@ -32,6 +33,12 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
             raise DataError(f"expected NAME=UNIT,NAME=UNIT, got {part!r}")
         wanted[name.replace(".", "_")] = unit
     return wanted
+
+
+def as_written(study: xr.Dataset) -> dict[str, str]:
+    """Return the units in which the campaign of a study writes its axes and parameters, words and lists left out."""
+    written = written_units(str(study.attrs.get("campaign", "")))
+    return {name: unit for name, unit in written.items() if name in study.coords and study[name].dtype.kind in "fiu"}
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
