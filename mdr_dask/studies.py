@@ -329,14 +329,14 @@ def master_curve(
     """
     from pandas import DataFrame
 
-    from mdr_dask.fits import master_curve as room
+    from mdr_dask.fits import curve_tables, master_curve
 
     if isinstance(study, str | Path) and Path(study).is_file():
-        study = room.read_table(study)
+        study = curve_tables.read_table(study)
     if not isinstance(study, DataFrame):
         groups = _groups(study)
-        study = room.friction_of_roughness(groups) if len(groups) > 1 else _group(study, None)
-    return room.master_curve(study, over, of, by, vertical, reference, bootstrap)
+        study = master_curve.friction_of_roughness(groups) if len(groups) > 1 else _group(study, None)
+    return master_curve.master_curve(study, over, of, by, vertical, reference, bootstrap)
 
 
 @xr.register_dataset_accessor("mdr")  # type: ignore[no-untyped-call]

@@ -10,7 +10,8 @@ from scipy.spatial import cKDTree
 
 from mdr_dask import aggregation, fits
 from mdr_dask.errors import FitError
-from mdr_dask.fits.friction import indenter_xi, numbers, spectral_slope, within_indenter_law
+from mdr_dask.fits.friction import numbers, spectral_slope
+from mdr_dask.fits.indenter import indenter_xi, within_indenter_law
 from mdr_dask.fits.kinetics import well_known
 from mdr_dask.models.ehl_line import groups as groups_of
 from mdr_dask.physics.lubrication import film_formulas

@@ -107,6 +107,12 @@ def test_what_belongs_together_travels_together():
     assert len(long) <= LONG_CALLS, long
 
 
+def test_a_file_is_one_idea():
+    """Beyond this size a file has held two, every time."""
+    sizes = {path: len(path.read_text().splitlines()) for path in (ROOT / "mdr_dask").rglob("*.py")}
+    assert {path: size for path, size in sizes.items() if size > 450} == {}
+
+
 def test_public_names_are_unique_across_physics():
     """Every solver may have its own `Settings`."""
     seen = defaultdict(set)

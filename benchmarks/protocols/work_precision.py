@@ -101,9 +101,8 @@ def backward_euler(under, solid) -> np.ndarray:
     """Return the drag at `TIMES` by backward Euler in steps of one cell."""
     reaches = np.array([REACH, REACH * (1 + CHANGE)])
     moments, drags = np.empty((2, under.height.size))
-    count = _euler(
-        under.height[:-1], under.slope[:-1], solid.moduli, solid.times, solid.viscosity, LOAD, reaches, moments, drags
-    )
+    slope = under.enter * under.enter.size
+    count = _euler(under.height[:-1], slope, solid.moduli, solid.times, solid.viscosity, LOAD, reaches, moments, drags)
     first = moments[:count] <= 1 + 1e-9
     parts = [(first, TIMES < 1), (~first, TIMES > 1)]
     return np.concatenate([np.interp(TIMES[t], moments[:count][rows], drags[:count][rows]) for rows, t in parts])

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
-from mdr_dask.fits.master_curve import read_table
+from mdr_dask.fits.curve_tables import read_table
 from mdr_dask.physics.superposition.master_curve import superpose
 
 DATA = Path(__file__).parents[2] / "tests" / "data" / "dma"

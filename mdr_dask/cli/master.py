@@ -115,7 +115,8 @@ def _keep(curve: xr.Dataset, part: str, path: Path) -> None:
 
 def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Dataset | pd.DataFrame:
     from mdr_dask import store
-    from mdr_dask.fits.master_curve import friction_of_roughness, read_table
+    from mdr_dask.fits.curve_tables import read_table
+    from mdr_dask.fits.master_curve import friction_of_roughness
     from mdr_dask.questions import selection
 
     path = Path("/dev/stdin" if source == "-" else source)

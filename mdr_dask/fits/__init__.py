@@ -12,6 +12,8 @@ SUBJECTS: tuple[str, ...] = (
     "calibration",
     "ehl",
     "friction",
+    "indenter",
+    "jumps",
     "kinetic_courses",
     "kinetics",
     "master_curve",

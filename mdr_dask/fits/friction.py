@@ -17,7 +17,6 @@ from mdr_dask.fits import top
 from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds, require
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces import shapes as indenter
 
 Series = Mapping[str, xr.Dataset]
 Variables = dict[str, xr.Variable]
@@ -25,7 +24,6 @@ Variables = dict[str, xr.Variable]
 MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
-BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
 LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
 
@@ -299,7 +297,7 @@ def _reached(x: FloatArray, at: float, rise: float, ends: tuple[float, float], p
     return f"no: the plateau is not reached, friction {end}, {change}"
 
 
-def _least_squares(
+def least_squares(
     model: Callable[[FloatArray], FloatArray], start: tuple[float, ...], data: FloatArray, steps: int = 40
 ) -> FloatArray:
     """Fit the data of every row, shape (rows, points), by Levenberg and Marquardt's steps; return (rows, constants)."""
@@ -325,7 +323,7 @@ def _least_squares(
     return constants
 
 
-def _law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
+def law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
     """Return how far a law is from the data, both in units of the plateau sqrt 2 slope."""
     away = np.abs(departures)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
@@ -365,7 +363,7 @@ def _interpolation(data: xr.Dataset) -> Variables:
     start = (laws.alpha(hurst), float(np.log(laws.BETA)))
     stack = table.stack(used)
     found = fitted(
-        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
+        lambda rows: least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
     )
     at = int(np.argmax(np.abs(found.departures)))
     worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
@@ -373,103 +371,11 @@ def _interpolation(data: xr.Dataset) -> Variables:
         **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
         **measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
         **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
-        **_law_error(found.departures, "", "constants fitted"),
-        **_law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
+        **law_error(found.departures, "", "constants fitted"),
+        **law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
         **measure("cases", int(used.sum()), "number of cases fitted"),
         **holds(law_holds(found.departures, found.chance, 2, worst)),
     }
-
-
-def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return coefficient and exponent of the line c |x|^n of a store's indenter."""
-    if "indenter_angle" in data.coords:
-        return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
-    if "indenter_radius" in data.coords:
-        return 1 / data["indenter_radius"], 2.0
-    if "indenter_coefficient" in data.coords and data["indenter_exponent"].ndim == 0:
-        exponent = one_value(data, "indenter_exponent")
-        return indenter.mapped(exponent) * data["indenter_coefficient"], exponent
-    raise FitError("expected a store with an indenter: cone, parabola or power")
-
-
-def _half_width(data: xr.Dataset) -> Any:
-    """Return the half width of the static contact without roughness."""
-    coefficient, exponent = _body(data)
-    load = data["normal_force"] / (4 * data["shear_modulus"])
-    return ((exponent + 1) * load / (2 * exponent * coefficient)) ** (1 / (exponent + 1))
-
-
-def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return mu at low velocity over sqrt 2 slope, the argument of the law of rough indenters (eq. 3.34, 3.38)."""
-    require(data, *KELVIN)
-    low = laws.indenter_low(
-        _half_width(data),
-        data["velocity"],
-        data["relaxation_time"],
-        data["shear_modulus"],
-        data["normal_force"],
-        slope,
-    )
-    return xr.DataArray(low / (np.sqrt(2) * slope))
-
-
-def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return where the law of rough indenters is meant to hold.
-
-    The body is flat against the roughness and pressed in by more than its rms height, and the velocity is not beyond
-    that of the largest friction, where region IV begins.
-    """
-    coefficient, exponent = _body(data)
-    width = _half_width(data)
-    flat = coefficient * exponent * width ** (exponent - 1) / np.sqrt(2 * exponent - 1) <= BODY * slope
-    deep = coefficient * width**exponent >= data["rms_roughness"]
-    within = flat & deep
-    if "velocity" in data["friction_coefficient"].dims:
-        mean = data["friction_coefficient"].mean("realisation").fillna(0.0)
-        within = within & (data["velocity"] <= mean.idxmax("velocity"))
-    return xr.DataArray(within)
-
-
-def _indenter(data: xr.Dataset) -> Variables:
-    """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
-    slope = spectral_slope(data)
-    table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
-    xi, within = table.columns
-    known = (table.mean() > 0) & np.isfinite(xi) & (xi > 0)
-    used = (within > 0) & known
-    measured = measure("cases", int(used.sum()), "number of cases within the law")
-    if np.count_nonzero(used) < 3:
-        errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
-        names = ["exponent", "exponent_low", "exponent_high", *errors]
-        reason = (
-            f"not tested: {used.sum()} of {known.sum()} cases within the law, three are needed; in the others the body"
-            f" is steep against the roughness or barely pressed in, or the velocity lies beyond the largest friction"
-        )
-        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason)
-    xi, count = xi[used], table.count(used)
-    logs = np.log(table.stack(used))
-
-    def model(constants: FloatArray) -> FloatArray:
-        law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
-        return law
-
-    start = (math.log(laws.INDENTER_EXPONENT),)
-    found = fitted(
-        lambda rows: _least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count
-    )
-    of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
-    worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
-    return {
-        **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
-        **_law_error(of_plateau, "", "exponent fitted"),
-        **_law_error(np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "exponent 1.5"),
-        **measured,
-        **holds(law_holds(found.departures, found.chance, 1, worst)),
-    }
-
-
-def _indenter_axes(data: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in data["friction_coefficient"].dims if dim not in ("realisation", "hurst")]
 
 
 FITS: tuple[Fit, ...] = (
@@ -496,13 +402,5 @@ FITS: tuple[Fit, ...] = (
         lambda series: each(series, zone_one_axes, _interpolation),
         apart=True,
         constants=("alpha", "beta"),
-    ),
-    Fit(
-        "indenter",
-        MODELS,
-        "exponent of mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) for rough indenters (eq. 3.40)",
-        lambda series: each(series, _indenter_axes, _indenter),
-        apart=True,
-        constants=("exponent",),
     ),
 )

@@ -169,3 +169,30 @@ def law_rate(number: FloatArray, hurst: FloatArray) -> FloatArray:
     """Return the rate of eq. 4.12 with its powers 1 below and 1 - H above v_1 tau q_max = 1."""
     rate: FloatArray = np.where(number < 1, number, number ** (1 - hurst))
     return rate
+
+
+def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
+    """Return samples of what follows from mu_1, d_mu_0 and mu_2."""
+    before, jump, after = cases.levels()
+    change, slope = cases.column("velocity_change"), cases.slope
+    return {
+        "before_over_slope": before / slope,
+        "jump_over_slope": jump / change / slope,
+        "zeta": jump / before / change,
+        "xi": (after / before - 1) / change,
+        "relaxing_over_slope": (before + jump - after) / slope,
+    }
+
+
+def rows_of(cases: Cases) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Return a label and the cases of every Hurst exponent, and of all; a measured surface has no exponent."""
+    if "hurst" not in cases.data:
+        return [("all", np.ones(cases.counts.size, dtype=bool))]
+    hurst = cases.column("hurst")
+    rows = [(f"{value:.4g}", hurst == value) for value in np.unique(hurst)]
+    return [*rows, ("all", np.ones(hurst.size, dtype=bool))] if len(rows) > 1 else rows
+
+
+def rms(values: FloatArray) -> float:
+    """Return the root of the mean square, NaN of nothing."""
+    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan

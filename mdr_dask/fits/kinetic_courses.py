@@ -12,8 +12,8 @@ from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
+from mdr_dask.fits.jumps import LAW, jump_law
 from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, law_rate
-from mdr_dask.fits.kinetics import LAW, jump_law
 
 Series = Mapping[str, xr.Dataset]
 _MODELS = ("velocity_jump",)

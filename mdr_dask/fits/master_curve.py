@@ -3,60 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.collapse import laws_of, with_verdict
+from mdr_dask.fits.curve_tables import (
+    clusters,
+    columns_to_use,
+    curves_of,
+    finite_rows,
+    frame_of,
+    is_temperature,
+    second_group,
+)
 from mdr_dask.physics.superposition import master_curve as superposition
 from mdr_dask.physics.superposition import two_factors as two_shifts
-from mdr_dask.tables import numbers, read_sheet
 
-ALIASES: dict[str, tuple[str, ...]] = {
-    "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
-    "normal_force": ("force", "load", "f_n", "fn"),
-    "velocity": ("v", "speed", "sliding_velocity"),
-    "temperature": ("T", "t_c", "t_k", "temp", "material_temperature"),
-    "frequency": ("f", "freq", "omega"),
-    "time": ("t",),
-    "modulus": ("relaxation_modulus", "e_relax", "g_relax", "storage_modulus", "e_stor", "g_stor", "e'", "g'"),
-}
-"""Names of columns that are understood, beside the names themselves; case does not matter."""
-
-LEAST_JUMP = 3.0  # between gaps within a group of scattered values and gaps between groups
 SHARE_OF_BARS, CONFIDENCE = 0.6827, 0.95  # of Student's t: `_error`, and `_low` to `_high`
-
-
-def read_table(path: str | Path) -> pd.DataFrame:
-    """Read a table of numbers: one row of names, perhaps a row of units, comments and a byte-order mark tolerated.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Floating-point columns under their own names; ``attrs["units"]`` holds the units found.
-
-    Raises
-    ------
-    DataError
-        If there is no row of names, or an entry is not a number.
-    """
-    sheet = read_sheet(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
-    if not sheet.names:
-        raise DataError(f"{path}: expected names of columns, got numbers")
-    names = [cell.text for cell in sheet.names]
-    if len(set(names)) < len(names):
-        raise DataError(f"{path}: expected each name of a column once, got {', '.join(names)!r:.200}")
-    table = pd.DataFrame(numbers(sheet), columns=names)
-    table.attrs["units"] = dict(zip(names, sheet.units, strict=True)) if any(sheet.units) else {}
-    return table
 
 
 def master_curve(
@@ -104,16 +74,16 @@ def master_curve(
     DataError
         If a column is missing, not positive, or the curves do not overlap.
     """
-    frame = _frame(table)
-    over, values, by = _columns(frame, abscissa, ordinate, group)
-    second = _second_group(frame, {over, values, by})
+    frame = frame_of(table)
+    over, values, by = columns_to_use(frame, abscissa, ordinate, group)
+    second = second_group(frame, {over, values, by})
     if isinstance(table, xr.Dataset):
         _require_no_axis_beside(table[values], {over, by, second, "realisation"})
-    frame, left_out = _finite(frame, [over, values, by] + ([second] if second else []))
+    frame, left_out = finite_rows(frame, [over, values, by] + ([second] if second else []))
     if second is not None:
         found = _of_two_groups(frame, over, values, (by, second), vertical, reference, draws)
         return found.assign_attrs(left_out=left_out)
-    groups, curves = _curves(frame, over, values, by)
+    groups, curves = curves_of(frame, over, values, by)
     zero = groups[groups.size // 2] if reference is None else _inside(groups, reference)
     free = superposition.superpose(groups, curves, vertical, None, draws)
     result = superposition.rereference(free, float(zero), _is_logarithmic(by, groups))
@@ -129,28 +99,6 @@ def _require_no_axis_beside(values: xr.DataArray, used: set[str | None]) -> None
             raise DataError(f"the study varies in {str(name)!r} too: keep one of its values, or group by it")
 
 
-def _frame(table: xr.Dataset | pd.DataFrame) -> pd.DataFrame:
-    if isinstance(table, pd.DataFrame):
-        return table
-    mean = table.mean("realisation", keep_attrs=True) if "realisation" in table.dims else table
-    numeric = [name for name in mean.variables if mean[name].dtype.kind in "fiu" and name != "status"]
-    frame = mean[[name for name in numeric if name in mean.data_vars]].to_dataframe().reset_index()
-    frame.attrs["units"] = {str(name): str(mean[name].attrs.get("units", "1")) for name in numeric}
-    return frame
-
-
-def _finite(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, str]:
-    """Return the rows that have a finite number in each of the columns, and a sentence about the others, if any."""
-    missing = {name: ~np.isfinite(frame[name].to_numpy(dtype=np.float64)) for name in columns}
-    anywhere = np.logical_or.reduce(list(missing.values()))
-    if not anywhere.any():
-        return frame, ""
-    where = ", ".join(f"{name!r} in {lines.sum()}" for name, lines in missing.items() if lines.any())
-    kept = frame[~anywhere]
-    kept.attrs.update(frame.attrs)
-    return kept, f"{anywhere.sum()} of {anywhere.size} rows are left out, which have no finite number: {where}"
-
-
 def _untold(found: superposition.Superposition) -> dict[str, str]:
     """Return a sentence about the steps that the curves do not tell, if there are any."""
     if not found.undetermined:
@@ -161,58 +109,6 @@ def _untold(found: superposition.Superposition) -> dict[str, str]:
         "undetermined": f"not determined {runs}: the curves look alike wherever they lie there, so that steps are "
         f"taken to be as others are, {mean:.2g} with a scatter of {scatter:.2g} decades"
     }
-
-
-def _find(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column of a name or of one of its aliases, as written or else in any case."""
-    columns = [str(name) for name in frame.columns]
-    lowered = [name.strip().lower().replace(" ", "_") for name in columns]
-    names = (wanted, *ALIASES.get(wanted, ()))
-    exact = [name for name in names if name in columns]
-    loose = [columns[lowered.index(name.lower())] for name in names if lowered.count(name.lower()) == 1]
-    return (exact + loose + [None])[0]
-
-
-def _columns(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
-    """Return the columns to use: those given, else the first family of which the table has all."""
-    families = [
-        ("normal_force", "friction_coefficient", "velocity"),
-        ("normal_force", "friction_coefficient", "temperature"),
-        ("frequency", "modulus", "temperature"),
-        ("time", "modulus", "temperature"),
-    ]
-    found = []
-    for family in families:
-        names = [
-            _find(frame, name) if wish is None else _find(frame, wish) for wish, name in zip(given, family, strict=True)
-        ]
-        if None not in names:
-            found.append([str(name) for name in names])
-    varied = [names for names in found if all(frame[name].nunique() > 1 for name in (names[0], names[2]))]
-    if found and not varied:
-        constant = next(name for name in (found[0][2], found[0][0]) if frame[name].nunique() < 2)
-        raise DataError(
-            f"expected curves at two or more values of {constant!r}, got one value: there is nothing to shift"
-        )
-    if not found:
-        wanted = ", ".join(repr(name) for name in given if name is not None) or (
-            "a coefficient over force by velocity or temperature, or a modulus over frequency or time by temperature"
-        )
-        got = [str(name) for name in frame.columns]
-        raise DataError(f"expected columns for {wanted}, got {got!r}: name them by --over, --of and --by")
-    return varied[0][0], varied[0][1], varied[0][2]
-
-
-def _second_group(frame: pd.DataFrame, used: set[str]) -> str | None:
-    """Return what the table varies in beside the columns used, or refuse it if that is no second group."""
-    found = None
-    for name in ("normal_force", "velocity", "temperature"):
-        column = _find(frame, name)
-        if column is not None and column not in used and frame[column].nunique() > 1:
-            if found is not None or name == "normal_force":
-                raise DataError(f"the table varies in {column!r} too: keep one of its values, or group by it")
-            found = column
-    return found
 
 
 def _of_two_groups(
@@ -227,14 +123,14 @@ def _of_two_groups(
     """Shift curves that differ in two things; the reference is of the first."""
     keys, curves = [], []
     rows = frame[[over, values, *by]]
-    first, second = (_clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
+    first, second = (clusters(rows[name].to_numpy(dtype=np.float64)) for name in by)
     centres = [
         {label: float(rows[name].to_numpy()[labels == label].mean()) for label in np.unique(labels)}
         for name, labels in zip(by, (first, second), strict=True)
     ]
     for one, other in sorted(set(zip(first.tolist(), second.tolist(), strict=True))):
         part = rows[(first == one) & (second == other)]
-        (_,), (curve,) = _curves(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
+        (_,), (curve,) = curves_of(part.assign(**{by[0]: centres[0][one]}), over, values, by[0])
         if np.ptp(curve[0]) == 0:
             where = f"{by[0]} = {centres[0][one]:g}, {by[1]} = {centres[1][other]:g}"
             raise DataError(f"the curve at {where} needs two or more distinct points")
@@ -263,35 +159,6 @@ def _of_two_groups(
     return dataset.assign_attrs(about, chi_squared=found.chi_squared, probability=found.probability)
 
 
-def _curves(
-    frame: pd.DataFrame, over: str, values: str, by: str
-) -> tuple[FloatArray, list[tuple[FloatArray, FloatArray]]]:
-    rows = frame[[over, values, by]].to_numpy(dtype=np.float64)
-    if rows.size == 0 or np.any(rows[:, :2] <= 0):
-        raise DataError(f"{over!r} and {values!r} must be positive: curves are shifted along logarithmic axes")
-    labels = _clusters(rows[:, 2])
-    parts = [rows[labels == label] for label in np.unique(labels)]
-    centres = np.array([np.median(part[:, 2]) for part in parts])
-    return centres, [(np.log10(part[:, 0]), np.log10(part[:, 1])) for part in parts]
-
-
-def _clusters(values: FloatArray) -> NDArray[np.intp]:
-    """Return the number of the group of each value.
-
-    Measured values that scatter about a few set ones are split at the largest jump among their gaps. Values that occur
-    again, or whose gaps are much alike, are set ones themselves.
-    """
-    distinct, place, times = np.unique(values, return_inverse=True, return_counts=True)
-    if distinct.size <= values.size / 3 or distinct.size < 3 or times.min() > 1:
-        return place
-    gaps = np.sort(np.diff(distinct))
-    jump = int(np.argmax(gaps[1:] / gaps[:-1]))
-    if gaps[jump + 1] < LEAST_JUMP * gaps[jump]:
-        return place
-    threshold = np.sqrt(gaps[jump] * gaps[jump + 1])
-    return np.asarray(np.append(0, np.cumsum(np.diff(distinct) > threshold))[place], dtype=np.intp)
-
-
 def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the first or last group if it lies just outside: set points are met by so much."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
@@ -300,13 +167,9 @@ def _inside(groups: FloatArray, reference: float) -> float:
     return float(np.clip(reference, groups.min(), groups.max()))
 
 
-def _is_temperature(by: str) -> bool:
-    return by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
-
-
 def _is_logarithmic(by: str, groups: FloatArray) -> bool:
     """Say whether factors are nearly linear in the logarithm of the group, as a power law of velocities is."""
-    return bool(np.all(groups > 0)) and not _is_temperature(by)
+    return bool(np.all(groups > 0)) and not is_temperature(by)
 
 
 def _nearest(groups: FloatArray, reference: float) -> float:
@@ -360,7 +223,7 @@ def _with_laws(dataset: xr.Dataset, *parts: tuple[superposition.Superposition, s
     over = str(dataset.attrs["abscissa"])
     told: dict[str, str] = {}
     for found, by, unit in parts:
-        constants, verdicts = laws_of(found, over, unit, is_temperature=_is_temperature(by))
+        constants, verdicts = laws_of(found, over, unit, is_temperature=is_temperature(by))
         dataset, told = dataset.assign(constants), told | verdicts
     return with_verdict(dataset, told)
 

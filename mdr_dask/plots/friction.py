@@ -9,7 +9,9 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits.friction import FITS, indenter_xi, numbers, spectral_slope, within_indenter_law
+from mdr_dask.fits import friction, indenter
+from mdr_dask.fits.friction import numbers, spectral_slope
+from mdr_dask.fits.indenter import indenter_xi, within_indenter_law
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
@@ -30,7 +32,7 @@ CASE = (
 #: Axes that get the colours, the first that varies.
 BY = ("normal_force", "hurst", "shear_modulus", "rms_roughness", "points")
 LAW = "law (eq. 3.18)"
-FIT: dict[str, Fit] = {fit.name: fit for fit in FITS}
+FIT: dict[str, Fit] = {fit.name: fit for fit in (*friction.FITS, *indenter.FITS)}
 
 
 def on_generated_line(data: xr.Dataset) -> bool:

@@ -24,9 +24,9 @@ HELD = ("hurst", "normal_force", "velocity", "velocity_change", "shear_modulus",
 
 
 def _fitted(groups: Mapping[str, xr.Dataset], name: str) -> dict[str, xr.Dataset]:
-    from mdr_dask.fits.kinetics import FITS
+    from mdr_dask.fits import available
 
-    fit = next(fit for fit in FITS if fit.name == name)
+    fit = available("velocity_jump")[name]
     return curves.results(fit.compute, groups)
 
 
@@ -69,7 +69,7 @@ def _title(figure: Figure, subject: str, held: Mapping[str, xr.DataArray], name:
 
 def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw mu_1 and d_mu_0 v_1 / dv against the velocity for every load, with eq. 4.11 (Fig. 4.4)."""
-    from mdr_dask.fits.kinetics import LAW, jump_law
+    from mdr_dask.fits.jumps import LAW, jump_law
 
     series, told = _choose(groups, "velocity", "normal_force")
     ((name, found),) = _fitted(series, "kinetics").items()
@@ -135,7 +135,7 @@ def _hurst_label(found: xr.Dataset, cases: _Cases) -> str | None:
 
 def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw d_mu_0 v_1 / dv against mu_1, both over the rms slope, with eq. 4.11 (Fig. 4.5)."""
-    from mdr_dask.fits.kinetics import LAW, jump_law
+    from mdr_dask.fits.jumps import LAW, jump_law
 
     series, told = _choose(groups, "velocity", "hurst")
     ((name, found),) = _fitted(series, "kinetics").items()

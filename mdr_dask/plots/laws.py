@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from mdr_dask import aggregation
-from mdr_dask.fits.friction import indenter_xi, loads_and_velocities, spectral_slope
+from mdr_dask.fits.friction import loads_and_velocities, spectral_slope
+from mdr_dask.fits.indenter import indenter_xi
 from mdr_dask.fits.kinetic_cases import is_jump
 from mdr_dask.models.ehl_line import groups
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM, FilmFormula
@@ -92,7 +93,7 @@ def _is_rough_indenter(data: xr.Dataset) -> bool:
 
 def _jump(data: xr.Dataset) -> xr.DataArray:
     """Return the law of the jump from friction before it, which the store holds."""
-    from mdr_dask.fits.kinetics import LAW, jump_law
+    from mdr_dask.fits.jumps import LAW, jump_law
 
     slope = spectral_slope(data)
     before = aggregation.mean(data["friction_coefficient_before"]) / slope

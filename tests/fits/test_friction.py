@@ -3,11 +3,12 @@ import pytest
 from friction_store import store
 
 from mdr_dask.errors import FitError
-from mdr_dask.fits.friction import FITS, within_indenter_law
+from mdr_dask.fits import available
+from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
 
-FIT = {fit.name: fit.compute for fit in FITS}
-ZONE_ONE = FITS[0]
+FIT = {name: fit.compute for name, fit in available("sliding_friction").items()}
+ZONE_ONE = available("sliding_friction")["zone_one"]
 
 
 @pytest.fixture(scope="module")

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask.fits import top
-from mdr_dask.fits.friction import FITS
+from mdr_dask.fits import available, top
 from mdr_dask.physics.sliding import laws
 
-FIT = {fit.name: fit for fit in FITS}
+FIT = available("sliding_friction")
 STUDIES = 100
 LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of so many studies
 G, RMS, LENGTH, TAU, SLOPE = 1e7, 5e-7, 0.02, 1e-3, 0.1

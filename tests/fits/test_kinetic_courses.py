@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import FitError
+from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.kinetic_courses import FITS, course_errors, relaxation_law
-from mdr_dask.fits.kinetics import jump_law
 
 FIT = {fit.name: fit for fit in FITS}
 TIMES = np.geomspace(1e-3, 20, 30)

@@ -3,10 +3,11 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import FitError
-from mdr_dask.fits.kinetics import FITS, jump_law
+from mdr_dask.fits import available
+from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.relaxation import exponential, widths
 
-FIT = {fit.name: fit for fit in FITS}
+FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-4, 20, 60)
 SLOPE = 0.07
 POINTS, LENGTH, TAU = 5000, 0.01, 1e-3

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from mdr_dask.fits.kinetics import FITS, jump_law
+from mdr_dask.fits import available
+from mdr_dask.fits.jumps import jump_law
 
-FIT = {fit.name: fit for fit in FITS}
+FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-3, 20, 40)
 POINTS, LENGTH, TAU, SLOPE, CHANGE = 5000, 0.01, 1e-3, 0.07, 0.2
 WAVENUMBER = np.pi * POINTS / LENGTH

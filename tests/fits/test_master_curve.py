@@ -6,7 +6,8 @@ import pytest
 import xarray as xr
 
 from mdr_dask.errors import DataError
-from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, read_table, rereferenced
+from mdr_dask.fits.curve_tables import read_table
+from mdr_dask.fits.master_curve import FITS, friction_of_roughness, master_curve, rereferenced
 
 DATA = Path(__file__).parents[1] / "data" / "dma"
 EXPONENT = -0.15
