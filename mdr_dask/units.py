@@ -118,9 +118,10 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 
 #: Units that a misspelt one is compared with.
 COMMON = (
-    "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent "
-    "meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute hour newton "
-    "millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz gram kilogram"
+    "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
+    "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
+    "hour newton millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz "
+    "gram kilogram"
 )
 
 

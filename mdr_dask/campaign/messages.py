@@ -13,7 +13,8 @@ from pydantic_core import ErrorDetails
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.errors import did_you_mean
-from mdr_dask.models.data_file import DataFile, NamedByFile
+from mdr_dask.models.data_file import DataFile
+from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
