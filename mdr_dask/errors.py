@@ -66,7 +66,7 @@ def did_you_mean(word: Any, known: Sequence[str]) -> str:
     folded = {name.casefold(): name for name in known}
     typed = str(word).casefold()
     near = [name for name in _SYNONYMS.get(typed, ()) if name in folded] or get_close_matches(typed, list(folded), n=1)
-    near = near or [name for name in folded if len(typed) > 3 and typed in name]
+    near = near or [name for name in folded if len(typed) > 2 and typed in name]
     if near:
         return f" (did you mean {folded[near[0]]!r}?)"
     return f" (known: {', '.join(known)})" if 0 < len(known) <= 12 else ""

@@ -57,6 +57,7 @@ hertz = 1 / second = Hz
 inch = 0.0254 * meter = in
 foot = 0.3048 * meter = ft
 angstrom = 1e-10 * meter = Å
+micron = 1e-6 * meter
 liter = 1e-3 * meter ** 3 = L = l = litre
 tonne = 1e6 * gram = t
 newton = kilogram * meter / second ** 2 = N
@@ -116,10 +117,11 @@ _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\
 
 
 #: Units that a misspelt one is compared with.
-_COMMON = (
-    "m mm um nm cm km s ms us min h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm inch percent "
-    "meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute hour newton "
-    "millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz gram kilogram"
+COMMON = (
+    "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
+    "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
+    "hour newton millinewton kilonewton pascal kilopascal megapascal gigapascal kelvin celsius degree radian hertz "
+    "gram kilogram"
 )
 
 
@@ -366,5 +368,5 @@ def _nearest(word: str) -> str:
     power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
     if power and is_unit(power[1]):
         return f" (write {power[1]}^{power[2]})"
-    hint = did_you_mean(word, _COMMON.split())
+    hint = did_you_mean(word, COMMON.split())
     return hint if "mean" in hint else ""

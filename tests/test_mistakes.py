@@ -5,6 +5,7 @@ import pytest
 from mdr_dask.campaign import load, loads
 from mdr_dask.errors import CampaignError
 from mdr_dask.plan import estimate
+from mdr_dask.units import COMMON, is_unit
 
 CAMPAIGN = """\
 name: study
@@ -69,6 +70,8 @@ MISTAKES = [
     ("20 mm", "20 kg", f"6:11: parameters.length: {LENGTH} '20 kg'"),
     ("hurst: 0.7", "hurst: 0.7 mm", "8:10: parameters.hurst: expected a number, got '0.7 mm'"),
     ("1 ms", "1 Hz", "11:20: parameters.relaxation_time: expected a time (such as '1 ms'), got '1 Hz'"),
+    ("[0.1 N, 1 N]", "[0.1 Newtn]", "unknown unit 'Newtn' (did you mean 'newton'?), got '0.1 Newtn'"),
+    ("{geometric: [1 mm/s,", "{geometric: [1 kmh,", "unknown unit 'kmh' (did you mean 'km/h'?), got '1 kmh'"),
     # ranges
     (VELOCITY, "1 mm/s, 1 m/s", f"{VELOCITIES} '1 mm/s, 1 m/s' {SEVERAL}"),
     (VELOCITY, "1 mm/s to 1 m/s", f"{VELOCITIES} '1 mm/s to 1 m/s' {SEVERAL}"),
@@ -86,6 +89,13 @@ MISTAKES = [
     ("  points", "\tpoints", "(indent with blanks, not with tabs)"),
     ("  length", "   length", "(entries of one mapping begin in the same column)"),
     ("hurst: 0.7", "hurst: 0.7\n  hurst: 0.8", "9:3: parameters.hurst: this key was already given in line 8"),
+    ("name: study", "name: my: study", "1:9: not YAML: mapping values are not allowed here (put quotation marks"),
+    ("hurst: 0.7", "hurst: *h", "not YAML: found undefined alias 'h' (put quotation marks around a string that begins"),
+    # files
+    ("hurst: 0.7", "material: rubber.csv", "expected a mapping, got 'rubber.csv' (write {dma_table: rubber.csv})"),
+    ("hurst: 0.7", "material: {dma: rubber.csv}", "dma: unknown key (did you mean 'dma_table'?)"),
+    ("hurst: 0.7", "surface: road.txt", "expected a mapping, got 'road.txt' (write|{profile: road.txt}"),
+    ("accuracy: 1 %", "measured: rig.csv", "measured: expected a mapping, got 'rig.csv' (write {table: rig.csv})"),
     # bodies
     (
         "hurst: 0.7",
@@ -152,3 +162,8 @@ def test_a_study_that_is_too_large_is_told_by_its_sizes():
         CampaignError, match=r"at most 1e\+09 results, got 100000 normal_force x 10000 velocity x 2 real"
     ):
         estimate(loads(text, "study.yaml", "."))
+
+
+@pytest.mark.parametrize("unit", COMMON.split())
+def test_a_unit_that_is_proposed_is_known(unit):
+    assert is_unit(unit)

@@ -116,6 +116,7 @@ def parse(text: str, source: str, problems: Problems) -> Document:
 
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
 _NO_BLANK = re.compile(r"(?:^|[{,])\s*(?:- )?([A-Za-z_]\w*):(?=[^\s:/\\])")
+_COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
@@ -128,6 +129,10 @@ def _hint(text: str, index: int) -> str:
         found = _NO_BLANK.search(line)
         if found:
             return f" (a blank is missing behind '{found[1]}:' in line {len(above) - back})"
+    if text[index : index + 1] == "*":
+        return " (put quotation marks around a string that begins with *)"
+    if _COLON_WITHIN.match(above[-1] if above else ""):
+        return " (put quotation marks around a string with a colon and a blank in it)"
     return " (entries of one mapping begin in the same column)" if _is_indented_otherwise(above) else ""
 
 

@@ -13,6 +13,8 @@ from pydantic_core import ErrorDetails
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.problems import Path, shown
 from mdr_dask.errors import did_you_mean
+from mdr_dask.models.data_file import DataFile
+from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
 #: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
@@ -174,7 +176,16 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
     if fields.holds_list(info):
         return f" (write [{value}])"
     first = next((name for one in fields.structures(info) for name in one.model_fields), "")
-    return f" (write {{{first}: {value}}})" if first == "path" else ""
+    inside = [first] if first == "path" else _of_file(info) if "." in value else []
+    written = " or ".join(f"{{{name}: {value}}}" for name in inside)
+    return f" (write {written})" if written else ""
+
+
+def _of_file(info: FieldInfo) -> list[str]:
+    """Return the entries of a parameter's structures for which the name of a file stands."""
+    inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
+    named = (DataFile, NamedByFile)
+    return [name for name, entry in inner if any(issubclass(one, named) for one in fields.structures(entry))]
 
 
 def required(kind: type[BaseModel]) -> list[str]:

@@ -50,10 +50,10 @@ class Question:
         Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; all axes and outputs if none.
     units : mapping of str to str
         Units of columns, others are SI.
-    written : bool
-        Whether axes and parameters without one of `units` are in the unit that the campaign writes them in.
     statistics : tuple of str, optional
         Over realisations; None for a row for each result.
+    written : bool
+        Whether axes and parameters without one of `units` are in the unit that the campaign writes them in.
     """
 
     outputs: tuple[str, ...] = ()
@@ -63,8 +63,8 @@ class Question:
     sort: tuple[str, ...] = ()
     columns: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
-    written: bool = False
     statistics: tuple[str, ...] | None = MEANS
+    written: bool = False
 
 
 @dataclass(frozen=True)

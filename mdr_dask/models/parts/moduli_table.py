@@ -9,8 +9,9 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Parameters, quantity
+from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import NamedFile
+from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.models.parts.temperature import Law
 from mdr_dask.tables import Column, read_table
 from mdr_dask.units import shown
@@ -20,7 +21,7 @@ SAME_TEMPERATURE = 1.0  # K: what an instrument scatters about its set point
 APART = 0.02
 
 
-class ModulusTable(Parameters):
+class ModulusTable(NamedByFile):
     """A Prony series fitted to a table of frequency, storage and loss modulus, and perhaps temperature."""
 
     file: NamedFile = Field(
