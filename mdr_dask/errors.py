@@ -18,7 +18,7 @@ class CampaignError(MdrDaskError):
 
 
 class ModelError(MdrDaskError):
-    """A model that is not there, or cannot be loaded."""
+    """A model that is missing, or cannot be loaded."""
 
 
 class StoreError(MdrDaskError):

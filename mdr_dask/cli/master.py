@@ -35,7 +35,7 @@ KEPT = (".json", ".csv")
 @click.argument("source")
 @series_option
 @select_option
-@click.option("--over", help="What curves are drawn over: a column such as normal_force or time.")
+@click.option("--over", help="What curves are drawn against: a column such as normal_force or time.")
 @click.option("--of", "ordinate", help="Their values: a column such as friction_coefficient or modulus.")
 @click.option("--by", help="What curves differ in: a column such as velocity or temperature.")
 @click.option("--vertical", is_flag=True, help="Let curves shift along the ordinate too.")

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core.types import unliteral
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.version import __version__
@@ -35,15 +34,9 @@ def fused(function: Kernel) -> Kernel:
 
 
 def _compiled(function: Kernel, **options: object) -> Kernel:
-    """Compile a function once for every type of its arguments, of which a number written in a call is none."""
+    """Compile a function for every type of its arguments; a number written in a call is one of its own, and quicker."""
     compile_it = numba.njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)  # type: ignore[call-overload]
     kernel: Any = compile_it(function)
-    if hasattr(kernel, "get_call_template"):
-        template: Any = kernel.get_call_template
-        plain: Callable[[Any], Any] = unliteral
-        kernel.get_call_template = lambda types, named: template(
-            [plain(each) for each in types], {name: plain(each) for name, each in named.items()}
-        )
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     if kept is not None:  # numba reads all of an index of its own version, types that are no more included
         kept._version = f"{numba.__version__}, mdr_dask {__version__}"

@@ -85,6 +85,6 @@ def _without_value(groups: Mapping[str, xr.Dataset]) -> list[str]:
     """Return how many results of a store have no value, and why."""
     states = [data["status"].to_numpy() for data in groups.values() if "status" in data]
     total = sum(state.size for state in states)
-    told = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are not there yet"}
+    told = {Status.FAILED: "failed", Status.NOT_CONVERGED: "did not converge", Status.MISSING: "are missing"}
     counts = {words: sum(int((state == status.value).sum()) for state in states) for status, words in told.items()}
     return [f"{count} of {total} results of the store, which {words}" for words, count in counts.items() if count]

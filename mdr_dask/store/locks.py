@@ -1,7 +1,7 @@
 """Who may write: one runner of a study at a time, and nobody on behalf of a runner that is gone.
 
 On a file system with locks the operating system lets go of a lock however its holder ends. Elsewhere, and at URLs, a
-claim takes its place: an object that is made only if it is not there yet, beside signs of life that its owner gives.
+claim takes its place: an object that is made only if it is missing, beside signs of life that its owner gives.
 """
 
 from __future__ import annotations
