@@ -72,9 +72,15 @@ def _root_attributes(url: str) -> dict[str, Any] | None:
     found = document(url)
     if found is None and groups_laid_out(url):
         raise StoreError(f"{url}: zarr.json is gone; 'mdr-dask verify --repair {url}' puts it back")
-    if found is None and groups_with(url, "status/zarr.json"):
+    if found is None and any(not _is_root(url, group) for group in groups_with(url, "status/zarr.json")):
         raise StoreError(f"{url}: zarr.json is gone, and the copy of it, too; {laying_out_again(url)}")
     return None if found is None else dict(found.get("attributes", {}))
+
+
+def _is_root(url: str, group: str) -> bool:
+    """Say whether a group is a study of its own, in a folder of studies."""
+    held = document(f"{url}/{group}") if group else None
+    return "mdr_dask_layout" in (held or {}).get("attributes", {})
 
 
 def only_claimed(found: Mapping[str, Any]) -> bool:
