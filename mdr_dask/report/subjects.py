@@ -96,7 +96,7 @@ SUBJECTS: dict[str, Subject] = {
             Equation(
                 r"F_x = 4 G \left[ v \tau \int_{c} w'^2 \, \mathrm{d}s + \sum_{f} \frac{u_l^2 - u_t^2}{2} \right], "
                 r"\quad \mu = \frac{F_x}{F_N}",
-                "friction: the part in contact c, and what is lost in every flight f between leaving l and touching t",
+                "friction: the part in contact c, and what every flight f dissipates between leaving l and touching t",
             ),
         ),
         (PRL, SHAPES, BOOK, OBJECTION),
