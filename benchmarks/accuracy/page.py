@@ -29,7 +29,7 @@ ABOUT = {
         "([materials](evidence/materials.md))."
     ),
     "velocity jump": (
-        "Largest error of the course of friction over its last value. Reference: every element followed from "
+        "Largest error of friction at any time, over its last value. Reference: every element followed from "
         "rest on two fine grids, extrapolated ([kinetics](evidence/kinetics.md))."
     ),
     "loading histories": (
