@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -220,12 +220,12 @@ store: {{blocks: {{speed: 1, line: {block_size}}}}}
 """
 
 
-def run_ours(study: Study) -> None:
+def run_ours(study: Study, kind: str = "threads") -> None:
     from mdr_dask.campaign import loads
     from mdr_dask.execute import Resources, run
 
     campaign = loads(CAMPAIGN.format(axes=study.axes, block_size=study.block_size), "peers.yaml", ".")
-    run(campaign, str(study.folder / "study.zarr"), Resources(threads=2), lambda _: None)
+    run(campaign, str(study.folder / "study.zarr"), Resources(**{kind: 2}), lambda _: None)
 
 
 def read_ours(study: Study) -> np.ndarray:
@@ -245,6 +245,7 @@ class Way:
 WAYS = {
     "bare loop": Way(run_loop, read_loop),
     "mdr_dask": Way(run_ours, read_ours),
+    "mdr_dask, processes": Way(partial(run_ours, kind="workers"), read_ours),
     "joblib to npz": Way(run_joblib, read_blocks),
     "dask.delayed, to_zarr(region)": Way(run_dask, read_dask),
     "xyzpy": Way(run_xyzpy, read_xyzpy),
