@@ -91,10 +91,6 @@ def definitions(folder):
         yield name, ast.parse(path.read_text())
 
 
-#: Functions of `physics` with eight arguments or more that there are still; their number may only fall.
-LONG_CALLS = 14
-
-
 def test_what_belongs_together_travels_together():
     """A call with eight arguments hides a noun; numba hands NamedTuples over at a fraction of a microsecond."""
     long = []
@@ -104,7 +100,7 @@ def test_what_belongs_together_travels_together():
             names = [one.arg for one in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
             if len([one for one in names if one not in ("self", "cls")]) >= 8:
                 long.append(f"{name}: {function.name}")
-    assert len(long) <= LONG_CALLS, long
+    assert long == []
 
 
 def test_a_file_is_one_idea():
