@@ -12,6 +12,7 @@ import shutil
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ import xarray as xr
 
 from mdr_dask import aggregation, campaign, fits, plots, store
 from mdr_dask.campaign import Campaign
+from mdr_dask.cli.campaigns import require_answers
+from mdr_dask.cli.understood import study_lines
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
@@ -64,8 +67,32 @@ def read(source: Source) -> Campaign:
     return campaign.load(source)
 
 
-def check(source: Source) -> Estimate:
-    """Check a campaign, and say what it will cost: cases, results, bytes, seconds, notes.
+@dataclass(frozen=True, repr=False)
+class Understood(Estimate):
+    """What a campaign was understood to be and what it will cost; printed, it is what ``mdr-dask check`` says.
+
+    Attributes
+    ----------
+    lines : tuple of str
+        The axes of each series, what its data hold, what it costs.
+    questions : tuple of str
+        What is asked about bare numbers far from the usual.
+    """
+
+    lines: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return "\n".join((*self.lines, *self.questions))
+
+
+def check(source: Source) -> Understood:
+    """Check a campaign, and say what was understood and what it will cost.
+
+    Returns
+    -------
+    Understood
+        Counts, bytes and seconds; printed, or at the end of a cell, it is the lines of ``mdr-dask check``.
 
     Raises
     ------
@@ -79,7 +106,11 @@ def check(source: Source) -> Estimate:
     >>> costs.cases
     2
     """
-    return estimate(read(source))
+    found = read(source)
+    require_answers(found)
+    costs = estimate(found)
+    lines = (f"{found.name}: {found.model}", *study_lines(found, costs))
+    return Understood(**vars(costs), lines=lines, questions=found.remarks)
 
 
 def run(
@@ -111,7 +142,7 @@ def run(
     Returns
     -------
     Dataset or DataTree
-        As `open_study` returns it. A warning says how many results failed.
+        As `open_study` returns it. Warnings ask about bare numbers far from the usual, and say how many results failed.
 
     Raises
     ------
@@ -128,6 +159,8 @@ def run(
     from mdr_dask.cli.progress import reporter
 
     found = read(source)
+    for question in found.remarks:
+        warnings.warn(question, stacklevel=2)
     url = str(store or _place(found, isinstance(source, Mapping) and "store" not in source))
     with reporter(not progress) as report:
         outcome = execute(found, url, resources or Resources(), report, retry_failed)

@@ -141,6 +141,23 @@ def test_an_interrupted_cell_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert (resumed.status == 1).all()
 
 
+def test_check_prints_what_the_command_prints(tmp_path):
+    asked = {**SMALL, "parameters": {**SMALL["parameters"], "velocity": [1, 2], "shear_modulus": 10}}
+    found = mdr_dask.check(asked)
+    assert (found.cases, found.results) == (4, 24)
+    campaign = tmp_path / "study.yaml"
+    campaign.write_text(mdr_dask.read(asked).text)
+    told = subprocess.run(
+        [sys.executable, "-m", "mdr_dask", "check", str(campaign)], capture_output=True, text=True, check=True
+    )
+    assert (
+        repr(found).splitlines()[1:] == (told.stdout + told.stderr).replace(str(campaign), "campaign").splitlines()[1:]
+    )
+    assert "shear_modulus" in found.questions[0]
+    with pytest.warns(UserWarning, match="shear_modulus"):
+        mdr_dask.run(asked, tmp_path / "asked.zarr", progress=False)
+
+
 REFUSED = [
     (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
