@@ -8,11 +8,12 @@ from __future__ import annotations
 import atexit
 import hashlib
 import json
+import re
 import shutil
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ from mdr_dask import aggregation, campaign, fits, plots, store
 from mdr_dask.campaign import Campaign
 from mdr_dask.cli.campaigns import require_answers
 from mdr_dask.cli.understood import study_lines
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import CampaignError, DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
 from mdr_dask.plan import Estimate, estimate
@@ -62,8 +63,7 @@ def read(source: Source) -> Campaign:
     if isinstance(source, Campaign):
         return source
     if isinstance(source, Mapping):
-        text = json.dumps({"name": "study", **source}, indent=1, default=_plain)
-        return campaign.loads(text, "campaign", ".")
+        return _of_dictionary(json.dumps({"name": "study", **source}, indent=1, default=_plain))
     return campaign.load(source)
 
 
@@ -419,6 +419,19 @@ class StudyAccessor:
 def _plain(value: Any) -> Any:
     """Return numbers of numpy and paths as JSON holds them."""
     return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _of_dictionary(text: str) -> Campaign:
+    """Read a campaign whose text nobody sees: its messages name keys, but no lines."""
+
+    def told(messages: Sequence[str]) -> tuple[str, ...]:
+        return tuple(re.sub(r"^campaign:\d+:\d+: ", "", message) for message in messages)
+
+    try:
+        found = campaign.loads(text, "campaign", ".")
+    except CampaignError as error:
+        raise CampaignError(*told(error.args)) from None
+    return replace(found, remarks=told(found.remarks))
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
