@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.cases import Cases, Steady
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -28,7 +29,6 @@ from mdr_dask.physics.sliding.nodes import (
     summit_rise,
     weights,
 )
-from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     DEBORAH,
     DEPTH,
@@ -77,7 +77,7 @@ class Sampled:
     rates : array, shape (cases, 3)
         Relative changes of drag, contact fraction and contact slope with the depth.
     drag, depth, contact_fraction, contact_slope : array, shape (cases,)
-        As in :class:`mdr_dask.physics.sliding.steady.Steady`.
+        As in :class:`mdr_dask.physics.sliding.cases.Steady`.
     doubts : array, shape (4, cases)
         What the search for the depth may have left in them.
     """
@@ -103,18 +103,27 @@ class Sampled:
         return Steady(drag, depth, fraction, slope, status)
 
 
+class Search(NamedTuple):
+    """What a search starts from and finds.
+
+    Parameters
+    ----------
+    depths : array, shape (cases,)
+        Penetration of the summit.
+    rates : array, shape (cases, SECANTS)
+        Relative changes of the results with it, NaN where they are not known.
+    results : array, shape (cases, RESULTS)
+        The results, bounds of their relative errors from the search, and that of the depth; NaN where none is found.
+    """
+
+    depths: FloatArray
+    rates: FloatArray
+    results: FloatArray
+
+
 @kernel
 def _solve(
-    line: Nodes,
-    weights: FloatArray,
-    rise: float,
-    deborah: FloatArray,
-    loads: FloatArray,
-    near_step: float,
-    trusted: float,
-    depths: FloatArray,
-    rates: FloatArray,
-    results: FloatArray,
+    line: Nodes, weights: FloatArray, rise: float, cases: Cases, bounds: tuple[float, float], search: Search
 ) -> None:
     """Find the states of cases on a grid by Newton steps; the last one is taken without another sweep.
 
@@ -126,18 +135,16 @@ def _solve(
         From `weights`.
     rise : float
         Height of the summit over the highest node.
-    deborah, loads : array, shape (cases,)
+    cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
-    near_step, trusted : float
+    bounds : tuple of float
         Bounds of the last relative step of the depth and of what it costs.
-    depths : array, shape (cases,)
-        Penetration of the summit; read and written.
-    rates : array, shape (cases, SECANTS)
-        Relative changes of the results with it, NaN where they are not known; read and written.
-    results : array, shape (cases, RESULTS)
-        Written: the results, bounds of their relative errors from the search, and that of the depth; NaN where no
-        depth is found.
+    search : Search
+        Read and written.
     """
+    deborah, loads = cases
+    near_step, trusted = bounds
+    depths, rates, results = search
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
     workspace, tile = np.empty(ROWS * LANES), np.empty((IN_A_TILE, cells + 3))
@@ -205,16 +212,15 @@ def begin(
     strides = [2]
     while height.size > SETTINGS.coarsening * SETTINGS.coarsest * strides[-1]:
         strides.append(strides[-1] * SETTINGS.coarsening)
-    depths, results = _shallow(loads), np.empty((loads.size, RESULTS))
-    rates = np.full((loads.size, SECANTS), np.nan)
-    highest, cases = int(np.argmax(height)), (deborah, loads)
+    search = Search(_shallow(loads), np.full((loads.size, SECANTS), np.nan), np.empty((loads.size, RESULTS)))
+    highest, cases = int(np.argmax(height)), Cases(deborah, loads)
     for stride in reversed(strides):
         line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
-        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, depths, rates, results)
-    coarse = _sampled(line.top, depths, rates.copy(), results)
+        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search)
+    coarse = _sampled(line.top, search._replace(rates=search.rates.copy()))
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
-    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, rates, trusted)
+    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, search.rates, trusted)
 
 
 def settle(
@@ -245,24 +251,24 @@ def settle(
     rise = summit_rise(line)
     top = line.top + rise
     depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
-    return _settled(line, rise, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
+    return _settled(line, rise, refinement, Cases(deborah, loads), depths, fine.rates.copy(), trusted)
 
 
 def _settled(
     line: Nodes,
     rise: float,
     refinement: int,
-    cases: tuple[FloatArray, FloatArray],
+    cases: Cases,
     depths: FloatArray,
     rates: FloatArray,
     trusted: float,
 ) -> Sampled:
     """Return the steady states on a grid, searched for from some depths of the mean line on."""
-    top, results = line.top + rise, np.empty((depths.size, RESULTS))
-    depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
-    bounds = SETTINGS.answer_step, trusted
-    _solve(line, weights(refinement), rise, *cases, *bounds, depths, rates, results)
-    return _sampled(top, depths, rates, results)
+    top = line.top + rise
+    penetration = np.where(depths + top > 0, depths + top, _shallow(cases.loads))
+    search = Search(penetration, rates, np.empty((depths.size, RESULTS)))
+    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search)
+    return _sampled(top, search)
 
 
 def _shallow(loads: FloatArray) -> FloatArray:
@@ -270,7 +276,7 @@ def _shallow(loads: FloatArray) -> FloatArray:
     return np.maximum(loads, loads ** (2 / 3))
 
 
-def _sampled(top: float, depths: FloatArray, rates: FloatArray, results: FloatArray) -> Sampled:
-    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = results.T.copy()
+def _sampled(top: float, search: Search) -> Sampled:
+    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = search.results.T.copy()
     doubts = np.array([of_drag * drag, of_depth, of_fraction * fraction, of_slope * slope])
-    return Sampled(rates, drag, depths - top, fraction, slope, doubts)
+    return Sampled(search.rates, drag, search.depths - top, fraction, slope, doubts)
