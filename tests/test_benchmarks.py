@@ -66,7 +66,7 @@ def test_the_comparison_of_solvers_is_what_its_table_says(benchmark_script):
 
 
 def test_stepping_all_springs_ends_at_the_scheme_of_the_thesis(benchmark_script):
-    """Friction of springs that are followed in time, on two grids; they share the line's heights with the solver alone."""
+    """Friction of springs that are followed in time, on two grids; only the heights are shared."""
     script = benchmark_script("peers.friction")
     line, _ = script.sliding.rough(0.7)
     for nodes in (256, 512):
