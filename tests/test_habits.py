@@ -109,6 +109,17 @@ def test_a_file_is_one_idea():
     assert {path: size for path, size in sizes.items() if size > 450} == {}
 
 
+@pytest.mark.parametrize(
+    "room", sorted((ROOT / "mdr_dask/physics").glob("**/__init__.py")), ids=lambda path: path.parent.name
+)
+def test_a_room_says_what_is_inside(room):
+    inside = {path.stem for path in room.parent.glob("*.py")} | {
+        path.parent.name for path in room.parent.glob("*/__init__.py")
+    }
+    said = re.findall(r"`(\w+)`", ast.get_docstring(ast.parse(room.read_text())))
+    assert inside - {"__init__"} <= set(said)
+
+
 def test_public_names_are_unique_across_physics():
     """Every solver may have its own `Settings`."""
     seen = defaultdict(set)

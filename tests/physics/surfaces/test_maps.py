@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from references.areal import areal_surface
 
 from mdr_dask.errors import DataError
-from mdr_dask.physics.surfaces.areal import areal_surface
 from mdr_dask.physics.surfaces.maps import (
     MOST_MISSING,
     SurfaceMap,
