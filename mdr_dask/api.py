@@ -25,7 +25,8 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
         ),
     ),
     "Steady sliding": (
-        ("mdr_dask.physics.sliding.steady", ("steady_sliding", "Steady")),
+        ("mdr_dask.physics.sliding.steady", ("steady_sliding",)),
+        ("mdr_dask.physics.sliding.cases", ("Steady",)),
         ("mdr_dask.physics.sliding.viscoelastic", ("steady_viscoelastic_sliding",)),
         ("mdr_dask.physics.surfaces.cubic_line", ("periodic_line", "indented_line")),
     ),

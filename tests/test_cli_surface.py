@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from references.areal import areal_surface
 
 from mdr_dask.cli import main
 from mdr_dask.models.parts.surface import Surface, spectra_of
-from mdr_dask.physics.surfaces.areal import areal_surface
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 LENGTH, POINTS, HURST = 4e-3, 512, 0.8

@@ -149,12 +149,9 @@ def test_nodes_visited_at_light_load(monkeypatch):
     nodes = cells.mean.size - 1
     peak = cells.peak.view(Visited)
     peak.seen = set()
-    barriers, block_barriers = np.empty(nodes), np.full(nodes // kelvin.BLOCK + 1, np.nan)
-    sums, none = np.empty(kelvin.SUMS), np.empty(0)
+    barriers, sums, unwritten = kelvin.barriers_for(nodes), np.empty(kelvin.SUMS), kelvin.places_for(0)
     monkeypatch.setattr(kelvin, "_flown_over", kelvin._flown_over.py_func)
-    kelvin.sweep_cells.py_func(
-        cells._replace(peak=peak), every, barriers, block_barriers, 1e-5 * nodes, 1e-2, sums, none, none
-    )
+    kelvin.sweep_cells.py_func(cells._replace(peak=peak), every, barriers, 1e-5 * nodes, 1e-2, sums, unwritten)
     assert 0 < sums[kelvin.LENGTH] < 0.05 * nodes
     assert len(peak.seen) < 0.25 * nodes
 

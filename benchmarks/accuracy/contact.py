@@ -72,7 +72,7 @@ def films(short: bool) -> Iterator[Point]:
     chosen = {"easy: M of 200": rows[0], "typical": rows[len(rows) // 2], "hard: heaviest of 70": rows[-1]}
     for name, row in list(chosen.items())[: 1 if short else None]:
         groups = (float(row[key]) for key in ("W", "U", "G"))
-        case = line_contact.line_contact(*groups, 115.385e9, compressible=row["compressible"] == "true")
+        case = line_contact.line_contact(groups, 115.385e9, compressible=row["compressible"] == "true")
         truth = float(row["central_film"])
         for accuracy in (1e-2, 1e-3) if short else (1e-2, 3e-3, 1e-3, 3e-4, 1e-4):
             found, seconds = timed(line_contact.solve_film, case, accuracy, calls=2)

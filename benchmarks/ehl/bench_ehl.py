@@ -23,14 +23,14 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_film_to_a_thousandth(benchmark, name):
-    case = line_contact(*CASES[name], E_STAR)
+    case = line_contact(CASES[name], E_STAR)
     found = benchmark(solve_film, case, 1e-3)
     assert found.outcome == Outcome.CONVERGED
     assert found.error <= 1e-3
 
 
 def test_film_to_a_ten_thousandth(benchmark):
-    case = line_contact(*CASES["checked"], E_STAR)
+    case = line_contact(CASES["checked"], E_STAR)
     found = benchmark.pedantic(solve_film, (case, 1e-4), rounds=3, warmup_rounds=1)
     assert found.error <= 1e-4
 

@@ -37,7 +37,7 @@ def cases(box, number, seed):
     found = []
     while len(found) < number:
         numbers = (float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in BOXES[box])
-        case = line_contact(*numbers, E_STAR, **OPTIONS[len(found) % len(OPTIONS)])
+        case = line_contact(numbers, E_STAR, **OPTIONS[len(found) % len(OPTIONS)])
         if box == "whole box" or case.M > LEAST_LOAD:
             found.append(case)
     return found

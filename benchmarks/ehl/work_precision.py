@@ -61,7 +61,7 @@ def measure():
     """Return rows of case, method, nodes, error of the central and the minimum film, seconds."""
     rows = []
     for name, numbers in CASES.items():
-        case = line_contact.line_contact(*numbers, E_STAR)
+        case = line_contact.line_contact(numbers, E_STAR)
         finest = line_contact.SETTINGS._replace(nodes=(*line_contact.SETTINGS.nodes, 2561))
         exact = line_contact.solve_film(case, 1e-6, finest)
         for method, function, settings in METHODS:
@@ -88,7 +88,7 @@ def stress():
         seconds, failed, missed = [], 0, 0
         for _ in range(STRESS):
             numbers = (float(np.exp(random.uniform(np.log(low), np.log(high)))) for low, high in BOX)
-            found, duration = timed(line_contact.solve_film, line_contact.line_contact(*numbers, E_STAR, **options))
+            found, duration = timed(line_contact.solve_film, line_contact.line_contact(numbers, E_STAR, **options))
             seconds.append(duration)
             failed += found.outcome != Outcome.CONVERGED
             missed += found.error > 1e-3

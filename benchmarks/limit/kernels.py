@@ -93,17 +93,16 @@ def node_to_node() -> Work:
 
 
 def _sweep(load: float) -> Work:
-    from mdr_dask.physics.sliding.kelvin import BLOCK, SUMS, blocks_of, sweep_cells
+    from mdr_dask.physics.sliding.kelvin import SUMS, barriers_for, blocks_of, places_for, sweep_cells
     from mdr_dask.physics.sliding.steady import steady_on_cells
 
     cells = cut(periodic_line(*_nodes(4)))
     blocks, n, deborah = blocks_of(cells), 4 * POINTS, 0.02
     depth = steady_on_cells(cells, blocks, np.array([deborah]), np.array([load])).depth[0] + cells.top
-    barriers, of_blocks, sums = np.empty(n), np.full(n // BLOCK + 1, np.nan), np.empty(SUMS)
-    nothing = np.empty(0)
+    barriers, sums, unwritten = barriers_for(n), np.empty(SUMS), places_for(0)
 
     def call() -> None:
-        sweep_cells(cells, blocks, barriers, of_blocks, deborah * n, depth, sums, nothing, nothing)
+        sweep_cells(cells, blocks, barriers, deborah * n, depth, sums, unwritten)
 
     call()
     return Work(call, n)
@@ -117,13 +116,10 @@ def papers_steps() -> Work:
     deborah, loads = np.geomspace(1e-4, 1e2, 20), np.full(20, 0.3)
     line = periodic_line(*_nodes(2))
     arguments = _captured(backward_euler, "_newton", lambda: stepped_sliding(line, deborah, loads))
-    height, rise, periodic, numbers, _, _, depths, _, _ = arguments
-    blocks, cases = backward_euler._blocks(height, rise, periodic), depths.size
-    decay, lanes = numbers / (1 + numbers), backward_euler.LANES
-    workspace, near = np.empty((backward_euler.ROWS, cases)), np.empty((backward_euler.ROWS + 2, cases + lanes))
-    queue, sums = np.empty(cases, np.int64), np.empty((backward_euler.SUMS, cases))
-    fixed = height, rise, blocks, periodic, numbers, decay, depths, workspace, near, queue, sums
-    return Work(lambda: backward_euler._sweep(*fixed), height.size * cases)
+    line, (deborah, _), _, depths, _, _ = arguments
+    moving = backward_euler.Moving(deborah, deborah / (1 + deborah), depths)
+    lanes = backward_euler.lanes_for(depths.size)
+    return Work(lambda: backward_euler._sweep(line, moving, lanes), line.height.size * depths.size)
 
 
 def general_solid() -> Work:
@@ -211,7 +207,7 @@ def _films() -> tuple[Any, Any, Any]:
     from mdr_dask.physics.lubrication import grids, line_contact
     from mdr_dask.physics.lubrication.newton import Grid, film_on
 
-    case = line_contact.line_contact(2.0452e-5, 1e-11, 5007.0, 115.385e9)
+    case = line_contact.line_contact((2.0452e-5, 1e-11, 5007.0), 115.385e9)
     nodes = grids.first_grid(0.1, grids.inlet_position(0.1), 121)
     grid, pressure = Grid.of(nodes), line_contact._first_pressure(nodes, 0.1)
     return case, _State(nodes, pressure, film_on(grid, pressure, 0.1)), grid

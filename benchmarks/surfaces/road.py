@@ -11,8 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from mdr_dask.cli import main
-from mdr_dask.physics.surfaces.areal import areal_surface
 from mdr_dask.physics.surfaces.spectrum import self_affine
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from references.areal import areal_surface
 
 SPACING, POINTS, SEED = 5e-6, 1024, 2026
 SPECTRUM = self_affine(0.8, 8e-3, 1e-5, 5e-5, 2.5e-3)

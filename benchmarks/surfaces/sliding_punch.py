@@ -15,10 +15,10 @@ from scipy import fft
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from benchmarks.measures import alone, print_table
-from benchmarks.surfaces.punches import free_half_space, spectrum
+from benchmarks.surfaces.punches import areal_surface, free_half_space, spectrum
 from mdr_dask.models.parts.surface import Surface
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
-from mdr_dask.physics.surfaces.areal import areal_surface, wavenumbers
+from mdr_dask.physics.surfaces.maps import wavenumbers
 
 TABLE = Path(__file__).parents[2] / "docs/evidence/sliding_punch.csv"
 COLUMNS = (

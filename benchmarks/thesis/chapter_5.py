@@ -47,7 +47,7 @@ def _constriction(studies: Studies) -> Found:
 
 
 def _density(_: Studies) -> Found:
-    most = float(oil.density_ratio(1e15)) - 1
+    most = oil.DENSITY_RISE / oil.DENSITY_SATURATION
     return Found(f"{100 * most:.1f} %", Verdict.FAILS if abs(most - 0.33) > 0.01 else Verdict.HOLDS)
 
 

@@ -102,21 +102,6 @@ def _relaxation_course(series: Series) -> xr.Dataset:
     return result
 
 
-def course_errors(data: xr.Dataset) -> xr.Dataset:
-    """Return law less course over d_mu_0 of every case of a series, over ``time`` (t - t_0) / tau, with intervals."""
-    cases = Cases.of({"": data}, *LEVELS, "friction_coefficient", "rms_slope")
-    time = np.concatenate([[0.0], cases.data["relaxation_times"].values])
-    ends = np.full((3, len(cases.counts), time.size), np.nan)
-    for k, course in enumerate(_courses(cases)):
-        if course is not None:
-            ends[:, k] = course.whole[0], *bootstrap.interval(course.whole, int(cases.counts[k]))
-    dims = (*cases.template.dims, "time")
-    axes = {dim: cases.template[dim] for dim in cases.template.dims if dim in cases.template.coords}
-    shaped = ends.reshape(3, *cases.template.shape, time.size)
-    names = ("course_error", "course_error_low", "course_error_high")
-    return xr.Dataset(dict(zip(names, ((dims, part) for part in shaped), strict=True)), {**axes, "time": time})
-
-
 LINEAR_FIELDS = {
     "zeta": "zeta of eq. 4.8 in the limit of a small jump",
     "zeta_trend": "relative change of zeta with dv / v_1",

@@ -6,7 +6,7 @@ import xarray as xr
 
 from mdr_dask.errors import FitError
 from mdr_dask.fits.jumps import jump_law
-from mdr_dask.fits.kinetic_courses import FITS, course_errors, relaxation_law
+from mdr_dask.fits.kinetic_courses import FITS
 
 FIT = {fit.name: fit for fit in FITS}
 TIMES = np.geomspace(1e-3, 20, 30)
@@ -66,19 +66,6 @@ def test_a_course_with_another_jump_or_another_rate_is_named(lines):
     assert judged(found, "no: departs") == 1
     assert np.all(found["rms_error_of_rate"] > 0.05)
     assert coverage(found, "start_error", 0.0) >= LEAST
-
-
-def test_errors_over_time():
-    data = studies(10, 3, wrong=6.0)
-    found = course_errors(data)
-    assert found["course_error"].dims == ("velocity", "velocity_change", "normal_force", "time")
-    first = found.isel(velocity=1, velocity_change=0, normal_force=0)
-    mean = data.mean("realisation").isel(velocity=1, velocity_change=0, normal_force=0)
-    before, jump, after = (float(mean[f"friction_coefficient_{name}"]) for name in ("before", "jump", "after"))
-    rate = (0.02 * TAU * WAVENUMBER) ** (1 - HURST)
-    law = relaxation_law(np.array([before]), np.array([after]), SLOPE, 0.2, rate, TIMES)[0]
-    assert np.allclose(first["course_error"][1:], (law - mean["friction_coefficient"].values) / jump)
-    assert np.all(first["course_error_low"] <= first["course_error_high"])
 
 
 SIZES = (-0.2, -0.1, 0.1, 0.2, 0.3)

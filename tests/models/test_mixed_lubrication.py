@@ -244,7 +244,7 @@ def test_film_of_the_full_solution_is_that_of_the_line_contact_in_metres(law):
     viscosity, alpha = float(data.dynamic(313.15)), float(data.alpha(313.15))
     radius, line_load, velocity = 0.025, 800.0 / 0.01, 100 * RPM * 0.05
     W, U, G = line_load / (2 * STEEL * radius), viscosity * velocity / (2 * STEEL * radius), alpha * 2 * STEEL
-    solution = solve_film(line_contact(W, U, G, STEEL, viscosity_law=law, viscosity=viscosity))
+    solution = solve_film(line_contact((W, U, G), STEEL, viscosity_law=law, viscosity=viscosity))
     half_width = np.sqrt(4 * line_load * radius / (np.pi * STEEL))
     expected = float(solution.central_film.value) * half_width**2 / radius
     assert found.values["film"][0, 0] == pytest.approx(expected, rel=1e-4)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from references.areal import areal_surface
 
 from mdr_dask.models.parts.surface import Surface, spectra_of
 from mdr_dask.models.parts.surface_files import read_map
-from mdr_dask.physics.surfaces.areal import areal_surface
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 topography = pytest.importorskip("SurfaceTopography")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -15,6 +14,7 @@ from mdr_dask.physics.lubrication import traction
 from mdr_dask.physics.lubrication.film_formulas import (
     PAN_HAMROCK_CENTRAL,
     PAN_HAMROCK_MINIMUM,
+    Groups,
     moes_parameters,
     square_of_half_width,
     thick_film,
@@ -28,21 +28,13 @@ _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
 _AROUND = 5
 
 
-class _Groups(NamedTuple):
-    """Load, speed and material parameters of one case or of all."""
-
-    W: FloatArray
-    U: FloatArray
-    G: FloatArray
-
-
-def _groups(block: Block[EhlLineParameters]) -> _Groups:
+def _groups(block: Block[EhlLineParameters]) -> Groups:
     """Return W, U and G of every case."""
 
     def lookup(name: str) -> FloatArray | None:
         return None if getattr(block.parameters, name) is None else block.column(name).astype(np.float64)
 
-    return _Groups(*groups(lookup))
+    return Groups(*groups(lookup))
 
 
 def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
@@ -51,7 +43,7 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
     columns = zip(*(block.column(name).tolist() for name in names), strict=True)
     return [
         line_contact(
-            W, U, G, modulus, viscosity_law=law, viscosity=viscosity, compressible=bool(compressible), inlet=inlet
+            (W, U, G), modulus, viscosity_law=law, viscosity=viscosity, compressible=bool(compressible), inlet=inlet
         )
         for W, U, G, (modulus, law, viscosity, compressible, inlet) in zip(
             *(group.tolist() for group in _groups(block)), columns, strict=True

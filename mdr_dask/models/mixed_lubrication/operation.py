@@ -149,7 +149,7 @@ def _film_of(
 
     def by_solution(share: float) -> Film:
         contact = line_contact.line_contact(
-            W, U / share, G * share, E_star * share, viscosity_law=case.viscosity_law, viscosity=viscosity
+            (W, U / share, G * share), E_star * share, viscosity_law=case.viscosity_law, viscosity=viscosity
         )
         found = _solved(contact, accuracy)
         return Film(found.thickness * film_formulas.square_of_half_width(W) * radius, found.error)

@@ -15,8 +15,8 @@ from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProble
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
+from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, solve
-from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say

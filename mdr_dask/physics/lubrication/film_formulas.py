@@ -17,32 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from mdr_dask.arrays import FloatArray
 
 
-def reduced_modulus(
-    modulus_1: ArrayLike, poisson_1: ArrayLike, modulus_2: ArrayLike, poisson_2: ArrayLike
-) -> FloatArray:
-    """Return the contact modulus E* of two bodies (thesis section 5.2.1).
-
-    Parameters
-    ----------
-    modulus_1, modulus_2 : array_like
-        Young's moduli in Pa.
-    poisson_1, poisson_2 : array_like
-        Poisson's ratios.
-
-    Returns
-    -------
-    array
-        ``E*`` in Pa, ``1/E* = (1-nu1^2)/E1 + (1-nu2^2)/E2``; the formulas' ``E'`` is twice that.
-    """
-    compliance = (1 - np.square(poisson_1)) / np.asarray(modulus_1) + (1 - np.square(poisson_2)) / np.asarray(modulus_2)
-    return np.asarray(1 / compliance, dtype=np.float64)
-
-
-def reduced_radius(radius_1: ArrayLike, radius_2: ArrayLike) -> FloatArray:
-    """Return the radius R* in m of the cylinder that meets a plane as the two meet: ``1/R* = 1/R1 + 1/R2``."""
-    return np.asarray(1 / (1 / np.asarray(radius_1, float) + 1 / np.asarray(radius_2, float)), dtype=np.float64)
-
-
 class HertzLine(NamedTuple):
     """Half width (m) and highest pressure (Pa) of a dry line contact."""
 
@@ -251,20 +225,6 @@ def moes_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Moes:
     """Return ``M = W (2U)^(-1/2)`` and ``L = G (2U)^(1/4)``."""
     speed = 2 * np.asarray(U, dtype=np.float64)
     return Moes(np.asarray(W) / np.sqrt(speed), np.asarray(G) * speed**0.25)
-
-
-class Johnson(NamedTuple):
-    """Johnson's viscosity and elasticity parameters; the film is then ``(h/R) W/U``."""
-
-    g_v: FloatArray
-    g_e: FloatArray
-
-
-def johnson_parameters(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> Johnson:
-    """Return ``g_v = G W^(3/2) U^(-1/2)`` and ``g_e = W U^(-1/2)``."""
-    root = np.sqrt(np.asarray(U, dtype=np.float64))
-    load = np.asarray(W, dtype=np.float64)
-    return Johnson(np.asarray(G) * load**1.5 / root, load / root)
 
 
 #: Names of the regimes, in the order of the rows of `limiting_films`.

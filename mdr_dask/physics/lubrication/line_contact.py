@@ -129,9 +129,7 @@ class LineContact(NamedTuple):
 
 
 def line_contact(
-    W: float,
-    U: float,
-    G: float,
+    groups: tuple[float, float, float],
     E_star: float,
     *,
     viscosity_law: str = "barus",
@@ -143,8 +141,8 @@ def line_contact(
 
     Parameters
     ----------
-    W, U, G : float
-        Load, speed and material parameters with ``E' = 2 E*`` and the mean velocity.
+    groups : tuple of float
+        Load, speed and material parameters W, U and G with ``E' = 2 E*`` and the mean velocity.
     E_star : float
         Contact modulus in Pa; it sets the pressures that the density law and Roelands' law see.
     viscosity_law : str
@@ -162,6 +160,7 @@ def line_contact(
         If a number is not positive, the law is unknown, Roelands' law has no viscosity above ``exp(-9.67)`` Pa s, or
         the inlet is not upstream.
     """
+    W, U, G = groups
     for name, value in (("W", W), ("U", U), ("G", G), ("E_star", E_star)):
         if not (np.isfinite(value) and (value > 0 or (name == "G" and value == 0))):
             raise ValueError(f"expected a positive {name}, got {value!r}")
@@ -363,7 +362,7 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
 
     Examples
     --------
-    >>> found = solve_film(line_contact(W=2e-5, U=1e-11, G=5000.0, E_star=115e9))
+    >>> found = solve_film(line_contact((2e-5, 1e-11, 5000.0), E_star=115e9))
     >>> central = found.central_film.scaled(8 * 2e-5 / np.pi)  # a^2/R^2
     >>> print(f"h_c/R = {central.value:.3e}")
     h_c/R = 2.546e-05

@@ -241,9 +241,3 @@ def roelands(pressure: ArrayLike, viscosity: ArrayLike, alpha: ArrayLike) -> Flo
 #: Constants of the density law in 1/Pa (thesis eq. B.6).
 DENSITY_RISE = 0.6e-9
 DENSITY_SATURATION = 1.7e-9
-
-
-def density_ratio(pressure: ArrayLike) -> FloatArray:
-    """Return ``rho/rho0 = 1 + 0.6e-9 p/(1 + 1.7e-9 p)`` (Dowson and Higginson; thesis eq. B.6 with its sign right)."""
-    p = np.asarray(pressure, dtype=np.float64)
-    return np.asarray(1 + DENSITY_RISE * p / (1 + DENSITY_SATURATION * p))

@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
-from mdr_dask.physics.sliding.steady import Scheme, Steady
+from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import Shape
 
@@ -170,8 +170,8 @@ class Ladder:
     def _sampled(self, accuracy: float) -> tuple[Steady, Errors]:
         """Solve cases from node to node; the errors are infinite where that gives nothing."""
         settings = SETTINGS
-        steady, errors = sliding.unsolved(self.loads.size), Errors.unknown(self.loads.size)
-        left = np.flatnonzero(sliding.valid(self.deborah, self.loads))
+        steady, errors = unsolved(self.loads.size), Errors.unknown(self.loads.size)
+        left = np.flatnonzero(valid(self.deborah, self.loads))
         height, slope = self._nodes(settings.sampled)
         cases = self.deborah[left], self.loads[left]
         line, coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)

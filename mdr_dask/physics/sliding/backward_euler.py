@@ -9,12 +9,14 @@ over cases, so that they are vector instructions. Each case does the same arithm
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
 COARSENING = 8
@@ -35,6 +37,61 @@ KNOWN = 8
 # What a sweep holds of a case, in this order; the last four while it goes from node to node
 U, FADE, THROUGH, MEMORY, LOAD, RATE, LOSS = range(7)
 ROWS = 7
+
+
+class Nodal(NamedTuple):
+    """A line known at its nodes, from the highest one on.
+
+    Parameters
+    ----------
+    height, rise : array, shape (n,)
+        Heights, and what each is above that of the node before.
+    blocks : array, shape (n // BLOCK, KNOWN)
+        From `_blocks`.
+    periodic : bool
+        Whether the line closes on itself; its highest node then comes last.
+    """
+
+    height: FloatArray
+    rise: FloatArray
+    blocks: FloatArray
+    periodic: bool
+
+
+class Moving(NamedTuple):
+    """Cases that go along a line: v tau in cells, lambda, and the penetration of the highest node."""
+
+    deborah: FloatArray
+    decay: FloatArray
+    depth: FloatArray
+
+
+class Lanes(NamedTuple):
+    """Workspace of a sweep over cases.
+
+    Parameters
+    ----------
+    state : array, shape (ROWS, cases)
+        `U` and `FADE` end as u and its derivative at the end of the line.
+    near : array, shape (ROWS + 2, cases + LANES)
+        The state of the cases of a queue, with their decay and depth.
+    queue : array, shape (cases,)
+        Cases that touch or leave in a block.
+    sums : array, shape (SUMS, cases)
+        Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
+    """
+
+    state: FloatArray
+    near: FloatArray
+    queue: IntArray
+    sums: FloatArray
+
+
+@kernel
+def lanes_for(cases: int) -> Lanes:
+    """Return the workspace of a sweep."""
+    near = np.empty((ROWS + 2, cases + LANES))
+    return Lanes(np.empty((ROWS, cases)), near, np.empty(cases, np.int64), np.empty((SUMS, cases)))
 
 
 @compiled
@@ -71,20 +128,12 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
 
 
 @compiled
-def _pass_block(
-    block: FloatArray,
-    last: float,
-    deborah: FloatArray,
-    decay: FloatArray,
-    depth: FloatArray,
-    workspace: FloatArray,
-    sums: FloatArray,
-    queue: NDArray[np.int64],
-) -> int:
+def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Take every case over a block by closed sums; queue those that touch or leave in it, and return their number."""
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
     heights, rises, work, squares = block[HEIGHTS], block[RISES], block[WORK], block[SQUARES]
-    queued = 0
+    deborah, decay, depth = moving
+    workspace, sums, queue, queued = lanes.state, lanes.sums, lanes.queue, 0
     for k in range(depth.size):
         d, u = depth[k], workspace[U, k]
         if peak + d <= u * workspace[THROUGH, k]:
@@ -132,27 +181,20 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
 
 
 @compiled
-def _walk_some(
-    height: FloatArray,
-    rise: FloatArray,
-    decay: FloatArray,
-    depth: FloatArray,
-    workspace: FloatArray,
-    sums: FloatArray,
-    queue: NDArray[np.int64],
-    near: FloatArray,
-) -> None:
-    """Take the cases of a queue from node to node, together in `near`, which has two rows more than `workspace`."""
-    for q in range(queue.size):
+def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
+    """Take the cases of the queue from node to node, together."""
+    decay, depth = moving.decay, moving.depth
+    workspace, near, queue, sums = lanes
+    for q in range(queued):
         k = queue[q]
         near[U, q], near[FADE, q] = workspace[U, k], workspace[FADE, k]
         near[ROWS, q], near[ROWS + 1, q] = decay[k], depth[k]
         near[LOAD, q] = near[RATE, q] = near[LOSS, q] = 0.0
     # full vectors are quicker than the rest of one
-    full = -(-queue.size // LANES) * LANES
-    near[:, queue.size : full] = 0.0
+    full = -(-queued // LANES) * LANES
+    near[:, queued:full] = 0.0
     _walk(height, rise, near[ROWS, :full], near[ROWS + 1, :full], near)
-    for q in range(queue.size):
+    for q in range(queued):
         k = queue[q]
         workspace[U, k], workspace[FADE, k] = near[U, q], near[FADE, q]
         sums[CARRIED, k] += near[LOAD, q]
@@ -161,38 +203,14 @@ def _walk_some(
 
 
 @compiled
-def _sweep(
-    height: FloatArray,
-    rise: FloatArray,
-    blocks: FloatArray,
-    periodic: bool,
-    deborah: FloatArray,
-    decay: FloatArray,
-    depth: FloatArray,
-    workspace: FloatArray,
-    near: FloatArray,
-    queue: NDArray[np.int64],
-    sums: FloatArray,
-) -> None:
+def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
 
-    Parameters
-    ----------
-    height : array, shape (n,)
-        Heights from the highest node.
-    rise : array, shape (n,)
-        Height less that of the node before.
-    blocks : array, shape (n // BLOCK, KNOWN)
-        From `_blocks`.
-    periodic : bool
-        Whether the line closes on itself; its highest node then comes last.
-    deborah, decay, depth : array, shape (cases,)
-        v tau in cells, lambda, and the penetration of the highest node.
-    workspace, near, queue : array, shape (ROWS, cases), (ROWS + 2, cases + LANES), (cases,)
-        Workspace; `U` and `FADE` of `workspace` end as u and its derivative at the end of the line.
-    sums : array, shape (SUMS, cases)
-        Written: sum of u, its derivative by the depth, F_x / (4 G) times 1 - lambda.
+    A queue is what the closed sums of a block do not take.
     """
+    height, rise, blocks, periodic = line
+    deborah, depth = moving.deborah, moving.depth
+    workspace, sums = lanes.state, lanes.sums
     for k in range(depth.size):
         workspace[U, k] = depth[k] if periodic else 0.0
         workspace[FADE, k] = 1.0 if periodic else 0.0
@@ -201,22 +219,19 @@ def _sweep(
         sums[CARRIED, k] = sums[STIFFNESS, k] = sums[DRAG, k] = 0.0
     for j in range(blocks.shape[0]):
         first, end = j * BLOCK, (j + 1) * BLOCK
-        queued = _pass_block(blocks[j], height[end - 1], deborah, decay, depth, workspace, sums, queue)
+        queued = _pass_block(blocks[j], height[end - 1], moving, lanes)
         if queued:
-            _walk_some(height[first:end], rise[first:end], decay, depth, workspace, sums, queue[:queued], near)
+            _walk_some(height[first:end], rise[first:end], moving, lanes, queued)
     first = blocks.shape[0] * BLOCK
     for k in range(depth.size):
-        queue[k] = k
-    _walk_some(height[first:], rise[first:], decay, depth, workspace, sums, queue[: depth.size], near)
+        lanes.queue[k] = k
+    _walk_some(height[first:], rise[first:], moving, lanes, depth.size)
 
 
 @kernel
 def _newton(
-    height: FloatArray,
-    rise: FloatArray,
-    periodic: bool,
-    deborahs: FloatArray,
-    loads: FloatArray,
+    line: Nodal,
+    cases: Cases,
     tolerance: float,
     depths: FloatArray,
     drags: FloatArray,
@@ -227,20 +242,15 @@ def _newton(
     The load is convex, increasing and piecewise linear in the depth, so that Newton comes down from the right after its
     first step. The last step is taken without another sweep: its load from the tangent, its drag from the secant.
     """
-    cases = loads.size
-    active = np.arange(cases)
-    depth, load, deborah = depths.copy(), loads.copy(), deborahs.copy()
-    decay = deborahs / (1 + deborahs)
-    blocks = _blocks(height, rise, periodic)
-    workspace, near, sums = np.empty((ROWS, cases)), np.empty((ROWS + 2, cases + LANES)), np.empty((SUMS, cases))
-    queue, before = np.empty(cases, np.int64), np.full((2, cases), np.nan)
+    count = depths.size
+    active, lanes, before = np.arange(count), lanes_for(count), np.full((2, count), np.nan)
+    depth, load, deborah = depths.copy(), cases.loads.copy(), cases.deborah.copy()
+    decay = deborah / (1 + deborah)
+    workspace, sums = lanes.state, lanes.sums
     drags[:] = np.nan
-    ends = 0.0 if periodic else 1.0
-    count = cases
+    ends = 0.0 if line.periodic else 1.0
     for _ in range(ITERATIONS):
-        _sweep(
-            height, rise, blocks, periodic, deborah[:count], decay[:count], depth[:count], workspace, near, queue, sums
-        )
+        _sweep(line, Moving(deborah[:count], decay[:count], depth[:count]), lanes)
         kept = 0
         for k in range(count):
             case = active[k]
@@ -253,7 +263,7 @@ def _newton(
                 change = (before[1, k] - drag) / earlier * step if abs(earlier) > 0 else 0.0
                 depths[case] = depth[k] + step
                 drags[case] = drag + change
-                outside[case] = not periodic and (workspace[FADE, k] == 1 or height[0] + depth[k] > 0)
+                outside[case] = not line.periodic and (workspace[FADE, k] == 1 or line.height[0] + depth[k] > 0)
                 continue
             active[kept], decay[kept], load[kept], deborah[kept] = case, decay[k], load[k], deborah[k]
             before[0, kept], before[1, kept] = depth[k], drag
@@ -318,5 +328,6 @@ def steady_by_steps(
         coarse = np.ascontiguousarray(height[top % stride :: stride])
         rise = coarse - np.roll(coarse, 1)
         tolerance = CONVERGED if stride == 1 else COARSE
-        _newton(coarse, rise, periodic, deborah / stride, loads / stride, tolerance, depths, drags, outside)
+        line = Nodal(coarse, rise, _blocks(coarse, rise, periodic), periodic)
+        _newton(line, Cases(deborah / stride, loads / stride), tolerance, depths, drags, outside)
     return depths, drags, outside

@@ -44,19 +44,39 @@ def blocks_of(cells: Cells) -> Blocks:
     return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
 
 
+class Barriers(NamedTuple):
+    """The depths that keep cells and blocks pressed at a Deborah number; NaN for blocks not needed yet."""
+
+    cell: FloatArray
+    block: FloatArray
+
+
+@kernel
+def barriers_for(cells: int) -> Barriers:
+    """Return barriers of a line of which none is known."""
+    return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan))
+
+
+class Places(NamedTuple):
+    """Where patches begin and end, in cells."""
+
+    touches: FloatArray
+    leaves: FloatArray
+
+
+@kernel
+def places_for(patches: int) -> Places:
+    """Return room for the places of some patches."""
+    return Places(np.empty(patches), np.empty(patches))
+
+
 @compiled
 def write_barriers(
-    height: FloatArray,
-    enter: FloatArray,
-    leave: FloatArray,
-    deborah: float,
-    block: int,
-    barriers: FloatArray,
-    block_barriers: FloatArray,
+    height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
     """Write the depth that keeps each whole cell of a block pressed, w + deborah w' > 0, and their maximum."""
-    every = -np.inf
-    for i in range(block * BLOCK, min((block + 1) * BLOCK, barriers.size)):
+    every, written = -np.inf, barriers.cell
+    for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
         first = -(h0 + deborah * a)
         last = -(height[i + 1] + deborah * leave[i])
@@ -67,9 +87,9 @@ def write_barriers(
         if x < 1:
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
-        barriers[i] = highest
+        written[i] = highest
         every = highest if highest > every else every
-    block_barriers[block] = every
+    barriers.block[block] = every
 
 
 @compiled
@@ -120,11 +140,21 @@ def _falling(p: float, q: float, r: float, c: float, low: float, high: float) ->
     return x
 
 
+class Flight(NamedTuple):
+    """An element that is free from a place in a cell on: the cubic w there, its displacement u, and that place."""
+
+    w0: float
+    a: float
+    b: float
+    c: float
+    u: float
+    start: float
+
+
 @compiled
-def _touching(
-    w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, high: float
-) -> float:
+def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
     """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
+    w0, a, b, c, u, start = flight
     if w0 + low * (a + low * (b + low * c)) >= u - u * _decayed((low - start) / deborah):
         return low
     first, end, x = low, high, high
@@ -144,13 +174,12 @@ def _touching(
 
 
 @compiled
-def _touch(
-    w0: float, a: float, b: float, c: float, deborah: float, u: float, start: float, low: float, stop: float
-) -> float:
-    """Return where from low to stop an element that is free from start on, with u there, touches first, or `NONE`.
+def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
+    """Return where from low to stop a free element touches first, or `NONE`.
 
     The lead of the line, (w - u_free) exp(x / deborah), rises while the force w + deborah w' is positive.
     """
+    w0, a, b, c, u, start = flight
     for _ in range(3):
         force = w0 + low * (a + low * (b + low * c)) + deborah * (a + low * (2 * b + low * 3 * c))
         first = low if force > 0 else leaving(-w0, -a, -b, -c, deborah, low)
@@ -158,7 +187,7 @@ def _touch(
             return NONE
         high = min(leaving(w0, a, b, c, deborah, first), stop)
         if w0 + high * (a + high * (b + high * c)) > u - u * _decayed((high - start) / deborah):
-            return _touching(w0, a, b, c, deborah, u, start, first, high)
+            return _touching(flight, deborah, first, high)
         if high >= stop:
             return NONE
         low = high + CLOSE
@@ -212,15 +241,7 @@ def _flown_over(
 
 @compiled
 def sweep_cells(
-    cells: Cells,
-    every: Blocks,
-    barriers: FloatArray,
-    block_barriers: FloatArray,
-    deborah: float,
-    depth: float,
-    sums: FloatArray,
-    touches: FloatArray,
-    leaves: FloatArray,
+    cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
 ) -> int:
     """Follow an element once along the line; return how many patches it touches.
 
@@ -228,9 +249,8 @@ def sweep_cells(
     ----------
     cells, every : Cells, Blocks
         The line, and its blocks.
-    barriers, block_barriers : array, shape (n,), (n // BLOCK + 1,)
-        Depths that keep cells and blocks pressed at this Deborah number, as far as sweeps have needed them: those of
-        blocks that are NaN, all of them at first, are written here when an element in contact comes there.
+    barriers : Barriers
+        Those of blocks that are NaN, all of them at first, are written here when an element in contact comes there.
     deborah : float
         v tau in cells.
     depth : float
@@ -239,8 +259,8 @@ def sweep_cells(
         Written: the integral of u (F_N / (4 G dx)), its derivative by the depth, F_x / (4 G), its derivative by the
         depth, the length in contact, the integral of w'^2 over it, and 1 if the contact leaves a line
         that is not periodic.
-    touches, leaves : array, shape (m,)
-        Written, as far as there is room: where each patch begins and ends, in cells.
+    places : Places
+        Written, as far as they reach: where each patch begins and ends.
     """
     # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
     height, enter, leave, peak, mean, stretches = (
@@ -252,6 +272,8 @@ def sweep_cells(
         cells.stretch,
     )
     block_peak, block_mean, block_stretch = every.peak, every.mean, every.stretch
+    barrier, block_barrier = barriers.cell, barriers.block
+    touches, leaves = places.touches, places.leaves
     n, blocks, start = mean.size - 1, block_peak.size, cells.start
     decay, block_decay = np.exp(-1 / deborah), np.exp(-BLOCK / deborah)
     area = rate = drag = drag_rate = length = stretch = 0.0
@@ -265,11 +287,11 @@ def sweep_cells(
     while i <= last:
         if contact and x == 0:
             while i < n:
-                if math.isnan(block_barriers[i // BLOCK]):
-                    write_barriers(height, enter, leave, deborah, i // BLOCK, barriers, block_barriers)
-                if not barriers[i] < depth:
+                if math.isnan(block_barrier[i // BLOCK]):
+                    write_barriers(height, enter, leave, deborah, i // BLOCK, barriers)
+                if not barrier[i] < depth:
                     break
-                if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barriers[i // BLOCK] < depth:
+                if i & (BLOCK - 1) == 0 and i // BLOCK < blocks and block_barrier[i // BLOCK] < depth:
                     area += block_mean[i // BLOCK] + BLOCK * depth
                     stretch += block_stretch[i // BLOCK]
                     length += BLOCK
@@ -306,7 +328,8 @@ def sweep_cells(
                 free = u = w0 + place * (c1 + place * (c2 + place * c3))
             # a force that is a cubic falls through 0 twice at most
             low = x + CLOSE if visits > 0 else x
-            touch = _touch(w0, c1, c2, c3, deborah, free, x, low, stop) if visits < 2 and low < stop else NONE
+            flies = visits < 2 and low < stop
+            touch = _touch(Flight(w0, c1, c2, c3, free, x), deborah, low, stop) if flies else NONE
             if touch > stop:
                 free -= free * _decayed((stop - x) / deborah)
                 break
@@ -340,19 +363,13 @@ def sweep_cells(
 
 @kernel
 def patches_at(
-    cells: Cells,
-    every: Blocks,
-    barriers: FloatArray,
-    block_barriers: FloatArray,
-    deborah: float,
-    depth: float,
-    sums: FloatArray,
+    cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return where each patch of the steady state at a depth begins and ends; sums are as in `sweep_cells`."""
     n = cells.mean.size - 1
-    touches, leaves = np.empty(n // 8 + 2), np.empty(n // 8 + 2)
-    count = sweep_cells(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
-    if count > touches.size:
-        touches, leaves = np.empty(count), np.empty(count)
-        sweep_cells(cells, every, barriers, block_barriers, deborah, depth, sums, touches, leaves)
-    return touches[:count], leaves[:count]
+    places = places_for(n // 8 + 2)
+    count = sweep_cells(cells, every, barriers, deborah, depth, sums, places)
+    if count > places.touches.size:
+        places = places_for(count)
+        sweep_cells(cells, every, barriers, deborah, depth, sums, places)
+    return places.touches[:count], places.leaves[:count]

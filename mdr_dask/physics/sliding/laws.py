@@ -80,11 +80,6 @@ def indenter_low(
     return 8 * shear_modulus * half_width * relaxation_time * velocity * slope**2 / force
 
 
-def material_low(half_width: Any, loss_modulus: Any, q_max: Any, force: Any, slope: Any) -> Any:
-    """Return mu of a rough indenter on a general material, 8 a G''(q_max v) / (q_max F_N) slope^2 (eq. 3.42)."""
-    return 8 * half_width * loss_modulus / (q_max * force) * slope**2
-
-
 def indenter(xi: Any, exponent: Any = INDENTER_EXPONENT) -> Any:
     """Return mu / (sqrt 2 slope) of a rough indenter (eq. 3.40, 3.43).
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, relative
-from mdr_dask.physics.sliding.steady import Scheme, Steady, unsolved, valid
+from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
 from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
 from mdr_dask.physics.solids import prony
 from mdr_dask.physics.surfaces.rough_line import RoughLine

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
+from mdr_dask.physics.sliding.cases import Cases, Steady, valid
 from mdr_dask.physics.sliding.kelvin import (
-    BLOCK,
     DISPLACEMENT,
     DRAG,
     DRAG_RATE,
@@ -24,66 +22,19 @@ from mdr_dask.physics.sliding.kelvin import (
     STIFFNESS,
     STRETCH,
     SUMS,
+    Barriers,
     Blocks,
+    barriers_for,
     blocks_of,
+    places_for,
     sweep_cells,
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
-
-Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
-
-
-@dataclass(frozen=True)
-class Steady:
-    """Steady states, one entry for every case.
-
-    Parameters
-    ----------
-    drag : array
-        F_x / (4 G), in the unit of height squared: mu = F_x / F_N.
-    depth : array
-        Penetration d of the mean line, in the unit of height.
-    contact_fraction : array
-        Length in contact over the length of the line.
-    contact_slope : array
-        rms slope of the profile over the contact.
-    status : int8 array
-        Values of `Outcome`.
-    """
-
-    drag: FloatArray
-    depth: FloatArray
-    contact_fraction: FloatArray
-    contact_slope: FloatArray
-    status: NDArray[np.int8]
-
-    def only(self, cases: NDArray[Any]) -> Steady:
-        """Return some of the cases."""
-        return Steady(**{name: column[cases] for name, column in vars(self).items()})
-
-    def replaced(self, cases: NDArray[Any], other: Steady) -> Steady:
-        """Return all cases, some of them from another solution."""
-        columns = {name: column.copy() for name, column in vars(self).items()}
-        for name, column in columns.items():
-            column[cases] = vars(other)[name]
-        return Steady(**columns)
-
-
-def unsolved(cases: int) -> Steady:
-    """Return what is known of cases before they are solved."""
-    nothing = np.full(cases, np.nan)
-    return Steady(nothing, nothing, nothing, nothing, np.full(cases, Outcome.INVALID, np.int8))
-
-
-def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
-    """Return which cases are numbers above zero."""
-    good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
-    return good
 
 
 @compiled
@@ -127,14 +78,7 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 @kernel
 def _solve(
-    cells: Cells,
-    blocks: Blocks,
-    barriers: FloatArray,
-    block_barriers: FloatArray,
-    deborah: float,
-    load: float,
-    trail: FloatArray,
-    sums: FloatArray,
+    cells: Cells, blocks: Blocks, barriers: Barriers, deborah: float, load: float, trail: FloatArray, sums: FloatArray
 ) -> tuple[float, bool]:
     """Find the last lattice depth that carries less than the load, and leave its sums.
 
@@ -142,11 +86,11 @@ def _solve(
     depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
     and so the answer does not depend on the `trail` that the search follows.
     """
-    low, high, unwritten = 0.0, np.inf, np.empty(0)
+    low, high, unwritten = 0.0, np.inf, places_for(0)
     depth = _floor(_guess(trail, load))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        sweep_cells(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
+        sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
@@ -178,8 +122,7 @@ def _solve(
 def _states(
     cells: Cells,
     blocks: Blocks,
-    deborahs: FloatArray,
-    loads: FloatArray,
+    cases: Cases,
     guesses: FloatArray,
     close: float,
     results: FloatArray,
@@ -190,25 +133,25 @@ def _states(
     The search for a depth follows that of the case before, or starts from its guess where that is a number. Where the
     tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
     """
-    n = cells.mean.size - 1
-    barriers, block_barriers = np.empty(n), np.empty(n // BLOCK + 1)
-    sums, trail, first, unwritten = np.empty(SUMS), np.zeros(4), np.zeros(4), np.empty(0)
+    n, (deborahs, loads) = cells.mean.size - 1, cases
+    barriers, unwritten = barriers_for(n), places_for(0)
+    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
     deborah = -1.0
     _begin(first, loads[0] / n, loads[0])
     for k in range(loads.size):
         starts = deborahs[k] != deborah
         if starts:
             deborah = deborahs[k]
-            block_barriers[:] = np.nan
+            barriers.block[:] = np.nan
             copy_into(trail, first)
         depth, converged = guesses[k], False
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
-                sweep_cells(cells, blocks, barriers, block_barriers, deborah, depth, sums, unwritten, unwritten)
+                sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
         if not converged:
-            depth, converged = _solve(cells, blocks, barriers, block_barriers, deborah, loads[k], trail, sums)
+            depth, converged = _solve(cells, blocks, barriers, deborah, loads[k], trail, sums)
         if not converged:
             status[k] = Outcome.DEPTH_NOT_FOUND
             copy_into(trail, first)
@@ -279,8 +222,7 @@ def steady_on_cells(
 ) -> Steady:
     """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already."""
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    cases = deborah, loads
-    return _solved(cells, *cases, lambda good, de, load: _swept(cells, blocks, de, load, start[good], close))
+    return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, cases, start[good], close))
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
@@ -293,7 +235,7 @@ def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, con
     contact : bool
         Whether fraction and slope of the contact are wanted, which cost extra.
     """
-    return _solved(line, deborah, loads, lambda _, de, load: _stepped(line, de, load, contact))
+    return _solved(line, deborah, loads, lambda _, cases: _stepped(line, cases, contact))
 
 
 def _solved(
@@ -310,47 +252,37 @@ def _solved(
     results = np.full((4, loads.size), np.nan)
     status = np.full(loads.size, Outcome.INVALID, np.int8)
     if np.any(good):
-        results[:, good], status[good] = solve(good, deborah[good] * n, loads[good] * n)
+        results[:, good], status[good] = solve(good, Cases(deborah[good] * n, loads[good] * n))
     results[:, status != Outcome.CONVERGED] = np.nan
     return Steady(results[0], results[1], results[2], results[3], status)
 
 
 def _swept(
-    cells: Cells, blocks: Blocks, deborah: FloatArray, loads: FloatArray, guesses: FloatArray, close: float
+    cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray, close: float
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
-    order = np.lexsort((loads, deborah))
-    ordered, ordered_status = np.full((loads.size, 4), np.nan), np.zeros(loads.size, np.int8)
-    _states(
-        cells,
-        blocks,
-        deborah[order],
-        loads[order],
-        guesses[order] + cells.top,
-        close,
-        ordered,
-        ordered_status,
-    )
+    order = np.lexsort((cases.loads, cases.deborah))
+    ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
+    in_order = Cases(cases.deborah[order], cases.loads[order])
+    _states(cells, blocks, in_order, guesses[order] + cells.top, close, ordered, ordered_status)
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= cells.top
     return results.T, status
 
 
-def _stepped(
-    line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool
-) -> tuple[FloatArray, NDArray[np.int8]]:
+def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by time steps of one cell; Deborah numbers in cells, loads over 4 G dx."""
     n = line.enter.size
     nodes = line.height[:n] if line.periodic else line.height
     highest = int(np.argmax(nodes))
     top = nodes[highest]
     below = (np.roll(nodes, -1 - highest) if line.periodic else nodes) - top
-    results = np.full((4, loads.size), np.nan)
-    depths, results[0], outside = backward_euler.steady_by_steps(below, line.periodic, deborah, loads)
+    results = np.full((4, cases.loads.size), np.nan)
+    depths, results[0], outside = backward_euler.steady_by_steps(below, line.periodic, *cases)
     results[1] = depths - top
     if contact:
-        backward_euler.contact(below, line.periodic, deborah, depths, results[2], results[3])
+        backward_euler.contact(below, line.periodic, cases.deborah, depths, results[2], results[3])
         results[2] /= n
         results[3] *= n
     status = np.where(

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.cases import Cases, Steady
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -28,7 +29,6 @@ from mdr_dask.physics.sliding.nodes import (
     summit_rise,
     weights,
 )
-from mdr_dask.physics.sliding.steady import Steady
 from mdr_dask.physics.sliding.walk import (
     BEGAN,
     CLOSED,
@@ -79,7 +79,7 @@ class Sampled:
     rates : array, shape (cases, 3)
         Relative changes of drag, contact fraction and contact slope with the depth.
     drag, depth, contact_fraction, contact_slope : array, shape (cases,)
-        As in :class:`mdr_dask.physics.sliding.steady.Steady`.
+        As in :class:`mdr_dask.physics.sliding.cases.Steady`.
     doubts : array, shape (4, cases)
         What the search for the depth may have left in them.
     """
@@ -106,10 +106,28 @@ class Sampled:
 
 
 class Search(NamedTuple):
+    """What a search starts from and finds.
+
+    Parameters
+    ----------
+    depths : array, shape (cases,)
+        Penetration of the summit.
+    rates : array, shape (cases, SECANTS)
+        Relative changes of the results with it, NaN where they are not known.
+    results : array, shape (cases, RESULTS)
+        The results, bounds of their relative errors from the search, and that of the depth; NaN where none is found.
+    """
+
+    depths: FloatArray
+    rates: FloatArray
+    results: FloatArray
+
+
+class Workspace(NamedTuple):
     """What a search works in: a tile of the line, the states of `walk`, queues, and what the last sweep has found."""
 
     tile: FloatArray
-    workspace: FloatArray
+    states: FloatArray
     queue: NDArray[np.int64]
     lanes: NDArray[np.int64]
     last_step: FloatArray
@@ -118,7 +136,7 @@ class Search(NamedTuple):
     rate: FloatArray
 
     @classmethod
-    def on(cls, refinement: int) -> Search:
+    def on(cls, refinement: int) -> Workspace:
         """Return one for a grid."""
         tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
         last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
@@ -130,14 +148,10 @@ def _solve(
     line: Nodes,
     weights: FloatArray,
     rise: float,
-    deborah: FloatArray,
-    loads: FloatArray,
-    near_step: float,
-    trusted: float,
-    depths: FloatArray,
-    rates: FloatArray,
-    results: FloatArray,
+    cases: Cases,
+    bounds: tuple[float, float],
     search: Search,
+    place: Workspace,
 ) -> None:
     """Find the states of cases on a grid by Newton steps; the last one is taken without another sweep.
 
@@ -149,24 +163,22 @@ def _solve(
         From `weights`.
     rise : float
         Height of the summit over the highest node.
-    deborah, loads : array, shape (cases,)
+    cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
-    near_step, trusted : float
+    bounds : tuple of float
         Bounds of the last relative step of the depth and of what it costs.
-    depths : array, shape (cases,)
-        Penetration of the summit; read and written.
-    rates : array, shape (cases, SECANTS)
-        Relative changes of the results with it, NaN where they are not known; read and written.
-    results : array, shape (cases, RESULTS)
-        Written: the results, bounds of their relative errors from the search, and that of the depth; left as they are
-        where no depth is found.
     search : Search
+        Read and written.
+    place : Workspace
         On this grid.
     """
+    deborah, loads = cases
+    near_step, trusted = bounds
+    depths, rates, results = search
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    workspace, lanes = search.workspace, search.lanes
-    last_step, last, now, rate = search.last_step, search.last, search.now, search.rate
+    workspace, lanes = place.states, place.lanes
+    last_step, last, now, rate = place.last_step, place.last, place.now, place.rate
     settings = SETTINGS
     for begin in range(0, loads.size, LANES):
         count = min(LANES, loads.size - begin)
@@ -177,7 +189,7 @@ def _solve(
         for _ in range(settings.iterations):
             if count == 0:
                 break
-            sweep(line, weights, search.tile, workspace, search.queue, count)
+            sweep(line, weights, place.tile, workspace, place.queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]
@@ -231,17 +243,16 @@ def begin(
     strides = [2]
     while height.size > SETTINGS.coarsening * SETTINGS.coarsest * strides[-1]:
         strides.append(strides[-1] * SETTINGS.coarsening)
-    depths, results = _shallow(loads), np.empty((loads.size, RESULTS))
-    rates = np.full((loads.size, SECANTS), np.nan)
-    highest, cases = int(np.argmax(height)), (deborah, loads)
+    search = Search(_shallow(loads), np.full((loads.size, SECANTS), np.nan), np.empty((loads.size, RESULTS)))
+    highest, cases = int(np.argmax(height)), Cases(deborah, loads)
     for stride in reversed(strides):
-        results.fill(np.nan)
+        search.results.fill(np.nan)
         line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
-        _solve(line, weights(1), 0.0, *cases, *SETTINGS.start, depths, rates, results, Search.on(1))
-    coarse = _sampled(line.top, depths, rates.copy(), results)
+        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search, Workspace.on(1))
+    coarse = _sampled(line.top, search._replace(rates=search.rates.copy()))
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
-    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, rates, trusted)
+    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, search.rates, trusted)
 
 
 def settle(
@@ -272,24 +283,24 @@ def settle(
     rise = summit_rise(line)
     top = line.top + rise
     depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
-    return _settled(line, rise, refinement, (deborah, loads), depths, fine.rates.copy(), trusted)
+    return _settled(line, rise, refinement, Cases(deborah, loads), depths, fine.rates.copy(), trusted)
 
 
 def _settled(
     line: Nodes,
     rise: float,
     refinement: int,
-    cases: tuple[FloatArray, FloatArray],
+    cases: Cases,
     depths: FloatArray,
     rates: FloatArray,
     trusted: float,
 ) -> Sampled:
     """Return the steady states on a grid, searched for from some depths of the mean line on."""
-    top, results = line.top + rise, np.full((depths.size, RESULTS), np.nan)
-    depths = np.where(depths + top > 0, depths + top, _shallow(cases[1]))
-    bounds = SETTINGS.answer_step, trusted
-    _solve(line, weights(refinement), rise, *cases, *bounds, depths, rates, results, Search.on(refinement))
-    return _sampled(top, depths, rates, results)
+    top = line.top + rise
+    penetration = np.where(depths + top > 0, depths + top, _shallow(cases.loads))
+    search = Search(penetration, rates, np.full((depths.size, RESULTS), np.nan))
+    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search, Workspace.on(refinement))
+    return _sampled(top, search)
 
 
 def _shallow(loads: FloatArray) -> FloatArray:
@@ -297,7 +308,7 @@ def _shallow(loads: FloatArray) -> FloatArray:
     return np.maximum(loads, loads ** (2 / 3))
 
 
-def _sampled(top: float, depths: FloatArray, rates: FloatArray, results: FloatArray) -> Sampled:
-    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = results.T.copy()
+def _sampled(top: float, search: Search) -> Sampled:
+    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = search.results.T.copy()
     doubts = np.array([of_drag * drag, of_depth, of_fraction * fraction, of_slope * slope])
-    return Sampled(rates, drag, depths - top, fraction, slope, doubts)
+    return Sampled(search.rates, drag, search.depths - top, fraction, slope, doubts)

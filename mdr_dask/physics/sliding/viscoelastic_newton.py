@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, copy_into, kernel
-from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Travelling, multiply, sweep_arms
+from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
 """Largest step back of the depth on a line that elements enter undeformed, relative to it."""
@@ -272,8 +272,8 @@ def solve_sliding(
     moduli, deborah, times = solid.moduli, solid.deborah, solid.times
     arms, nodes = moduli.size, profile.size
     size = arms + 1
-    lengths, penetration = np.empty(2 * nodes + 4), np.empty(nodes)
-    imbalance, room, workspace = np.empty(arms), np.empty((10, max(arms, 1))), np.empty((3, arms))
+    passage, penetration = Passage(np.empty(2 * nodes + 4), np.empty(arms), totals), np.empty(nodes)
+    of_sweep, workspace = np.empty((10, max(arms, 1))), np.empty((3, arms))
     residual, scale, step, product = np.empty(size), np.empty(size), np.zeros(size), np.empty(size)
     triangle, rotations = np.empty((size + 1, size)), np.empty((3, size + 1))
     krylov = Krylov(np.empty((size + 1, size)), triangle, rotations, workspace)
@@ -287,12 +287,12 @@ def solve_sliding(
         for i in range(nodes):
             penetration[i] = unknown[arms] + profile[i]
         start = unknown[:arms]
-        pieces, end = sweep_arms(penetration, start, solid, not periodic, lengths, imbalance, totals, room)
-        found = lengths[:pieces]
+        pieces, end = sweep_arms(penetration, start, solid, not periodic, passage, of_sweep)
+        found = passage.lengths[:pieces]
         swept = Swept(_decays(found, deborah, times), found, solid)
         if periodic:
             for m in range(arms):
-                residual[m] = -imbalance[m]
+                residual[m] = -passage.imbalance[m]
             residual[arms] = strain_area - totals[0]
             scale[arms] = totals[3]
             newton_step(residual, scale, swept, krylov, step)

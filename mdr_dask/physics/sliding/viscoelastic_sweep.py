@@ -167,15 +167,32 @@ def _fly(
     return -1.0
 
 
+class Passage(NamedTuple):
+    """What a sweep writes.
+
+    Parameters
+    ----------
+    lengths : array, shape (>= 2 nodes + 2,)
+        Lengths of flight, contact, flight, contact, ... in this order, the first flight possibly of length zero.
+    imbalance : array, shape (arms,)
+        Integral of e_m over the line.
+    totals : array, shape (6,)
+        Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
+        beyond the line.
+    """
+
+    lengths: FloatArray
+    imbalance: FloatArray
+    totals: FloatArray
+
+
 @compiled
 def sweep_arms(
     penetration: FloatArray,
     start: FloatArray,
     solid: Travelling,
     undeformed: bool,
-    lengths: FloatArray,
-    imbalance: FloatArray,
-    totals: FloatArray,
+    passage: Passage,
     workspace: FloatArray,
 ) -> tuple[int, int]:  # pragma: no cover
     """Carry the arms once along the line and note what each contact and each flight contributes.
@@ -190,13 +207,7 @@ def sweep_arms(
         The solid.
     undeformed : bool
         Whether the elements enter free and at rest.
-    lengths : array, shape (>= 2 nodes + 2,), output
-        Lengths of flight, contact, flight, contact, ... in this order, the first flight possibly of length zero.
-    imbalance : array, shape (arms,), output
-        Integral of e_m over the line.
-    totals : array, shape (6,), output
-        Integrals of u, of the stress, of stress times slope; contact length; integral of slope^2 in contact; tail of u
-        beyond the line.
+    passage : Passage, output
     workspace : array, shape (10, max(arms, 1))
 
     Returns
@@ -206,6 +217,7 @@ def sweep_arms(
     """
     # arrays by name: a tuple of arrays costs more to look into than a cell does to compute
     moduli, deborah, times, stretch_of, amplitude_of = solid
+    lengths, imbalance, totals = passage
     arms, last = moduli.size, penetration.size - 1
     e, modes = workspace[0], workspace[1]
     step_factors(1.0, deborah, workspace[3], workspace[4], workspace[5])
@@ -227,7 +239,7 @@ def sweep_arms(
         lengths[pieces] = goal - place
         pieces += 1
         if flying:
-            _add_flight(goal - place, modes, times, stretch_of, deborah, e, imbalance, totals)
+            _add_flight(goal - place, modes, times, stretch_of, e, imbalance, totals)
         if landing < 0:
             for k in range(arms):
                 totals[5] += modes[k] * times[k]
@@ -336,7 +348,6 @@ def _add_flight(
     modes: FloatArray,
     times: FloatArray,
     stretch_of: FloatArray,
-    deborah: FloatArray,
     e: FloatArray,
     imbalance: FloatArray,
     totals: FloatArray,

@@ -114,9 +114,16 @@ def _split(
     summed = _summed(replace(free, curve_cross=cross), design, both, covariance)
     own = summed.x[np.isin(free.member, np.flatnonzero((places[0] == zeros[0]) & (places[1] == zeros[1])))]
     own = own if own.size else summed.x[places[0][free.member] == zeros[0]]
-    summed = replace(summed, measured=(float(own.min()), float(own.max())))
+    summed = replace(
+        summed,
+        measured=(float(own.min()), float(own.max())),
+        horizontal=both[: both.size // 2],
+        vertical=both[both.size // 2 :],
+        covariance=covariance,
+        draws=drawn,
+    )
     one, other = (
-        _one(summed, groups[i], zeros[i], both, covariance, places[i], drawn, columns_of + np.arange(groups[i].size))
+        _one(summed, groups[i], zeros[i], places[i], columns_of + np.arange(groups[i].size))
         for i, columns_of in enumerate((0, size))
     )
     return TwoShifts(one, other, reduced, float(chi2.sf(misfit, freedom)) if freedom else 1.0)
@@ -140,27 +147,20 @@ def _summed(free: Superposition, design: FloatArray, both: FloatArray, covarianc
 
 
 def _one(
-    summed: Superposition,
-    groups: FloatArray,
-    zero: int,
-    factors: FloatArray,
-    covariance: FloatArray,
-    place: NDArray[np.intp],
-    drawn: FloatArray,
-    own: NDArray[np.intp],
+    summed: Superposition, groups: FloatArray, zero: int, place: NDArray[np.intp], own: NDArray[np.intp]
 ) -> Superposition:
-    """Return the superposition as seen by one of the groups, whose horizontal factors are at `own`."""
-    kept = np.append(own, factors.size // 2 + own)
+    """Return the superposition as seen by one of the groups, whose factors are at `own` among those of both."""
+    kept = np.append(own, summed.horizontal.size + own)
     return replace(
         summed,
         groups=groups,
-        horizontal=factors[own],
-        vertical=factors[factors.size // 2 + own],
-        covariance=covariance[np.ix_(kept, kept)],
+        horizontal=summed.horizontal[own],
+        vertical=summed.vertical[own],
+        covariance=summed.covariance[np.ix_(kept, kept)],
         curve_cross=summed.curve_cross[:, kept],
         reference=float(groups[zero]),
         member=place[summed.member],
-        draws=drawn[:, kept],
+        draws=summed.draws[:, kept],
         undetermined=(),
     )
 

@@ -2,4 +2,5 @@
 
 Read `waves` (the common form of any roughness), `roughness` (generated lines), `measured` (recorded lines), `shapes`
 (indenters), `rough_line` (roughness over an indenter or a plane) and `cubic_line` (the line that the solvers take).
+Measured surfaces: `maps` and `scans` lead to a `spectrum`, of which lines are made; `self_affine` fits its slope.
 """

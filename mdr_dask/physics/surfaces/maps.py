@@ -11,7 +11,6 @@ from scipy import fft, ndimage, sparse
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.physics.surfaces.areal import wavenumbers
 from mdr_dask.physics.surfaces.scans import Cut, averaged
 from mdr_dask.physics.surfaces.spectrum import Spectrum
 
@@ -305,3 +304,10 @@ def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: 
     k = ring[inner] - 1
     ratio = power[inner] / (total[k] / count[k])
     return float(np.median(ratio) / np.log(2)) if k.size else 1.0
+
+
+def wavenumbers(points: tuple[int, int], size: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    """Return the angular wave numbers, rad/m, along both axes of the half of a spectrum that `rfft2` gives."""
+    q_x = 2 * np.pi * fft.fftfreq(points[0], size[0] / points[0])
+    q_y = 2 * np.pi * fft.rfftfreq(points[1], size[1] / points[1])
+    return np.asarray(q_x), np.asarray(q_y)

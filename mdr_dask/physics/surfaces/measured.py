@@ -133,14 +133,6 @@ def resampled(height: FloatArray, points: int) -> FloatArray:
     return np.asarray(series(waves.coefficients[: points // 2], points) + mean, dtype=np.float64)
 
 
-def spectral_derivative(height: FloatArray, length: float) -> FloatArray:
-    """Return the slope dz/dx of a periodic line at its points, exact for its Fourier series.
-
-    The wave of two points is at its crests there, so that its slope does not show.
-    """
-    return waves_of(height).slopes(height.size) / length
-
-
 def rms_height(height: FloatArray) -> float:
     """Return the rms height about the mean, m."""
     return float(np.std(height))
@@ -149,15 +141,3 @@ def rms_height(height: FloatArray) -> float:
 def rms_slope(height: FloatArray, length: float) -> float:
     """Return the spectral rms slope of the periodic line through samples, down to the wave of two points."""
     return waves_of(height).rms_slope() / length
-
-
-def power_spectrum(height: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wavenumbers q, rad/m, and the one-dimensional spectral density C(q), m^3, of a periodic line.
-
-    C(q) = L |h_q|^2 for q > 0 with h_q the complex Fourier amplitude, so that rms^2 = sum over positive and negative
-    q of
-    C / L. The mean is left out.
-    """
-    waves = np.fft.rfft(height) / height.size
-    q = np.asarray(2 * np.pi * np.arange(1, waves.size) / length, dtype=np.float64)
-    return q, np.asarray(length * np.abs(waves[1:]) ** 2, dtype=np.float64)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined
-from mdr_dask.physics.sliding.kelvin import BLOCK
+from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
     Instant,
@@ -29,7 +29,6 @@ from mdr_dask.physics.transients.patches import (
     STIFFNESS,
     SUMS,
     TILT,
-    Barriers,
     add_patch,
     force_at,
     height_at,

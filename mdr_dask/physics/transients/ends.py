@@ -12,7 +12,7 @@ from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
-from mdr_dask.physics.sliding.kelvin import Blocks, blocks_of, patches_at
+from mdr_dask.physics.sliding.kelvin import Barriers, Blocks, barriers_for, blocks_of, patches_at
 from mdr_dask.physics.sliding.steady import steady_on_cells
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 from mdr_dask.physics.transients.patches import (
@@ -21,10 +21,8 @@ from mdr_dask.physics.transients.patches import (
     LOAD,
     SUMS,
     TILT,
-    Barriers,
     Patches,
     Track,
-    barriers_for,
     height_at,
     released,
     track_of,
@@ -54,13 +52,13 @@ class PreparedLine(NamedTuple):
         if deborah not in self.known:
             if len(self.known) >= KNOWN:
                 self.known.clear()
-            self.known[deborah] = barriers_for(self.track)
+            self.known[deborah] = barriers_for(int(self.track.cells))
         return self.known[deborah]
 
     def patches(self, depth: float, deborah: float, sums: FloatArray) -> Patches:
         """Return what touches in steady sliding at a depth of the highest point; write the sums of the sweep."""
         barriers = self.barriers(deborah)
-        start, end = patches_at(self.cells, self.blocks, *barriers, deborah, depth, sums)
+        start, end = patches_at(self.cells, self.blocks, barriers, deborah, depth, sums)
         return Patches(start, end, _pressed(self.track, end, depth), start.size, depth, deborah, np.zeros(1, np.int64))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined
-from mdr_dask.physics.sliding.kelvin import BLOCK, leaving, write_barriers
+from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
@@ -69,19 +69,6 @@ class Patches(NamedTuple):
     depth: float
     deborah: float
     cursor: IntArray
-
-
-class Barriers(NamedTuple):
-    """The force without the lift d + d_dot that keeps cells and blocks pressed; NaN in blocks not needed yet."""
-
-    cell: FloatArray
-    block: FloatArray
-
-
-def barriers_for(track: Track) -> Barriers:
-    """Return barriers of which none is known."""
-    n = int(track.cells)
-    return Barriers(np.empty(n), np.full(n // BLOCK + 1, np.nan))
 
 
 class History(NamedTuple):
@@ -226,7 +213,7 @@ def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: f
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
     """Return whether the force is positive in all of cell i."""
     if np.isnan(barriers.block[i // BLOCK]):
-        write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers.cell, barriers.block)
+        write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers)
     return bool(barriers.cell[i] < lift)
 
 

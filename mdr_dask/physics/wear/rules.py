@@ -181,26 +181,6 @@ def fast_cases(
     return radius, volume, force
 
 
-def parabola_limit_radius(half_angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return (c, a) of a parabola as functions of t = arccos(c/a): a = sqrt(2 / (1 + sin(2t)/(2t)))."""
-    t = np.asarray(half_angle, dtype=float)
-    a = np.sqrt(2.0 / (1.0 + np.sinc(2.0 * t / np.pi)))
-    return np.asarray(a * np.cos(t)), a
-
-
-def cone_limit_radius(half_angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return (c, a) of a cone as functions of t = arccos(c/a): a = t / sin(t), c = t cot(t) (thesis eq. 6.17)."""
-    t = np.asarray(half_angle, dtype=float)
-    a = 1.0 / np.sinc(t / np.pi)
-    return np.asarray(a * np.cos(t)), np.asarray(a)
-
-
-def printed_parabola_limit(stick_radius: ArrayLike) -> FloatArray:
-    """Return a(c) as printed in thesis eq. 6.16, sqrt(2 + c^2/4) - c/2: an approximation, up to 3.6 % low."""
-    half = 0.5 * np.asarray(stick_radius, dtype=float)
-    return np.asarray(np.sqrt(2.0 + half**2) - half)
-
-
 def _quadrature() -> Quadrature:
     return Quadrature(*gauss(SETTINGS.nodes), np.empty(5))
 

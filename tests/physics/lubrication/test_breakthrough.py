@@ -9,7 +9,7 @@ from mdr_dask.physics.lubrication import film_formulas as film
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.lubrication.clusters import excursions, find_clusters
 
-E_STAR = float(film.reduced_modulus(210e9, 0.3, 210e9, 0.3))
+E_STAR = 210e9 / (2 * (1 - 0.3**2))
 STRENGTH = float(bt.layer_strength(1e6, E_STAR, 5e-9))
 PERIMETER = 2 * np.pi * 0.05
 

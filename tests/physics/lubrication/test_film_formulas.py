@@ -10,15 +10,6 @@ from mdr_dask.physics.lubrication import film_formulas as film
 W, U, G = 2.0452e-5, 1e-11, 5007.0
 
 
-def test_reduced_modulus_of_steel_on_steel():
-    assert film.reduced_modulus(210e9, 0.3, 210e9, 0.3) == pytest.approx(115.385e9, rel=1e-5)
-
-
-def test_reduced_radius_is_half_of_equal_radii_and_the_radius_against_a_plane():
-    assert film.reduced_radius(0.05, 0.05) == pytest.approx(0.025)
-    assert film.reduced_radius(0.05, np.inf) == pytest.approx(0.05)
-
-
 def test_hertz_pressure_carries_the_load():
     contact = film.hertz_line(8e4, 115.385e9, 0.025)
     # an elliptic distribution over 2a: pi/2 p0 a; its curvature: p0 = E* a/(2R)
@@ -102,13 +93,6 @@ def test_limits_depend_on_two_numbers_only():
         # the fourth is a regression, whose rounded exponents keep it only roughly
         np.testing.assert_allclose(films[:3], expected[:3], rtol=1e-12)
         np.testing.assert_allclose(films[3], expected[3], rtol=0.15)
-
-
-def test_johnson_parameters_follow_from_moes():
-    M, L = film.moes_parameters(W, U, G)
-    g_v, g_e = film.johnson_parameters(W, U, G)
-    assert g_e == pytest.approx(np.sqrt(2) * M, rel=1e-12)
-    assert g_v == pytest.approx(L * M**1.5 * np.sqrt(2), rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -36,7 +36,7 @@ def in_radii(value: float, W: float) -> float:
 
 @pytest.fixture(scope="module")
 def checked() -> LineSolution:
-    return solve_film(line_contact(*CHECKED, E_STAR), accuracy=1e-4)
+    return solve_film(line_contact(CHECKED, E_STAR), accuracy=1e-4)
 
 
 def test_checked_figures(checked: LineSolution) -> None:
@@ -106,7 +106,7 @@ def test_soft_limit(M: float) -> None:
 
 
 def test_heavy_load_gives_the_pressure_of_hertz() -> None:
-    found = solve_film(line_contact(5e-4, 1e-13, 5000.0, E_STAR))
+    found = solve_film(line_contact((5e-4, 1e-13, 5000.0), E_STAR))
     inside = np.linspace(-0.9, 0.9, 19)
     np.testing.assert_allclose(found.finest.pressure_between(inside), np.sqrt(1 - inside**2), atol=5e-3)
 
@@ -125,7 +125,7 @@ def test_flow_is_the_same_everywhere() -> None:
 
 @pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-13, 500.0), (5e-5, 1e-9, 2000.0), (2e-4, 1e-12, 2000.0)])
 def test_second_order(numbers: tuple[float, float, float]) -> None:
-    found = solve_film(line_contact(*numbers, E_STAR), accuracy=1e-4)
+    found = solve_film(line_contact(numbers, E_STAR), accuracy=1e-4)
     assert found.central_film.order == pytest.approx(2.0, abs=0.15)
     assert found.minimum_film.order == pytest.approx(2.0, abs=0.35)  # the rupture lies anywhere between two nodes
 
@@ -165,10 +165,10 @@ def _heavy() -> list[tuple[LineContact, float, float]]:
     rows = csv.DictReader(line for line in HEAVY.read_text().splitlines() if not line.startswith("#"))
     cases = []
     for row in rows:
-        numbers = (float(row[name]) for name in ("W", "U", "G"))
+        numbers = tuple(float(row[name]) for name in ("W", "U", "G"))
         viscosity = float(row["viscosity"]) if row["viscosity"] else None
         case = line_contact(
-            *numbers,
+            numbers,
             E_STAR,
             viscosity_law=row["viscosity_law"],
             viscosity=viscosity,
@@ -206,7 +206,7 @@ def test_soft_heavy_contacts_that_three_coarse_grids_agree_on(
     numbers: tuple[float, float, float], options: dict[str, Any]
 ) -> None:
     """Where central films between two nodes sag, grids may agree on a film that is 0.2 to 1.2 % off."""
-    case = line_contact(*numbers, E_STAR, **options)
+    case = line_contact(numbers, E_STAR, **options)
     for accuracy in (1e-2, 1e-3):
         coarse, fine = solve_film(case, accuracy), solve_film(case, 1e-4)
         for here, there in (
@@ -218,14 +218,14 @@ def test_soft_heavy_contacts_that_three_coarse_grids_agree_on(
 
 def test_an_independent_solver_s_film() -> None:
     """8.376e-7 by an equally spaced solver of 3201 nodes, written apart from this one."""
-    found = solve_film(line_contact(4.838e-4, 3.837e-13, 1385.0, E_STAR))
+    found = solve_film(line_contact((4.838e-4, 3.837e-13, 1385.0), E_STAR))
     assert in_radii(float(found.central_film.value), 4.838e-4) == pytest.approx(8.376e-7, rel=1e-3)
 
 
 @pytest.mark.parametrize("index", range(6))
 def test_error_estimate_covers_the_error(index: int) -> None:
     W, U, G = (np.exp(np.random.default_rng(index).uniform(np.log(a), np.log(b))) for a, b in BOX)
-    case = line_contact(W, U, G, E_STAR)
+    case = line_contact((W, U, G), E_STAR)
     coarse, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=1e-4)
     for name in ("central_film", "minimum_film"):
         here, there = getattr(coarse, name), getattr(fine, name)
@@ -240,7 +240,7 @@ BOX = ((2e-6, 5e-4), (1e-13, 1e-9), (500.0, 8000.0))
 @pytest.mark.parametrize("U", [1e-13, 1e-11, 1e-9])
 @pytest.mark.parametrize("G", [500.0, 8000.0])
 def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: float, law: str) -> None:
-    found = solve_film(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
+    found = solve_film(line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08))
     assert found.outcome == Outcome.CONVERGED, found.reason
     assert found.reason == ""
     assert found.error <= 1e-3
@@ -253,8 +253,8 @@ def test_every_corner_and_middle_of_the_box_converges(W: float, U: float, G: flo
 @pytest.mark.parametrize(("W", "U", "G"), [(2e-5, 1e-11, 5000.0), (1e-4, 1e-10, 2500.0), (3e-6, 1e-12, 1000.0)])
 def test_only_moes_numbers_count_without_density(W: float, U: float, G: float) -> None:
     """The same M and L from other W, U, G: the film in units of R sqrt(2 U) is the same."""
-    here = solve_film(line_contact(W, U, G, E_STAR, compressible=False))
-    there = solve_film(line_contact(2 * W, 4 * U, G / np.sqrt(2), 3 * E_STAR, compressible=False))
+    here = solve_film(line_contact((W, U, G), E_STAR, compressible=False))
+    there = solve_film(line_contact((2 * W, 4 * U, G / np.sqrt(2)), 3 * E_STAR, compressible=False))
     np.testing.assert_allclose(here.case[:2], there.case[:2], rtol=1e-14)
     assert here.central_film.value == pytest.approx(
         there.central_film.value, rel=1e-9
@@ -270,7 +270,7 @@ def test_formulas_over_27_points(law: str, central: tuple[float, float], minimum
     for W in (2.0452e-5, 1e-4, 5e-4):
         for U in (1e-12, 1e-11, 1e-10):
             for G in (2504.0, 3500.0, 5007.0):
-                found = solve_film(line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08))
+                found = solve_film(line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08))
                 ratios.append(
                     (
                         in_radii(found.central_film.value, W) / float(film.PAN_HAMROCK_CENTRAL(W, U, G)),
@@ -284,15 +284,15 @@ def test_formulas_over_27_points(law: str, central: tuple[float, float], minimum
 
 def test_ratio_of_films_is_that_of_the_thesis_without_density_and_higher_with_it() -> None:
     for W, U, G in ((2.0452e-5, 1e-11, 5007.0), (1e-4, 1e-11, 5000.0)):
-        loose = solve_film(line_contact(W, U, G, E_STAR, compressible=False))
-        dense = solve_film(line_contact(W, U, G, E_STAR))
+        loose = solve_film(line_contact((W, U, G), E_STAR, compressible=False))
+        dense = solve_film(line_contact((W, U, G), E_STAR))
         assert 0.74 < loose.minimum_film.value / loose.central_film.value < 0.79
         assert 0.82 < dense.minimum_film.value / dense.central_film.value < 0.92
 
 
 def test_short_inlet_starves_the_film() -> None:
     films = [
-        solve_film(line_contact(*CHECKED, E_STAR, inlet=inlet)).central_film.value
+        solve_film(line_contact(CHECKED, E_STAR, inlet=inlet)).central_film.value
         for inlet in (-1.5, -2.0, -4.0, -10.0, None)
     ]
     assert np.all(np.diff(films) > 0)
@@ -304,23 +304,23 @@ def test_short_inlet_starves_the_film() -> None:
 @pytest.mark.parametrize("U", [1e-13, 1e-9])
 @pytest.mark.parametrize("G", [500.0, 8000.0])
 def test_starved_corners_of_the_box_converge(W: float, U: float, G: float, inlet: float) -> None:
-    found = solve_film(line_contact(W, U, G, E_STAR, inlet=inlet))
+    found = solve_film(line_contact((W, U, G), E_STAR, inlet=inlet))
     assert found.outcome == Outcome.CONVERGED, found.reason
     assert found.finest.nodes[0] == inlet
     assert 0 < found.minimum_film.value <= found.finest.film.min() * 1.02
 
 
 def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    case = line_contact(*CHECKED, E_STAR)
+    case = line_contact(CHECKED, E_STAR)
     usual = solve_film(case, accuracy=1e-4)
     monkeypatch.setattr(ehl_grid, "FLOODED", 3 * ehl_grid.FLOODED)
     assert solve_film(case, accuracy=1e-4).central_film.value == pytest.approx(usual.central_film.value, rel=1e-4)
 
 
 def test_same_case_same_bytes() -> None:
-    case = line_contact(*CHECKED, E_STAR)
+    case = line_contact(CHECKED, E_STAR)
     first = solve_film(case)
-    solve_film(line_contact(1e-4, 1e-10, 3000.0, E_STAR))
+    solve_film(line_contact((1e-4, 1e-10, 3000.0), E_STAR))
     second = solve_film(case)
     assert first.finest.pressure.tobytes() == second.finest.pressure.tobytes()
     assert first.central_film.value == second.central_film.value
@@ -353,15 +353,15 @@ def test_missed_accuracy_is_in_the_error() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"W": 0.0}, r"expected a positive W, got 0\.0"),
-        ({"U": -1.0}, r"expected a positive U, got -1\.0"),
-        ({"G": np.inf}, "expected a positive G, got inf"),
+        ({"groups": (0.0, 1e-11, 5000.0)}, r"expected a positive W, got 0\.0"),
+        ({"groups": (2e-5, -1.0, 5000.0)}, r"expected a positive U, got -1\.0"),
+        ({"groups": (2e-5, 1e-11, np.inf)}, "expected a positive G, got inf"),
         ({"inlet": 1.0}, "expected an inlet upstream"),
         ({"viscosity_law": "roelands"}, r"needs a viscosity above 6\.3e-5 Pa s, got None"),
         ({"viscosity_law": "ree"}, "expected a viscosity law of barus, roelands, got 'ree'"),
     ],
 )
 def test_bad_input(change: dict[str, object], message: str) -> None:
-    arguments = {"W": 2e-5, "U": 1e-11, "G": 5000.0, "E_star": E_STAR} | change
+    arguments = {"groups": (2e-5, 1e-11, 5000.0), "E_star": E_STAR} | change
     with pytest.raises(ValueError, match=message):
         line_contact(**arguments)  # type: ignore[arg-type]

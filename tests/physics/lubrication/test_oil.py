@@ -67,11 +67,6 @@ def test_roelands_has_the_slope_of_barus_and_stays_below_it():
     assert np.all(r[2:] < b[2:])
 
 
-def test_density_ratio_rises_to_its_limit():
-    assert oil.density_ratio(0.0) == 1.0
-    assert oil.density_ratio(1e15) == pytest.approx(1 + 0.6 / 1.7, rel=1e-5)
-
-
 def test_unknown_viscosity_law_names_the_known_ones():
     with pytest.raises(ValueError, match="expected a viscosity law of barus, roelands, got 'free volume'"):
         oil.log_viscosity("free volume", 1e8, 0.1, 2e-8)

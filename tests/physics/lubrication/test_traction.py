@@ -17,7 +17,7 @@ def sliding(solution: LineSolution, slide_roll_ratio: float, eyring_stress: floa
 
 @pytest.fixture(scope="module")
 def solution() -> LineSolution:
-    return solve_film(line_contact(W, U, G, E_STAR))
+    return solve_film(line_contact((W, U, G), E_STAR))
 
 
 def test_newtonian_stress_in_units(solution: LineSolution) -> None:
@@ -60,7 +60,7 @@ def test_rolling_friction_of_a_rigid_contact_balances_the_pressure() -> None:
 @pytest.mark.parametrize("eyring_stress", [None, 0.01])
 @pytest.mark.parametrize("law", ["barus", "roelands"])
 def test_errors_of_friction_cover_the_finest_grids(law: str, eyring_stress: float | None) -> None:
-    case = line_contact(W, U, G, E_STAR, viscosity_law=law, viscosity=0.08)
+    case = line_contact((W, U, G), E_STAR, viscosity_law=law, viscosity=0.08)
     coarse, fine = solve_film(case, 1e-3), solve_film(case, 3e-5)
     for read in (
         lambda grid: sliding_coefficient(case, grid, W, 0.01, eyring_stress),
@@ -72,7 +72,7 @@ def test_errors_of_friction_cover_the_finest_grids(law: str, eyring_stress: floa
 
 
 def test_a_liquid_like_glass_gives_no_overflow() -> None:
-    case = line_contact(5e-4, 1e-11, 8000.0, E_STAR)
+    case = line_contact((5e-4, 1e-11, 8000.0), E_STAR)
     found = solve_film(case)
     with np.errstate(all="raise", under="ignore"):
         assert np.isfinite(sliding_coefficient(case, found.finest, 5e-4, 1.0, None))

@@ -3,7 +3,6 @@ import itertools
 import numpy as np
 import pytest
 
-from mdr_dask.physics.linear import solve_in_place
 from mdr_dask.physics.mdr.half_integrals import graded_panels, interpolate
 
 PANELS = graded_panels(4, 5, 6)
@@ -40,15 +39,6 @@ def test_interpolation_is_exact_for_polynomials_and_zero_outside():
     values = interpolate(PANELS.mesh, Z**4 - Z, x)
     np.testing.assert_allclose(values[:6], (x**4 - x)[:6], rtol=1e-10)
     assert np.all(values[6:] == 0)
-
-
-def test_dense_solver():
-    rng = np.random.default_rng(1)
-    matrix, right = rng.normal(size=(20, 20)), rng.normal(size=20)
-    solution = right.copy()
-    assert solve_in_place(matrix.copy(), solution)
-    np.testing.assert_allclose(matrix @ solution, right, atol=1e-11)
-    assert not solve_in_place(np.zeros((2, 2)), np.ones(2))
 
 
 def test_slowest_modes_of_a_flat_punch_that_wears_under_constant_force():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.sliding.kelvin import BLOCK, DISPLACEMENT, LENGTH, SUMS, blocks_of, patches_at
+from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, LENGTH, SUMS, barriers_for, blocks_of, patches_at
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
 
@@ -19,7 +19,7 @@ def cells(hurst, nodes):
 @pytest.mark.parametrize("deborah", [0.05, 3.0, 300.0])
 def test_patches_are_the_contact_of_the_sums(depth, deborah):
     line, sums = cells(0.4, 8 * POINTS), np.empty(SUMS)
-    touches, leaves = patches_at(line, blocks_of(line), *unknown(line), deborah, depth, sums)
+    touches, leaves = patches_at(line, blocks_of(line), barriers_for(line.mean.size - 1), deborah, depth, sums)
     assert np.all(touches <= leaves)
     assert np.all(leaves[:-1] < touches[1:])
     assert np.sum(leaves - touches) == pytest.approx(sums[LENGTH], rel=1e-9)
@@ -37,12 +37,6 @@ def test_patches_are_the_contact_of_the_sums(depth, deborah):
     free = pressed[:-1] * np.exp(-(first - leaves[:-1]) / deborah)
     touched = depth + height(line, first, np.minimum(first.astype(int), n))
     assert np.allclose(free, touched, rtol=0, atol=1e-8)
-
-
-def unknown(line):
-    """Return barriers of which none is known."""
-    n = line.mean.size - 1
-    return np.empty(n), np.full(n // BLOCK + 1, np.nan)
 
 
 def height(line, x, i):

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from references.areal import areal_surface
 from scipy import integrate
 
 from mdr_dask.errors import DataError
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces.areal import areal_surface
 from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.scans import cut_of_lines, of_cut
 from mdr_dask.physics.surfaces.spectrum import Spectrum, self_affine

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, patches_at
+from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, barriers_for, patches_at
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
 from mdr_dask.physics.transients.ends import PreparedLine
 from mdr_dask.physics.transients.free_flight import Instant
-from mdr_dask.physics.transients.patches import History, barriers_for
+from mdr_dask.physics.transients.patches import History
 
 POINTS = 200
 LONG = 100.0  # relaxation times after which nothing is left of the state before
@@ -31,7 +31,7 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
         work = workspace_for(nodes, barriers)
         found = touch(Instant(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
         sums = np.empty(SUMS)
-        start, end = patches_at(line.cells, line.blocks, *barriers_for(line.track), deborah, depth, sums)
+        start, end = patches_at(line.cells, line.blocks, barriers_for(int(line.track.cells)), deborah, depth, sums)
         assert found == start.size
         assert np.allclose(work.start[:found], start, rtol=0, atol=1e-6)
         assert np.allclose(work.end[:found], end, rtol=0, atol=1e-6)

@@ -18,16 +18,27 @@ def test_checked_limit_of_the_parabola():
     assert worn.wear_volume == pytest.approx(0.9181587, abs=5e-8)
 
 
+def limit_of_a_parabola(t):
+    """Return (c, a) by t = arccos(c/a)."""
+    a = np.sqrt(2.0 / (1.0 + np.sinc(2.0 * t / np.pi)))
+    return a * np.cos(t), a
+
+
+def limit_of_a_cone(t):
+    """Return (c, a) by t = arccos(c/a) (thesis eq. 6.17)."""
+    return t / np.tan(t), t / np.sin(t)
+
+
 @pytest.mark.parametrize("t", [0.05, 0.4, 1.0, 1.4, 1.55])
 def test_limit_radius_is_the_parametric_form(t):
-    for profile, form in ((PARABOLA, wear.parabola_limit_radius), (CONE, wear.cone_limit_radius)):
+    for profile, form in ((PARABOLA, limit_of_a_parabola), (CONE, limit_of_a_cone)):
         c, a = form(t)
         assert wear.limit_radius(profile, float(c)) == pytest.approx(float(a), rel=1e-12)
 
 
 def test_printed_limit_of_the_parabola_is_low_by_at_most_3_6_percent():
-    c, a = wear.parabola_limit_radius(np.linspace(0.01, 1.57, 400))
-    low = 1 - wear.printed_parabola_limit(c) / a
+    c, a = limit_of_a_parabola(np.linspace(0.01, 1.57, 400))
+    low = 1 - (np.sqrt(2.0 + c**2 / 4) - c / 2) / a  # thesis eq. 6.16
     assert low.min() > -1e-12
     assert low.max() == pytest.approx(0.036, abs=0.0005)
 

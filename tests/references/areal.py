@@ -6,6 +6,7 @@ import numpy as np
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.surfaces.maps import wavenumbers
 from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 
@@ -37,10 +38,3 @@ def areal_surface(
     waves *= 2 * np.pi * np.sqrt(spectrum.at(np.hypot(q_x[:, None], q_y)) / (size[0] * size[1]))
     surface: FloatArray = fft.irfft2(waves, points, norm="forward", overwrite_x=True)
     return surface
-
-
-def wavenumbers(points: tuple[int, int], size: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the angular wave numbers, rad/m, along both axes of the half of a spectrum that `rfft2` gives."""
-    q_x = 2 * np.pi * fft.fftfreq(points[0], size[0] / points[0])
-    q_y = 2 * np.pi * fft.rfftfreq(points[1], size[1] / points[1])
-    return np.asarray(q_x), np.asarray(q_y)
