@@ -94,7 +94,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     h, s = np.empty((2, BEFORE + n + AFTER))
     terms = np.empty((2, ends.shape[1] and h.size))
     line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]))
-    _take_line(height, slope, ends, first, stride, resolved, line, np.empty((3, BLOCK + 1)))
+    _take_line(height, slope if resolved else slope[:0], ends, first, stride, line, np.empty((3, BLOCK + 1)))
     return line
 
 
@@ -105,17 +105,16 @@ def _take_line(
     ends: FloatArray,
     first: int,
     stride: int,
-    resolved: bool,
     line: Nodes,
     cells: FloatArray,
 ) -> None:
-    """Write the nodes and blocks of a line."""
+    """Write the nodes and blocks of a line; differences for slopes where none are given."""
     h, s, of_height, of_square, blocks = line.height, line.slope, line.ends[0], line.ends[1], line.blocks
     n = h.size - BEFORE - AFTER
     _take(height, first, stride, h)
     for i in range(h.size):
         h[i] -= line.top
-    if resolved:
+    if slope.size > 0:
         _take(slope, first, stride, s)
         for i in range(s.size):
             s[i] /= n

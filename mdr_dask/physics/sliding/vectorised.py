@@ -123,7 +123,7 @@ class Search(NamedTuple):
     results: FloatArray
 
 
-class Workspace(NamedTuple):
+class _Workspace(NamedTuple):
     """What a search works in: a tile of the line, the states of `walk`, queues, and what the last sweep has found."""
 
     tile: FloatArray
@@ -136,7 +136,7 @@ class Workspace(NamedTuple):
     rate: FloatArray
 
     @classmethod
-    def on(cls, refinement: int) -> Workspace:
+    def on(cls, refinement: int) -> _Workspace:
         """Return one for a grid."""
         tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
         last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
@@ -151,7 +151,7 @@ def _solve(
     cases: Cases,
     bounds: tuple[float, float],
     search: Search,
-    place: Workspace,
+    place: _Workspace,
 ) -> None:
     """Find the states of cases on a grid by Newton steps; the last one is taken without another sweep.
 
@@ -169,7 +169,7 @@ def _solve(
         Bounds of the last relative step of the depth and of what it costs.
     search : Search
         Read and written.
-    place : Workspace
+    place : _Workspace
         On this grid.
     """
     deborah, loads = cases
@@ -248,7 +248,7 @@ def begin(
     for stride in reversed(strides):
         search.results.fill(np.nan)
         line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
-        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search, Workspace.on(1))
+        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search, _Workspace.on(1))
     coarse = _sampled(line.top, search._replace(rates=search.rates.copy()))
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
@@ -299,7 +299,7 @@ def _settled(
     top = line.top + rise
     penetration = np.where(depths + top > 0, depths + top, _shallow(cases.loads))
     search = Search(penetration, rates, np.full((depths.size, RESULTS), np.nan))
-    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search, Workspace.on(refinement))
+    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search, _Workspace.on(refinement))
     return _sampled(top, search)
 
 
