@@ -93,7 +93,7 @@ _MEANINGS = {
     "Pa": ("a pressure", "10 MPa"),
     "1/Pa": ("an inverse pressure", "20 1/GPa"),
     "Pa s": ("a viscosity", "10 mPa s"),
-    "m^2/s": ("a diffusivity", "1 mm^2/s"),
+    "m^2/s": ("a kinematic viscosity", "100 mm^2/s"),
     "rad": ("an angle", "5 deg"),
     "rad/s": ("an angular frequency", "10 rad/s"),
     "K": ("a temperature", "300 K"),
