@@ -131,7 +131,7 @@ def on_plateaus(families=40, first=900_000, vertical=False):
 
 
 def with_laws(families=40):
-    """Print median processor times of a merge of ten temperatures, thirty points each, and of the laws of its factors."""
+    """Print median processor times of a merge of ten temperatures, thirty points each, and of its laws."""
     laws, times = (fit_arrhenius, fit_wlf), []
     for seed in range(families + 1):  # the first one compiles
         numbers, pieces, *_ = family(FIRST_SEED[False] + seed, 0.01, "sigmoid", False)
