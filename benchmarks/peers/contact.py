@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from references.areal import areal_surface
 from scipy.optimize import brentq
 
 from benchmarks.accuracy.points import Point
@@ -15,7 +16,6 @@ from benchmarks.peers.page import tell
 from benchmarks.surfaces import punches
 from mdr_dask.physics.mdr import power_law_contact
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss
-from mdr_dask.physics.surfaces.areal import areal_surface
 
 GRIDS = (32, 64, 128, 256)
 WIDTH, RADIUS = 2.0, 0.5
