@@ -70,7 +70,7 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
     from matplotlib.style import context, library
 
     if file is not None and not (Path(file).is_file() or file in library):
-        hint = did_you_mean(file, library)
+        hint = did_you_mean(file, [*library])
         near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
         raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {file!r}")
     token = _PAGE.set(asked)
