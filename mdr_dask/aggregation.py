@@ -77,6 +77,39 @@ def interval(array: xr.DataArray, error: xr.DataArray | None) -> xr.DataArray:
     return bounds.assign_coords(bound=np.array(["low", "high"], dtype=object))
 
 
+def mean_and_ends(array: xr.DataArray, error: xr.DataArray | None) -> tuple[xr.DataArray, xr.DataArray, xr.DataArray]:
+    """Return the mean and both ends of its `interval`; where nothing scatters, they are its discretisation error away.
+
+    All three are computed at once, for figures and pages ask for them thousands of times.
+    """
+    known = (array,) if error is None else xr.broadcast(array, abs(error))
+    found: tuple[xr.DataArray, xr.DataArray, xr.DataArray] = xr.apply_ufunc(
+        _mean_and_ends,
+        *(each.compute() for each in known),
+        input_core_dims=[["realisation"]] * len(known),
+        output_core_dims=[[], [], []],
+    )
+    return found
+
+
+def _mean_and_ends(
+    values: NDArray[np.float64], errors: NDArray[np.float64] | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    middle, count = _mean(values), values.shape[-1]
+    if errors is None:
+        return middle, *np.moveaxis(_interval(values, count), -1, 0)
+    grid = _mean(errors)
+    low, high = np.moveaxis(_interval(np.concatenate([values, grid[..., None]], axis=-1), count), -1, 0)
+    return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
+
+
+def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    known = ~np.isnan(values)
+    number = known.sum(axis=-1)
+    total: NDArray[np.float64] = np.where(known, values, 0.0).sum(axis=-1)
+    return total / np.where(number > 0, number, np.nan)
+
+
 def _interval(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the ends of intervals from realisations along the last axis, and perhaps their error behind them."""
     flat = values.reshape(-1, values.shape[-1])

@@ -60,6 +60,21 @@ def test_the_page_of_accuracy_is_what_its_table_says(benchmark_script):
     assert script.text(script.read()) == script.PAGE.read_text()
 
 
+def test_the_comparison_of_solvers_is_what_its_table_says(benchmark_script):
+    script = benchmark_script("peers.page")
+    assert script.PAGE.read_text().endswith(script.text(script.read(script.TABLE)))
+
+
+def test_stepping_all_springs_ends_at_the_scheme_of_the_thesis(benchmark_script):
+    """Friction of springs that are followed in time, on two grids; only the heights are shared."""
+    script = benchmark_script("peers.friction")
+    line, _ = script.sliding.rough(0.7)
+    for nodes in (256, 512):
+        aim = script.Aim(("drag",), 0.01, nodes // 128, "backward_euler")
+        steady, _ = script.solve(line, None, np.array([0.01]), np.array([0.2]), aim)
+        assert script.stepped(line, 0.01, 0.2, nodes) == pytest.approx(steady.drag[0] / 0.2, rel=1e-4)
+
+
 def test_the_page_of_validity_is_what_its_evidence_says(benchmark_script):
     script = benchmark_script("surfaces.validity")
     assert script.text(512) == script.PAGE.read_text()

@@ -50,7 +50,6 @@ def test_a_table_without_what_is_needed_is_one_clear_error(tmp_path, capsys, con
         ([str(TABLE), "--plot", "figure.xyz"], "ends in .png, .pdf or .svg, got 'figure.xyz'"),
         ([str(TABLE), "-o", "factors.txt"], "ends in .json or .csv, got 'factors.txt'"),
         ([str(TABLE), "--reference", "500"], "must lie between -49.9392 and 99.9931, got 500"),
-        ([str(TABLE), "--vertical"], "measure in between or do without vertical factors"),
     ],
 )
 def test_what_cannot_be_done_is_said_before_anything_is_written(tmp_path, monkeypatch, capsys, options, message):
@@ -75,6 +74,18 @@ def test_factors_and_merged_curve_go_into_tables_and_kept_results_are_known_by_w
     assert "decades at T = -49.9392, t = 10: " in printed.err
     assert main(["master-curve", str(other), "--vertical"]) == 2
     assert "is a kept result, of which only --reference may change" in capsys.readouterr().err
+
+
+def test_steps_that_vertical_factors_leave_open_are_named(capsys):
+    """Vertical factors pull two curves of this table apart, which was refused as a gap."""
+    assert main(["master-curve", str(TABLE), "--vertical", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    open_steps = "not determined between -49.9392 and -42.4659, between 17.8249 and 24.9796: "
+    assert found["attrs"]["undetermined"].startswith(open_steps)
+    found = {name: np.array(column["data"]) for name, column in found["data_vars"].items()}
+    below = found["shift_factor"][found["shift_factor"] < 0]
+    assert np.all(np.diff(below) > 0)
+    assert found["shift_factor_error"][9] > 1  # of a step that is within three decades either way
 
 
 def test_a_file_that_holds_no_master_curve_is_named(tmp_path, capsys):

@@ -13,7 +13,10 @@ FILE = Path(__file__).parents[2] / "docs/evidence/accuracy-and-speed.csv"
 
 
 class Point(NamedTuple):
-    """One entry of a work-precision diagram; `stated` is NaN where a method states no error."""
+    """One entry of a work-precision diagram; `stated` is NaN where a method states no error.
+
+    `covered` is the share of cases whose error is at most the stated one, NaN where it was not counted.
+    """
 
     solver: str
     case: str
@@ -22,6 +25,7 @@ class Point(NamedTuple):
     seconds: float
     error: float
     stated: float = np.nan
+    covered: float = np.nan
 
 
 def read(path: Path = FILE) -> list[Point]:

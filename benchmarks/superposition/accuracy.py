@@ -1,7 +1,8 @@
 """Coverage of the bars of shift factors, and processor time: ``python -m benchmarks superposition accuracy [40]``
 
-Families of ten curves of thirty points on one curve, two decades wide, 0.2 to 0.6 decades apart; then families that run
-into a plateau, with short overlaps, for which intervals of 95 % are judged.
+Families of ten curves of thirty points on one curve, two decades wide, 0.2 to 0.6 decades apart, and the time that one
+of them takes with its laws; then families that run into a plateau, with short overlaps, for which intervals of 95 % are
+judged.
 """
 
 import sys
@@ -11,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from mdr_dask.errors import DataError
+from mdr_dask.physics.superposition.laws import fit_arrhenius, fit_power, fit_wlf
 from mdr_dask.physics.superposition.master_curve import superpose
 
 SHAPES = {
@@ -111,19 +113,42 @@ def on_plateaus(families=40, first=900_000, vertical=False):
     beside = ", those of vertical factors" if vertical else ""
     print(f"intervals of 95 % on plateaus: held{beside}; median largest error, its half width, families beyond three")
     for setting in PLATEAUS:
-        ratios, errors, times = zip(
-            *(on_plateau(setting, seed, vertical) for seed in range(first, first + families)), strict=True
-        )
+        found, refused = [], 0
+        for seed in range(first, first + families):
+            try:
+                found.append(on_plateau(setting, seed, vertical))
+            except DataError:
+                refused += 1
+        ratios, errors, times = zip(*found, strict=True)
         held = " ".join(f"{share:.3f}" for share in np.mean(np.array(ratios) <= 1, axis=(0, 2)))
         most = [
             (error.max(), error.max() / ratio[0, error.argmax()]) for ratio, error in zip(ratios, errors, strict=True)
         ]
         beyond = sum(bool(np.any(ratio[0] > 3)) for ratio in ratios)
         largest, half = np.median(most, axis=0)
-        print(f"{setting!s:34s} {held}; {largest:.3f} {half:.3f} {beyond}/{families} {1e3 * np.median(times):.1f} ms")
+        numbers = f"{held}; {largest:.3f} {half:.3f} {beyond}/{len(found)} {1e3 * np.median(times):.1f} ms"
+        print(f"{setting!s:34s} {numbers}, refused {refused}")
+
+
+def with_laws(families=40):
+    """Print median processor times of a merge of ten curves of thirty points and of each law of its factors."""
+    laws, times = (fit_power, fit_arrhenius, fit_wlf), []
+    for seed in range(families + 1):  # the first one compiles
+        numbers, pieces, *_ = family(FIRST_SEED[False] + seed, 0.01, "sigmoid", False)
+        moments = [time.process_time()]
+        merged = superpose(300.0 + 10 * numbers, pieces)
+        moments.append(time.process_time())
+        for law in laws:
+            law(merged.groups, merged.horizontal, merged.covariance[:10, :10], merged.reference)
+            moments.append(time.process_time())
+        times.append(np.diff(moments))
+    each = dict(zip(["merge", *(law.__name__ for law in laws)], 1e3 * np.median(times[1:], axis=0), strict=True))
+    whole = 1e3 * np.median(np.sum(times[1:], axis=1))
+    print(f"merge with laws {whole:.1f} ms:", ", ".join(f"{name} {spent:.1f}" for name, spent in each.items()))
 
 
 def main(families=40):
+    with_laws(families)
     for vertical in (False, True):
         superpose(*family(0, 0.01, "sigmoid", vertical)[:2], vertical)  # compiles
         print("vertical factors too" if vertical else "horizontal factors", "at scatter", *SCATTER)

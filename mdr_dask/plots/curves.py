@@ -64,13 +64,7 @@ NO_FAMILY = Family([], False, "", None, {}, [])
 
 def mean(values: xr.DataArray, error: xr.DataArray | None = None) -> Mean:
     """Return the mean over realisations with its interval: their scatter and the error of the grid, joined."""
-    middle = aggregation.mean(values)
-    bounds = aggregation.interval(values, error)
-    low, high = bounds.sel(bound="low", drop=True), bounds.sel(bound="high", drop=True)
-    if error is not None:
-        grid = aggregation.grid_error(error)
-        low, high = low.fillna(middle - grid), high.fillna(middle + grid)
-    return Mean(middle, low, high)
+    return Mean(*aggregation.mean_and_ends(values, error))
 
 
 def measured(data: xr.Dataset, output: str, factor: Any = 1.0) -> Mean:

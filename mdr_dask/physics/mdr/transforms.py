@@ -189,8 +189,8 @@ def pressure(
         ahead = inside & (r < place)
         value[ahead] += height / (np.pi * np.sqrt((place - r[ahead]) * (place + r[ahead])))
     on_axis = inside & (r == 0.0)
-    near = image_slope(np.array([1e-9, 0.5]) * contact_radius)
-    if np.any(on_axis) and abs(near[0]) > 1e-6 * abs(near[1]):
+    near, *farther = np.abs(image_slope(np.array([1e-9, 0.01, 0.5]) * contact_radius))
+    if np.any(on_axis) and near > 1e-6 * max(farther):
         value[on_axis] = np.inf
     return Estimate(np.where(inside, value, 0.0), np.where(inside, error, 0.0))
 

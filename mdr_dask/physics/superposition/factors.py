@@ -28,8 +28,6 @@ class Settings(NamedTuple):
     """Of the linearised problem with vertical shifts, at most."""
     settled: float = 0.3
     """Standard errors by which no shift moves any more in the last of them."""
-    rises: tuple[float, float] = (0.0, 0.03)
-    """Scatter that horizontal shifts allow for, in heights of a curve, before vertical ones are known and after."""
     places: int = 20
     """Places on either side of the best, one standard deviation apart, along the loosest combination of shifts, at
     most."""
@@ -37,8 +35,6 @@ class Settings(NamedTuple):
     """Logarithm of the evidence, below the largest, where they end."""
     power: float = 0.7
     """Power of the evidence there: a curve is not quite what its smoothing expects."""
-    open: float = 0.25
-    """Widths of a curve by which a step may scatter before all that is known is that its curves overlap."""
     pin: float = 1e6
     """Precision with which that combination is held there, relative to its own."""
     held: int = 3
@@ -64,12 +60,11 @@ class Found(NamedTuple):
     rising: float = 0.0
 
 
-def find_horizontal(problem: ShiftProblem, least: float = 0.0) -> Found:
+def find_horizontal(problem: ShiftProblem) -> Found:
     """Find horizontal shifts.
 
     A first fit knows smoothing and scatter. Scans of all pairs of neighbours then tell what steps have in common, a
-    joint fit with that knowledge finds the best shifts, and scans about these their means and errors. `least` is a
-    scatter of the ordinates to be allowed for, whatever they tell.
+    joint fit with that knowledge finds the best shifts, and scans about these their means and errors.
     """
     guess = problem.first_guess()
     first = SETTINGS.first_weight * float(problem.grid.weights[-1]) / 1e6
@@ -77,7 +72,7 @@ def find_horizontal(problem: ShiftProblem, least: float = 0.0) -> Found:
     _, weight, variance = fit(
         problem.points, _chained(guess), problem.grid, usual, (first, 0.0), SETTINGS.first_iterations
     )
-    pairs = scan_pairs(problem, weight, max(variance, least**2))
+    pairs = scan_pairs(problem, weight, variance)
     steps = together(pairs, problem)
     for _ in range(SETTINGS.rounds):
         prior = problem.prior(steps.common)
@@ -85,7 +80,6 @@ def find_horizontal(problem: ShiftProblem, least: float = 0.0) -> Found:
         shifts, weight, variance = fit(
             problem.points, _chained(steps.mean), problem.grid, prior, smoothing, SETTINGS.iterations
         )
-        variance = max(variance, least**2)
         _, covariance, *_ = changes_of(problem.points, shifts, problem.grid, weight, variance, [prior])
         spread = _of_steps(covariance)
         scanned = scan(problem, shifts, spread, (weight, variance), steps.common, pairs)
@@ -105,8 +99,9 @@ def find_both(problem: ShiftProblem) -> Found:
     there scans, in which vertical shifts are free at each place, tell whether it began well, and what it leaves open.
     What both disagree in counts as an error.
     """
-    starts = [find_horizontal(problem, rise * problem.height) for rise in SETTINGS.rises]
-    found, size = _likeliest(problem, starts), problem.curves - 1
+    level = find_horizontal(problem)
+    level, _ = _linear(problem, level, problem.priors(level.common.mean))
+    found, size = _likeliest(problem, [level, _by_pairs(problem, level)]), problem.curves - 1
     for left in range(SETTINGS.rounds - 1, -1, -1):
         spread = _of_steps(found.covariance[:size, :size])
         steps = _scanned(problem, found, spread)
@@ -118,26 +113,45 @@ def find_both(problem: ShiftProblem) -> Found:
     return _joined(problem, found, steps, spread)
 
 
+def _by_pairs(problem: ShiftProblem, found: Found) -> Found:
+    """Return shifts by scans of two neighbours each, whose vertical shifts are free about their mean step.
+
+    Horizontal shifts alone take the levels of a plateau for a slope, so that its curves lie far apart. The scatter is
+    to be one of both kinds of shifts.
+    """
+    usual = _usual(found)
+    pairs = scan_pairs(problem.lifted(usual), found.weight, found.variance, found.rising)
+    steps = together(pairs, problem)
+    return found._replace(shifts=_chained(steps.mean)._replace(along=usual), common=steps.common)
+
+
+def _usual(found: Found) -> FloatArray:
+    """Return vertical shifts whose steps all are the mean step."""
+    return np.asarray(np.linspace(0.0, found.shifts.along[-1], found.shifts.along.size))
+
+
 def _joined(problem: ShiftProblem, found: Found, steps: Steps, spread: FloatArray) -> Found:
     """Return shifts of the linearised problem and of scans together; `spread` is the covariance of the former's steps.
 
     A scan counts for the place as far as it is the wider of the two, and for the width where the curves do not tell.
+    Curves that overlap nowhere tell nothing of a step beside a vertical one: it is taken to be as others are.
     """
     scanned, linear, sums = steps.shared + np.diag(steps.own), np.diff(found.shifts.across), np.tri(steps.mean.size)
     share = np.clip(1 - np.diag(spread) / np.diag(scanned), 0.0, 1.0)
     wide, apart = np.sqrt(np.maximum(share, 1 - steps.told)), steps.mean - linear
     between = linear + share * apart
-    is_open = np.sqrt(np.diag(spread)) > SETTINGS.open * problem.width
-    place = np.where(is_open, np.clip(between, *problem.windows.T), between)
+    place = np.clip(between, *problem.windows.T)
     other = sums @ ((1 - steps.told) * (1 - share) * apart + place - between)
     covariance = sums @ (spread + wide[:, None] * scanned * wide) @ sums.T + np.outer(other, other)
-    told = np.where(place == between, steps.told, 0.0)
+    is_open = place != between
+    covariance += sums @ np.diag(is_open * steps.common.scatter**2) @ sums.T
+    told = np.where(is_open, 0.0, steps.told)
     return _followed(found, sums @ (place - linear), covariance)._replace(told=told, common=steps.common)
 
 
 def _scanned(problem: ShiftProblem, found: Found, spread: FloatArray) -> Steps:
     """Return what scans tell of steps where vertical shifts are free, about their mean step."""
-    usual = found.shifts.along[-1] / (problem.curves - 1) * np.arange(problem.curves)
+    usual = _usual(found)
     level, smoothing = problem.lifted(usual), (found.weight, found.variance)
     shifts = found.shifts._replace(along=found.shifts.along - usual)
     pairs = scan_pairs(level, *smoothing, found.rising)
@@ -158,7 +172,7 @@ def _followed(found: Found, moved: FloatArray, covariance: FloatArray) -> Found:
 
 def _likeliest(problem: ShiftProblem, starts: list[Found]) -> Found:
     """Return both kinds of shifts from the start of most evidence."""
-    priors = problem.priors(float(np.mean([start.common.mean for start in starts])))
+    priors = problem.priors(starts[-1].common.mean)
     found, _ = max((_linear(problem, start, priors) for start in starts), key=lambda pair: pair[1])
     return _along_the_loosest(problem, found, priors)
 

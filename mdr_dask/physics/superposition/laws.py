@@ -22,6 +22,9 @@ ITERATIONS, CONVERGED = 40, 1e-12
 RIDGE = 1e-12
 """Added to the precision of the constants, relative to it, so that a step is finite where they cannot be told apart."""
 
+NEGLIGIBLE = 1e-3
+"""Scatter about a law over the least error of the factors, below which there is none."""
+
 STRAIGHTEST = 1e-5
 """Span of the temperatures over c2, below which factors are as good as linear in temperature."""
 
@@ -169,10 +172,11 @@ def _fit(name: str, law: Law, guess: FloatArray, factors: FloatArray, covariance
         best, squares, _ = _solved(law, best, known, vectors, values + scatter**2, target)
         return squares / freedom - 1
 
-    chance = float(chdtrc(freedom, freedom * (excess(0.0) + 1)))
-    scatter, largest = 0.0, float(np.std(factors))
-    ends = np.log(1e-6 * largest + 1e-300), np.log(10 * largest + 1e-300)
-    if excess(0.0) > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
+    alone, scatter = excess(0.0), 0.0
+    chance = float(chdtrc(freedom, freedom * (alone + 1)))
+    squares = float(np.sum((law(best)[0] - factors)[known] ** 2))
+    ends = np.log(NEGLIGIBLE * np.sqrt(values.min())), np.log(2 * np.sqrt(squares / freedom) + 1e-300)
+    if alone > 0 and excess(float(np.exp(ends[0]))) > 0 > excess(float(np.exp(ends[1]))):
         scatter = float(np.exp(brentq(lambda width: excess(float(np.exp(width))), *ends, xtol=1e-3)))
     best, _, precision = _solved(law, best, known, vectors, values + scatter**2, target)
     quantile = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))

@@ -45,6 +45,8 @@ class Settings(NamedTuple):
     """Places of a step between the ends where its neighbours cease to overlap."""
     unlikely: float = 12.0
     """Logarithm of a likelihood, below the largest, that no scan needs to visit."""
+    impossible: float = 1e-15
+    """Of the largest share of a place of a step: places that need no sum."""
     beyond: tuple[float, float] = (0.05, 8.0)
     """Widths of a curve over which a step without overlap becomes unlikely, and how unlikely at most."""
 
@@ -184,10 +186,11 @@ def _given(
     """
     shape = means.size, scatters.size
     evidence, centre, spread = np.empty(shape), np.empty(shape), np.empty(shape)
+    kept = np.flatnonzero(shares > SETTINGS.impossible * np.max(shares))
     for a in range(means.size):
         for b in range(scatters.size):
             zero = first = second = 0.0
-            for j in range(places.size):
+            for j in kept:
                 apart = (places[j] - means[a]) / scatters[b]
                 part = shares[j] * np.exp(-0.5 * apart * apart)
                 zero += part

@@ -86,6 +86,13 @@ def test_pressure_of_hertz_cone_and_punch():
     np.testing.assert_allclose(punch, 0.5 / np.pi / np.sqrt(1 - r**2), rtol=1e-14)
 
 
+def test_pressure_on_the_axis_is_finite_where_the_line_load_falls_fast():
+    """A Gaussian line load is that of a Gaussian pressure; its slope is steepest near the axis."""
+    r = np.array([0.0, 0.1, 0.5])
+    p = transforms.pressure(lambda x: 2 * x * np.sqrt(np.pi) / 0.3 * np.exp(-((x / 0.3) ** 2)), r, 2.0).value
+    np.testing.assert_allclose(p, np.exp(-((r / 0.3) ** 2)), rtol=1e-9)
+
+
 def test_a_jump_of_the_line_load_inside_the_contact():
     p = transforms.pressure(np.zeros_like, [0.1, 0.6], 1.0, jumps=[(0.5, 0.2)], edge_gap=0.0).value
     np.testing.assert_allclose(p, [0.2 / np.pi / np.sqrt(0.25 - 0.01), 0.0], rtol=1e-14)

@@ -49,6 +49,14 @@ def test_intervals_of_both_kinds_of_factors_hold(setting):
     assert np.all(np.mean(ratios <= 1, axis=(0, 2)) >= 0.88)
 
 
+@pytest.mark.parametrize("seed", [900_017, 900_034])
+def test_levels_of_a_plateau_are_not_taken_for_a_slope(seed):
+    """Horizontal shifts alone put such curves so far apart that none overlap, and were the only start."""
+    ratios, errors, _ = on_plateau(("steep", 15, 20, 0.005, 0.3), seed, vertical=True)
+    assert np.all(ratios <= 2)
+    assert np.all(errors < 1)
+
+
 def test_the_bootstrap_is_as_wide_as_the_intervals_along_a_plateau():
     groups, curves, _ = plateau_family("decay", 8, 20, 0.02, 0.3, 3)
     found = superpose(groups, curves, draws=100)

@@ -14,6 +14,7 @@ from mdr_dask.physics.surfaces.maps import (
     spectrum_of_map,
     without_trend,
 )
+from mdr_dask.physics.surfaces.scans import Cut
 from mdr_dask.physics.surfaces.self_affine import fit_self_affine, noise_limit, steep_limit
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
@@ -141,3 +142,18 @@ def test_the_exponent_and_the_cut_offs_are_found(hurst):
     noisy = height + noise * np.random.default_rng(1).standard_normal(height.shape)
     limit = noise_limit(spectrum_of_map(SurfaceMap(noisy, (LENGTH, LENGTH))).binned())
     assert limit == pytest.approx(crossing, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("density", "limit"),
+    [
+        ([8.0, 4.0, 2.0, 1.0], np.inf),  # slopes of -1 between wave numbers that double
+        ([8.0, 4.0, 4e-3, 4e-6], 2.0),
+        ([8.0, 4e-3, 2e-3, 1e-3], np.inf),  # steep once, and then no more: no end
+        ([8.0, 4.0, 2.0, 0.0], 4.0),  # nothing is beyond the last wave
+        ([8.0, 4.0, 4e-3, 0.0], 2.0),
+    ],
+)
+def test_a_spectrum_ends_where_it_falls_too_steeply_or_to_nothing(density, limit):
+    bins = Cut(np.array([1.0, 2.0, 4.0, 8.0]), np.array(density), np.full(4, 0.1))
+    assert steep_limit(bins) == pytest.approx(limit)

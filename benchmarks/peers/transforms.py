@@ -1,0 +1,73 @@
+"""Pressure from a line load beside PyAbel: ``python -m benchmarks peers transforms``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from benchmarks.accuracy.points import Point
+from benchmarks.peers.beside import OURS, called, in_turns, single_threaded
+from benchmarks.peers.page import tell
+from mdr_dask.physics.mdr.transforms import pressure
+
+SAMPLES = (101, 401, 1601)
+WIDTH = 0.3
+
+
+def bell(r):
+    """Return line load, its slope, and pressure of a Gaussian."""
+    load = np.sqrt(np.pi) * WIDTH * np.exp(-((r / WIDTH) ** 2))
+    return load, -2 * r / WIDTH**2 * load, np.exp(-((r / WIDTH) ** 2))
+
+
+def hertz(r):
+    """Return the same of a parabola in contact up to 1."""
+    return np.pi / 2 * np.maximum(1 - r**2, 0), np.where(r <= 1, -np.pi * r, 0.0), np.sqrt(np.maximum(1 - r**2, 0))
+
+
+#: Functions, and the edge of the contact.
+CASES = {"smooth: Gaussian": (bell, 2.0), "edge: Hertz": (hertz, 1.0)}
+
+
+def peers(load, spacing):
+    """Return PyAbel's methods for one row of samples."""
+    name = called("PyAbel")
+    if name is None:
+        return {}
+    from abel import basex, dasch, daun, hansenlaw
+
+    row, kept = load[None, :], {"basis_dir": None, "verbose": False}
+    return {
+        (name, "three_point"): lambda: dasch.three_point_transform(row, dr=spacing, direction="inverse", **kept),
+        (name, "basex"): lambda: basex.basex_transform(row, dr=spacing, direction="inverse", **kept),
+        (name, "daun, cubic"): lambda: daun.daun_transform(row, dr=spacing, degree=3, direction="inverse", **kept),
+        (name, "hansenlaw"): lambda: hansenlaw.hansenlaw_transform(row, dr=spacing, direction="inverse"),
+    }
+
+
+def compared(samples: tuple[int, ...] = SAMPLES) -> Iterator[Point]:
+    """Yield the largest error of each method on ever more radii."""
+    for case, (function, edge) in CASES.items():
+        for number in samples:
+            radius = np.linspace(0, 2, number)  # the edge is among them
+            load, _, truth = function(radius)
+
+            def known(edge=edge, function=function, radius=radius):
+                return pressure(lambda x: -function(x)[1], radius, edge).value
+
+            def sampled(edge=edge, load=load, radius=radius):
+                inside = radius <= edge
+                slope = CubicSpline(radius[inside], load[inside], bc_type=("clamped", "not-a-knot")).derivative()
+                return pressure(lambda x: -slope(x), radius, edge).value
+
+            methods = {(OURS, ""): known, (OURS, "spline"): sampled} | peers(load, radius[1])
+            for (name, setting), (found, seconds) in in_turns(methods).items():
+                error = max(np.max(np.abs(np.ravel(found) - truth)), 1e-16)
+                yield Point("Abel transform", f"{case}, {number} radii", name, setting, seconds, error)
+
+
+if __name__ == "__main__":
+    single_threaded()
+    tell(compared())
