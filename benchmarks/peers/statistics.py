@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from references.areal import areal_surface, wavenumbers
 
 from benchmarks.accuracy.points import Point
 from benchmarks.peers.beside import OURS, called, in_turns, single_threaded
 from benchmarks.peers.page import tell
+from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces import measured, roughness
-from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map
+from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.spectrum import self_affine
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8

@@ -188,14 +188,14 @@ def random_jump(seed: int) -> dict[str, object]:
     generator = np.random.default_rng(seed)
     hurst, points = float(generator.uniform(0, 1)), int(generator.choice([16, 32, 64, 200]))
     slope = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
-    reach = 10 ** generator.uniform(-2.5, 1.5) / slope
+    deborah = 10 ** generator.uniform(-2.5, 1.5) / slope
     force = 4 * 1e7 * 0.002 * 2e-6 * 10 ** generator.uniform(-3, 0.5)
     change = float(generator.choice([-0.9, -0.5, -0.2, 0.2, 1.0, 9.0]))
     return {
         "hurst": hurst,
         "points": points,
         "normal_force": force,
-        "velocity": reach * 0.002 / 1e-3,
+        "velocity": deborah * 0.002 / 1e-3,
         "velocity_change": change,
         "relaxation_times": (0.01, 1.0),
     }
