@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import atexit
 import hashlib
-import json
-import re
 import shutil
 import tempfile
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,12 +19,11 @@ import xarray as xr
 
 from mdr_dask import aggregation, campaign, fits, plots, store
 from mdr_dask.campaign import Campaign
-from mdr_dask.cli.campaigns import require_answers
-from mdr_dask.cli.understood import study_lines
-from mdr_dask.errors import CampaignError, DataError, did_you_mean
+from mdr_dask.campaign.keys import of_keys
+from mdr_dask.cli.checked import Understood, understood
+from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
-from mdr_dask.plan import Estimate, estimate
 from mdr_dask.questions import selection
 from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
@@ -63,27 +59,8 @@ def read(source: Source) -> Campaign:
     if isinstance(source, Campaign):
         return source
     if isinstance(source, Mapping):
-        return _of_dictionary(json.dumps({"name": "study", **source}, indent=1, default=_plain))
+        return of_keys(source)
     return campaign.load(source)
-
-
-@dataclass(frozen=True, repr=False)
-class Understood(Estimate):
-    """What a campaign was understood to be and what it will cost; printed, it is what ``mdr-dask check`` says.
-
-    Attributes
-    ----------
-    lines : tuple of str
-        The axes of each series, what its data hold, what it costs.
-    questions : tuple of str
-        What is asked about bare numbers far from the usual.
-    """
-
-    lines: tuple[str, ...] = ()
-    questions: tuple[str, ...] = ()
-
-    def __repr__(self) -> str:
-        return "\n".join((*self.lines, *self.questions))
 
 
 def check(source: Source) -> Understood:
@@ -106,11 +83,7 @@ def check(source: Source) -> Understood:
     >>> costs.cases
     2
     """
-    found = read(source)
-    require_answers(found)
-    costs = estimate(found)
-    lines = (f"{found.name}: {found.model}", *study_lines(found, costs))
-    return Understood(**vars(costs), lines=lines, questions=found.remarks)
+    return understood(read(source))
 
 
 def run(
@@ -414,24 +387,6 @@ class StudyAccessor:
     def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""
         return plot(self._dataset, figure, select, **view)
-
-
-def _plain(value: Any) -> Any:
-    """Return numbers of numpy and paths as JSON holds them."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
-
-
-def _of_dictionary(text: str) -> Campaign:
-    """Read a campaign whose text nobody sees: its messages name keys, but no lines."""
-
-    def told(messages: Sequence[str]) -> tuple[str, ...]:
-        return tuple(re.sub(r"^campaign:\d+:\d+: ", "", message) for message in messages)
-
-    try:
-        found = campaign.loads(text, "campaign", ".")
-    except CampaignError as error:
-        raise CampaignError(*told(error.args)) from None
-    return replace(found, remarks=told(found.remarks))
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
