@@ -15,7 +15,7 @@ from benchmarks.peers.page import tell
 from benchmarks.surfaces import punches
 from mdr_dask.physics.mdr import power_law_contact
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss
-from mdr_dask.physics.surfaces.areal import areal_surface
+from tests.references.areal import areal_surface
 
 GRIDS = (32, 64, 128, 256)
 WIDTH, RADIUS = 2.0, 0.5
