@@ -173,8 +173,12 @@ PICKED = """## What asking for an accuracy costs
 
 For each accuracy asked for: time over that of the cheapest setting tried whose error is not larger, whatever the
 method; 1 if it is the cheapest itself. A user does not know that setting beforehand. Then the largest error over the
-accuracy. {within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times. The fast rule of
-wear is left out: its error is that of its equation, and no setting lowers it.
+accuracy. {within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times. Large ratios
+stand where a rough grid is far better than it can know: films of the first grids are extrapolated, and some of them are
+right to 5e-6 by chance. The fast rule of wear is left out: its error is that of its equation, and no setting lowers it.
+
+Not measured yet: campaigns of velocity jumps and of mixed lubrication (`python -m benchmarks accuracy measure
+campaigns_of_jumps campaigns_of_rollers`), and the stated errors of velocity jumps on seeds kept apart.
 
 | solver | case | accuracy: times the cheapest | error over accuracy, most |
 |---|---|---|---|
@@ -183,7 +187,9 @@ wear is left out: its error is that of its equation, and no setting lowers it.
 HONESTY = """## Whether stated errors hold
 
 Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms: the share whose error is
-below the stated one, and the median of stated over error. The judgements are [a table](evidence/honesty.csv).
+below the stated one, and the median of stated over error. The judgements are [a table](evidence/honesty.csv). Shares of
+20 cases are known to ten per cent. The breakthrough of few points converges so slowly that its stated error, the change
+from every second point, is too small; at a million points it is too large ([evidence](evidence/mixed-lubrication.md)).
 
 | solver | cases | number | held | stated over error |
 |---|---|---|---|---|

@@ -10,11 +10,11 @@ from scipy.signal import resample
 from benchmarks.accuracy.points import Point
 from benchmarks.accuracy.sliding import exact, ladder, slow
 from benchmarks.measures import timed
+from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import waves_of
-from tests.references.areal import areal_surface
 
 SAMPLES, DEEP, DEBORAH = 128, 0.5, 0.003
 #: Hurst exponent, and points of the shortest wave.

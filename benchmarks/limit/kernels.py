@@ -66,10 +66,11 @@ def _captured(module: ModuleType, name: str, run: Callable[[], object]) -> tuple
 
 def preparation() -> Work:
     """Nodes with bounds and sums of their blocks."""
-    from mdr_dask.physics.sliding.nodes import nodes
+    from mdr_dask.physics.sliding.nodes import ends_of, nodes
 
     height, slope = _nodes(2)
-    return Work(lambda: nodes(height, slope, 0, 1, True), height.size)
+    ends = ends_of(height, slope)
+    return Work(lambda: nodes(height, slope, 0, 1, True, ends), height.size)
 
 
 def node_to_node() -> Work:

@@ -15,7 +15,6 @@ from benchmarks.peers.page import tell
 from benchmarks.surfaces import punches
 from mdr_dask.physics.mdr import power_law_contact
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss
-from tests.references.areal import areal_surface
 
 GRIDS = (32, 64, 128, 256)
 WIDTH, RADIUS = 2.0, 0.5
@@ -125,7 +124,7 @@ def by_lines() -> np.ndarray:
 def rough() -> Iterator[Point]:
     """Yield the largest error of the stiffness of one rough punch; everything beyond the punch is far below."""
     place = (np.arange(PUNCH) + 0.5) / PUNCH - 0.5
-    surface = punches.HEIGHT * areal_surface(punches.spectrum(HURST, PUNCH), (PUNCH, PUNCH), (1.0, 1.0), 1, 0)
+    surface = punches.HEIGHT * punches.areal_surface(punches.spectrum(HURST, PUNCH), (PUNCH, PUNCH), (1.0, 1.0), 1, 0)
     surface[np.hypot(place[:, None], place) >= 0.5] = -1.0
 
     def depths(press, tolerance):

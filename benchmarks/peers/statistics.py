@@ -9,11 +9,11 @@ import numpy as np
 from benchmarks.accuracy.points import Point
 from benchmarks.peers.beside import OURS, called, in_turns, single_threaded
 from benchmarks.peers.page import tell
+from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces import measured, roughness
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.spectrum import self_affine
 from mdr_dask.physics.surfaces.waves import waves_of
-from tests.references.areal import areal_surface
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8
 #: Points of the shortest wave.

@@ -1,5 +1,6 @@
-"""Compiled kernels that another version of the package left behind are not read."""
+"""What a kernel compiles, and that what another version of the package left behind is not read."""
 
+import gc
 import os
 import pickle
 import subprocess
@@ -7,6 +8,12 @@ import sys
 from pathlib import Path
 
 import numba
+import pytest
+from numba.core.event import Listener, install_listener
+
+from mdr_dask.physics.compiling import compiled
+
+pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
 MODULE = """
 from mdr_dask.physics.compiling import compiled
@@ -33,3 +40,42 @@ def test_an_index_of_another_version_is_no_error(tmp_path):
     index.write_bytes(pickle.dumps(numba.__version__) + gone)
     again = run()
     assert (again.returncode, again.stdout) == (0, "42\n"), again.stderr
+
+
+def test_a_number_written_in_a_call_compiles_no_kernel_of_its_own():
+    @compiled
+    def raised(x, power):
+        return x**power
+
+    @compiled
+    def summed(x):
+        total, power = raised(x, 2), 0
+        while power < 3:
+            total += raised(x, power)
+            power += 1
+        return total
+
+    assert summed(2.0) == 4 + 1 + 2 + 4
+    assert list(raised.overloads) == [(numba.float64, numba.int64)]
+
+
+def test_garbage_is_collected_after_compiling_but_not_meanwhile():
+    collects = []
+
+    class Noting(Listener):
+        def on_start(self, event):
+            collects.append(gc.isenabled())
+
+        def on_end(self, event):
+            pass
+
+    @compiled
+    def halved(x):
+        return x / 2
+
+    halved._cache.disable()  # type: ignore[attr-defined]
+    with install_listener("numba:run_pass", Noting()):
+        assert halved(3.0) == 1.5
+    assert not any(collects)
+    assert collects
+    assert gc.isenabled()

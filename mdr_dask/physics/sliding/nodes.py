@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
+from mdr_dask.physics.compiling import compiled, copy_into
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
@@ -49,24 +49,19 @@ class Nodes(NamedTuple):
 
 
 @compiled
-def _close(turn: FloatArray) -> None:
-    """Write the nodes of the turns before and after."""
+def _take(given: FloatArray, first: int, stride: int, turn: FloatArray) -> None:
+    """Write every stride-th number of a turn from the first one on, and those of the turns before and after."""
     n = turn.size - BEFORE - AFTER
-    copy_into(turn[:BEFORE], turn[n : n + BEFORE])
-    copy_into(turn[n + BEFORE :], turn[BEFORE : BEFORE + AFTER])
-
-
-@inlined
-def _end_term(h: FloatArray, s: FloatArray, i: int) -> float:
-    """Return what Euler and Maclaurin add to the trapezium of the slope squared at its first node, in cells.
-
-    The derivatives come from heights and slopes at the nodes beside; over a whole line the terms cancel.
-    """
-    rise, fall = h[i + 1] - h[i - 1], (h[i + 1] - h[i]) - (h[i] - h[i - 1])
-    tilt, bow = s[i + 1] + s[i - 1], s[i + 1] - s[i - 1]
-    second, third, fourth = 2 * fall - 0.5 * bow, 7.5 * rise - 1.5 * (tilt + 8 * s[i]), 6 * bow - 12 * fall
-    term: float = s[i] * second / 6 - (s[i] * fourth + 3 * second * third) / 360
-    return term
+    turned = min(-(-(given.size - first) // stride), n)  # up to the end of the turn as it is given
+    for i in range(turned):
+        turn[BEFORE + i] = given[first + i * stride]
+    first -= given.size
+    for i in range(turned, n):
+        turn[BEFORE + i] = given[first + i * stride]
+    for i in range(BEFORE):
+        turn[i] = turn[n + i]
+    for i in range(n + BEFORE, turn.size):
+        turn[i] = turn[i - n]
 
 
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
@@ -83,7 +78,6 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     return np.asarray(np.fft.irfft(parts, n), dtype=np.float64)
 
 
-@kernel
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
     """Take every stride-th node of a line; differences for slopes if it is not resolved.
 
@@ -97,30 +91,45 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
         From `ends_of`; integrals over cells come from the nodes beside without.
     """
     n = height.size // stride
-    terms = np.empty((2, ends.shape[1] and n + BEFORE + AFTER))
-    for i in range(terms.shape[1]):
-        place = (first + i - BEFORE) % n
-        terms[0, i], terms[1, i] = ends[0, place], ends[1, place]
-    h, s = np.empty(n + BEFORE + AFTER), np.empty(n + BEFORE + AFTER)
-    top = height[first]
-    turned = min(-(-(height.size - first) // stride), n)  # nodes up to the end of the line as it is given
-    for i in range(turned):
-        h[BEFORE + i] = height[first + i * stride] - top
-        s[BEFORE + i] = slope[first + i * stride] / n
-    first -= height.size
-    for i in range(turned, n):
-        h[BEFORE + i] = height[first + i * stride] - top
-        s[BEFORE + i] = slope[first + i * stride] / n
-    _close(h)
-    if not resolved:
-        for i in range(BEFORE, n + BEFORE):
+    h, s = np.empty((2, BEFORE + n + AFTER))
+    terms = np.empty((2, ends.shape[1] and h.size))
+    line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]))
+    _take_line(height, slope if resolved else slope[:0], ends, first, stride, line, np.empty((3, BLOCK + 1)))
+    return line
+
+
+@compiled
+def _take_line(
+    height: FloatArray,
+    slope: FloatArray,
+    ends: FloatArray,
+    first: int,
+    stride: int,
+    line: Nodes,
+    cells: FloatArray,
+) -> None:
+    """Write the nodes and blocks of a line; differences for slopes where none are given."""
+    h, s, of_height, of_square, blocks = line.height, line.slope, line.ends[0], line.ends[1], line.blocks
+    n = h.size - BEFORE - AFTER
+    _take(height, first, stride, h)
+    for i in range(h.size):
+        h[i] -= line.top
+    if slope.size > 0:
+        _take(slope, first, stride, s)
+        for i in range(s.size):
+            s[i] /= n
+    else:
+        for i in range(1, s.size - 1):
             s[i] = 0.5 * (h[i + 1] - h[i - 1])
-    _close(s)
-    blocks, square, above, mean = np.empty((n // BLOCK, KNOWN)), np.empty(BLOCK + 1), np.empty(BLOCK), np.empty(BLOCK)
+        s[0], s[s.size - 1] = s[n], s[s.size - 1 - n]
+    if of_height.size > 0:
+        _take(ends[0], first, stride, of_height)
+        _take(ends[1], first, stride, of_square)
+    mean, square, above = cells[0], cells[1], cells[2]
     for j in range(blocks.shape[0]):
-        begin, last = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
+        before, begin, last = BEFORE + j * BLOCK - 1, BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
         # cell by cell, so that these are vector instructions, and then their sums
-        _integrals(h, s, (terms[0], terms[1]), begin, BLOCK, mean, square)
+        _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
             above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
@@ -131,46 +140,50 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
             squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
-    return Nodes(h, s, terms, blocks, top)
 
 
 @compiled
 def _integrals(
     h: FloatArray,
     s: FloatArray,
-    ends: tuple[FloatArray, FloatArray],
-    first: int,
+    of_height: FloatArray,
+    of_square: FloatArray,
     cells: int,
     mean: FloatArray,
     square: FloatArray,
 ) -> None:
-    """Write the integrals of the height and of the slope squared over cells; `square` is one longer."""
-    of_height, of_square = ends
+    """Write the integrals of the height and of the slope squared over cells; `square` is one longer.
+
+    Nodes are given from the one before the first cell on: what is counted from there needs no look for its sign.
+    Without exact ends there is, at every node, what Euler and Maclaurin add to the trapezium: the derivatives come from
+    heights and slopes at the nodes beside, and over a whole line the terms cancel.
+    """
     if of_height.size > 0:
         for k in range(cells):
-            i = first + k
-            mean[k] = 0.5 * (h[i] + h[i + 1]) + of_height[i] - of_height[i + 1]
-            square[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + of_square[i] - of_square[i + 1]
+            mean[k] = 0.5 * (h[k + 1] + h[k + 2]) + of_height[k + 1] - of_height[k + 2]
+            square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + of_square[k + 1] - of_square[k + 2]
         return
     for k in range(cells + 1):
-        square[k] = _end_term(h, s, first + k)
+        rise, fall = h[k + 2] - h[k], (h[k + 2] - h[k + 1]) - (h[k + 1] - h[k])
+        tilt, bow = s[k + 2] + s[k], s[k + 2] - s[k]
+        second, third, fourth = 2 * fall - 0.5 * bow, 7.5 * rise - 1.5 * (tilt + 8 * s[k + 1]), 6 * bow - 12 * fall
+        square[k] = s[k + 1] * second / 6 - (s[k + 1] * fourth + 3 * second * third) / 360
     for k in range(cells):
-        i = first + k
-        mean[k] = 0.5 * (h[i] + h[i + 1]) + (s[i] - s[i + 1]) / 12
-        square[k] = 0.5 * (s[i] * s[i] + s[i + 1] * s[i + 1]) + square[k] - square[k + 1]
+        mean[k] = 0.5 * (h[k + 1] + h[k + 2]) + (s[k + 1] - s[k + 2]) / 12
+        square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
 
 
 @compiled
-def _peaks(h: FloatArray, s: FloatArray, first: int, cells: int, peak: FloatArray) -> None:
-    """Write the highest point of cells."""
+def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
+    """Write the highest point of cells, from the second node on."""
     for k in range(cells):
-        i = first + k
-        rise = h[i + 1] - h[i]
-        a, b = 3 * rise - 2 * s[i] - s[i + 1], s[i] + s[i + 1] - 2 * rise
-        inside = a * a - 3 * s[i] * b
-        x = s[i] / ((math.sqrt(inside) if inside > 0 else 0.0) - a)
+        h0, h1, s0, s1 = h[k + 1], h[k + 2], s[k + 1], s[k + 2]
+        rise = h1 - h0
+        a, b = 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise
+        inside = a * a - 3 * s0 * b
+        x = s0 / ((math.sqrt(inside) if inside > 0 else 0.0) - a)
         x = x if (x > 0) & (x < 1) else 0.0
-        top, ends = h[i] + x * (s[i] + x * (a + x * b)), max(h[i], h[i + 1])
+        top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
         peak[k] = top if top > ends else ends
 
 
@@ -189,18 +202,17 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
         Written, row by row: heights and slopes, a node before the first one and one behind the last one too; integrals
         of the height and of the slope squared over each cell, and its highest point.
     """
-    refinement = weights.shape[1]
+    refinement, h, s = weights.shape[1], tile[HEIGHT], tile[SLOPE]
     # exact ones stand at the nodes of the line only
     here = first - 1 if refinement == 1 else line.ends.shape[1]
-    ends = line.ends[0, here:], line.ends[1, here:]
     if refinement == 1:
-        copy_into(tile[HEIGHT, : cells + 3], line.height[first - 1 : first + cells + 2])
-        copy_into(tile[SLOPE, : cells + 3], line.slope[first - 1 : first + cells + 2])
+        copy_into(h, line.height[first - 1 : first + cells + 2])
+        copy_into(s, line.slope[first - 1 : first + cells + 2])
     else:
-        refine(line, first, cells, weights, tile[HEIGHT], tile[SLOPE])
+        refine(line, first, cells, weights, h, s)
     cells *= refinement
-    _integrals(tile[HEIGHT], tile[SLOPE], ends, 1, cells, tile[MEAN], tile[SQUARE])
-    _peaks(tile[HEIGHT], tile[SLOPE], 1, cells, tile[TOP])
+    _integrals(h, s, line.ends[0, here:], line.ends[1, here:], cells, tile[MEAN], tile[SQUARE])
+    _peaks(h, s, cells, tile[TOP])
     return cells
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import copy_into, kernel
+from mdr_dask.physics.compiling import compiled
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.cases import Cases, Steady
 from mdr_dask.physics.sliding.nodes import (
@@ -30,6 +30,8 @@ from mdr_dask.physics.sliding.nodes import (
     weights,
 )
 from mdr_dask.physics.sliding.walk import (
+    BEGAN,
+    CLOSED,
     DEBORAH,
     DEPTH,
     LANES,
@@ -39,7 +41,7 @@ from mdr_dask.physics.sliding.walk import (
     RATE,
     ROWS,
     STRETCH,
-    closed,
+    U,
     load_case,
     sweep,
 )
@@ -121,9 +123,35 @@ class Search(NamedTuple):
     results: FloatArray
 
 
-@kernel
+class _Workspace(NamedTuple):
+    """What a search works in: a tile of the line, the states of `walk`, queues, and what the last sweep has found."""
+
+    tile: FloatArray
+    states: FloatArray
+    queue: NDArray[np.int64]
+    lanes: NDArray[np.int64]
+    last_step: FloatArray
+    last: FloatArray
+    now: FloatArray
+    rate: FloatArray
+
+    @classmethod
+    def on(cls, refinement: int) -> _Workspace:
+        """Return one for a grid."""
+        tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
+        last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
+        return cls(tile, np.empty(ROWS * LANES), queue, lanes, last_step, last, now, rate)
+
+
+@compiled
 def _solve(
-    line: Nodes, weights: FloatArray, rise: float, cases: Cases, bounds: tuple[float, float], search: Search
+    line: Nodes,
+    weights: FloatArray,
+    rise: float,
+    cases: Cases,
+    bounds: tuple[float, float],
+    search: Search,
+    place: _Workspace,
 ) -> None:
     """Find the states of cases on a grid by Newton steps; the last one is taken without another sweep.
 
@@ -141,26 +169,27 @@ def _solve(
         Bounds of the last relative step of the depth and of what it costs.
     search : Search
         Read and written.
+    place : _Workspace
+        On this grid.
     """
     deborah, loads = cases
     near_step, trusted = bounds
     depths, rates, results = search
     refinement = weights.shape[1]
     n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
-    workspace, tile = np.empty(ROWS * LANES), np.empty((IN_A_TILE, cells + 3))
-    queue, lanes = np.empty(LANES, np.int64), np.empty(LANES, np.int64)
-    last_step, last, now, rate = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty(SECANTS), np.empty(SECANTS)
+    workspace, lanes = place.states, place.lanes
+    last_step, last, now, rate = place.last_step, place.last, place.now, place.rate
+    settings = SETTINGS
     for begin in range(0, loads.size, LANES):
         count = min(LANES, loads.size - begin)
         for k in range(count):
             lanes[k] = begin + k
-            last_step[k], last[k] = np.nan, np.nan
+            last_step[k] = np.nan
             load_case(workspace, k, depths[begin + k] - rise, deborah[begin + k] * n, cells)
-            results[begin + k] = np.nan
-        for _ in range(SETTINGS.iterations):
+        for _ in range(settings.iterations):
             if count == 0:
                 break
-            sweep(line, weights, tile, workspace, queue, count)
+            sweep(line, weights, place.tile, workspace, place.queue, count)
             kept = 0
             for k in range(count):
                 case = lanes[k]
@@ -173,22 +202,24 @@ def _solve(
                 for j in range(SECANTS):
                     rate[j] = (1 - last[k, j] / now[j]) / last_step[k]
                     rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
-                    if size < SETTINGS.exact_step and not math.isfinite(rate[j]):
+                    if size < settings.exact_step and not math.isfinite(rate[j]):
                         rate[j] = 0.0
-                doubt = SETTINGS.doubted * abs(rate[DRAG] * step)
-                if size <= near_step and doubt <= trusted and closed(workspace, k):
+                doubt = settings.doubted * abs(rate[DRAG] * step)
+                closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
+                if size <= near_step and doubt <= trusted and closes:
                     depths[case] = depth + step
-                    copy_into(rates[case], rate)
                     for j in range(SECANTS):
+                        rates[case, j] = rate[j]
                         results[case, j] = now[j] * (1 + rate[j] * step)
-                        results[case, DOUBTS + j] = SETTINGS.doubted * abs(rate[j] * step) + SETTINGS.rounding
-                    results[case, DOUBT_OF_DEPTH] = (SETTINGS.doubted_rate + 0.5 * size) * abs(
+                        results[case, DOUBTS + j] = settings.doubted * abs(rate[j] * step) + settings.rounding
+                    results[case, DOUBT_OF_DEPTH] = (settings.doubted_rate + 0.5 * size) * abs(
                         step
-                    ) + SETTINGS.rounding * depth
+                    ) + settings.rounding * depth
                     continue
                 ahead = depth + step if step > -0.7 * depth else 0.3 * depth
                 last_step[kept], lanes[kept] = ahead - depth, case
-                copy_into(last[kept], now)
+                for j in range(SECANTS):
+                    last[kept, j] = now[j]
                 load_case(workspace, kept, ahead - rise, workspace[DEBORAH + k], cells)
                 kept += 1
             count = kept
@@ -215,8 +246,9 @@ def begin(
     search = Search(_shallow(loads), np.full((loads.size, SECANTS), np.nan), np.empty((loads.size, RESULTS)))
     highest, cases = int(np.argmax(height)), Cases(deborah, loads)
     for stride in reversed(strides):
+        search.results.fill(np.nan)
         line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
-        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search)
+        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search, _Workspace.on(1))
     coarse = _sampled(line.top, search._replace(rates=search.rates.copy()))
     cell, _, _ = highest_point(height, slope)
     line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
@@ -266,8 +298,8 @@ def _settled(
     """Return the steady states on a grid, searched for from some depths of the mean line on."""
     top = line.top + rise
     penetration = np.where(depths + top > 0, depths + top, _shallow(cases.loads))
-    search = Search(penetration, rates, np.empty((depths.size, RESULTS)))
-    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search)
+    search = Search(penetration, rates, np.full((depths.size, RESULTS), np.nan))
+    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search, _Workspace.on(refinement))
     return _sampled(top, search)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, fused, inlined
+from mdr_dask.physics.compiling import compiled, fused
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -267,32 +267,31 @@ def sweep(
     """
     refinement, blocks = weights.shape[1], line.blocks
     n = line.height.size - BEFORE - AFTER
-    # the summit, where every case touches, lies in the cell before the first one
     for k in range(count):
-        queue[k] = k
         w = workspace[DEPTH + k] + line.height[BEFORE - 1]
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
         workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
-    _walk_some(tile, fill(line, BEFORE - 1, 1, weights, tile), workspace, queue, count)
-    copy_into(workspace[BEGAN:CALM], workspace[U:FADE])
-    workspace[LOAD:DEPTH] = 0.0
-    for j in range(blocks.shape[0]):
-        first, end = BEFORE + j * BLOCK, BEFORE + (j + 1) * BLOCK
-        queued = _pass_block(blocks[j], line.height[end], refinement, workspace, count, queue)
+    # the summit, where every case touches, lies in the cell before the first one; then blocks, and what is left
+    first, cells = BEFORE - 1, 1
+    for j in range(blocks.shape[0] + 2):
+        if 0 < j <= blocks.shape[0]:
+            queued = _pass_block(blocks[j - 1], line.height[first + cells], refinement, workspace, count, queue)
+        else:
+            queued = count
+            for k in range(count):
+                queue[k] = k
         if queued > 0:
-            _walk_some(tile, fill(line, first, BLOCK, weights, tile), workspace, queue, queued)
-    first = blocks.shape[0] * BLOCK
-    for k in range(count):
-        queue[k] = k
-    _walk_some(tile, fill(line, BEFORE + first, n - first, weights, tile), workspace, queue, count)
-
-
-@compiled
-def _walk_some(tile: FloatArray, cells: int, workspace: FloatArray, queue: NDArray[np.int64], queued: int) -> None:
-    """Take the cases of a queue over the cells of a tile."""
-    for q in range(queued):
-        _walk(tile, cells, workspace, queue[q])
+            walked = fill(line, first, cells, weights, tile)
+            for q in range(queued):
+                _walk(tile, walked, workspace, queue[q])
+        if j == 0:
+            for k in range(count):
+                workspace[BEGAN + k] = workspace[U + k]
+            for k in range(LOAD, DEPTH):
+                workspace[k] = 0.0
+        first += cells
+        cells = min(BLOCK, BEFORE + n - first)
 
 
 @compiled
@@ -301,10 +300,3 @@ def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
-
-
-@inlined
-def closed(workspace: FloatArray, k: int) -> bool:
-    """Return whether a case ended its turn as it began it: not so where the first cell is not touched."""
-    same: bool = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
-    return same
