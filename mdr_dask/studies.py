@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import atexit
 import hashlib
-import json
 import shutil
 import tempfile
 import warnings
@@ -20,10 +19,11 @@ import xarray as xr
 
 from mdr_dask import aggregation, campaign, fits, plots, store
 from mdr_dask.campaign import Campaign
+from mdr_dask.campaign.keys import of_keys
+from mdr_dask.cli.checked import Understood, understood
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
-from mdr_dask.plan import Estimate, estimate
 from mdr_dask.questions import selection
 from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
@@ -59,13 +59,17 @@ def read(source: Source) -> Campaign:
     if isinstance(source, Campaign):
         return source
     if isinstance(source, Mapping):
-        text = json.dumps({"name": "study", **source}, indent=1, default=_plain)
-        return campaign.loads(text, "campaign", ".")
+        return of_keys(source)
     return campaign.load(source)
 
 
-def check(source: Source) -> Estimate:
-    """Check a campaign, and say what it will cost: cases, results, bytes, seconds, notes.
+def check(source: Source) -> Understood:
+    """Check a campaign, and say what was understood and what it will cost.
+
+    Returns
+    -------
+    Understood
+        Counts, bytes and seconds; printed, or at the end of a cell, it is the lines of ``mdr-dask check``.
 
     Raises
     ------
@@ -79,7 +83,7 @@ def check(source: Source) -> Estimate:
     >>> costs.cases
     2
     """
-    return estimate(read(source))
+    return understood(read(source))
 
 
 def run(
@@ -111,7 +115,7 @@ def run(
     Returns
     -------
     Dataset or DataTree
-        As `open_study` returns it. A warning says how many results failed.
+        As `open_study` returns it. Warnings ask about bare numbers far from the usual, and say how many results failed.
 
     Raises
     ------
@@ -128,6 +132,8 @@ def run(
     from mdr_dask.cli.progress import reporter
 
     found = read(source)
+    for question in found.remarks:
+        warnings.warn(question, stacklevel=2)
     url = str(store or _place(found, isinstance(source, Mapping) and "store" not in source))
     with reporter(not progress) as report:
         outcome = execute(found, url, resources or Resources(), report, retry_failed)
@@ -381,11 +387,6 @@ class StudyAccessor:
     def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""
         return plot(self._dataset, figure, select, **view)
-
-
-def _plain(value: Any) -> Any:
-    """Return numbers of numpy and paths as JSON holds them."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:

@@ -31,6 +31,7 @@ _WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*\Z")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
 _CELSIUS = ("C", "c", "°c", "ºC")
 _PRIMES = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''"})
+_COMMAS = " (put semicolons between the values if they have decimal commas)"
 NO_ROWS = "expected a line of names and at least one line of values"
 _MISSING = frozenset({"", "-", "nan", "na", "n/a"})
 
@@ -218,7 +219,9 @@ def read_sheet(text: str, source: str, numeric: bool = True) -> Sheet:
     uneven = [row for row in rows if len(row) != width]
     if uneven:
         what = f"expected {width} values as in line {rows[0][0].line}, got "
-        raise TableError(source, [Problem(row[0].line, 1, f"{what}{len(row)}") for row in uneven])
+        hints = [_COMMAS if separator == "," and width < len(row) <= 2 * width else "" for row in uneven]
+        told = [Problem(row[0].line, 1, f"{what}{len(row)}{hint}") for row, hint in zip(uneven, hints, strict=True)]
+        raise TableError(source, told)
     headings: list[tuple[Cell, ...]] = []
     if not any(_NUMBER.match(cell.text) for cell in rows[0]):
         headings.append(rows.pop(0))

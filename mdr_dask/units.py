@@ -93,7 +93,7 @@ _MEANINGS = {
     "Pa": ("a pressure", "10 MPa"),
     "1/Pa": ("an inverse pressure", "20 1/GPa"),
     "Pa s": ("a viscosity", "10 mPa s"),
-    "m^2/s": ("a diffusivity", "1 mm^2/s"),
+    "m^2/s": ("a kinematic viscosity", "100 mm^2/s"),
     "rad": ("an angle", "5 deg"),
     "rad/s": ("an angular frequency", "10 rad/s"),
     "K": ("a temperature", "300 K"),
@@ -329,9 +329,10 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
         zero, one = (units.Quantity(size, source).to(target).magnitude for size in (0.0, 1.0))
     except UndefinedUnitError as error:
         word = error.args[0] if isinstance(error.args[0], str) else next(iter(error.args[0]))
-        raise ValueError(f"unknown unit {word!r}{_nearest(word)}") from None
+        raise ValueError(f"unknown unit {word!r}{_nearest(word, unit if word == given.strip() else '')}") from None
     except DimensionalityError:
-        raise ValueError(f"expected {expected(unit)}") from None
+        weight = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
+        raise ValueError(f"expected {expected(unit)}{weight}") from None
     except Exception:  # pint's parser raises what its tokens happen to raise: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
     return (1.0, zero) if zero else (one, 0.0)
@@ -362,11 +363,13 @@ def _spelling(unit: str) -> str:
     return "" if unit == "1" else f"1{unit}" if unit.startswith("/") else unit
 
 
-def _nearest(word: str) -> str:
+def _nearest(word: str, unit: str = "") -> str:
+    """Return what to write in place of an unknown unit; one of the dimension of `unit`, if that is known."""
     if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
         return ", temperatures are in 'degC', '°C' or 'K'"
     power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
     if power and is_unit(power[1]):
         return f" (write {power[1]}^{power[2]})"
-    hint = did_you_mean(word, COMMON.split())
-    return hint if "mean" in hint else ""
+    common = COMMON.split()
+    hint = did_you_mean(word, [each for each in common if dimension_of(each) == dimension_of(unit)] if unit else common)
+    return hint if "mean" in hint else f", expected {expected(unit)}" if unit else ""

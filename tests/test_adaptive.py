@@ -236,7 +236,7 @@ def test_what_may_come_is_said_before(study, tmp_path, monkeypatch, capsys):
     assert main(["check", "c.yaml"]) == 0
     told = capsys.readouterr().out
     assert "1 mm to 1 km, 5 to 60 values, geometric, until y is interpolated within 1 % of its largest value" in told
-    assert "10 to 120 cases x 1 realisations = 10 to 120 results" in told
+    assert "10 to 120 cases x 1 realisation = 10 to 120 results" in told
     assert main(["run", "c.yaml", "--quiet"]) == 0
     capsys.readouterr()
     assert main(["run", "c.yaml", "--dry-run"]) == 0

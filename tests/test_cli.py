@@ -58,7 +58,7 @@ def test_run_then_run_again(campaign, capsys):
     assert main(["run", str(campaign)]) == 0
     first = capsys.readouterr()
     assert first.out == "results/small.zarr: 64 done, 0 failed\n"
-    assert "blocks" in first.err
+    assert "block" in first.err
     assert main(["run", str(campaign)]) == 0
     assert capsys.readouterr().out == "results/small.zarr: all 64 results are there already; nothing to do\n"
 

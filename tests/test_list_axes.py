@@ -58,6 +58,7 @@ def test_questions_and_figures_take_lists(tmp_path):
     assert main(["aggregate", url, "wear_volume", "--group-by", "history", "-o", csv]) == 0
     assert Path(csv).read_text().count("amplitude_factor") == 2
     assert main(["plot", url, "wear_volume", "--over", "history", "-o", figure]) == 0
+    assert "cycles" not in store.datasets(url)[""].coords  # a history replaces them
 
 
 ARMS = """
@@ -87,6 +88,7 @@ def test_lists_of_a_structure_vary_together(tmp_path):
 MISTAKES = [
     ("[[{cycles: 10}], {cycles: 5}]", "4:74: parameters.history: expected a list, got a mapping"),
     ("[[{cycles: 10}], [{cycles: 10.0}]]", "4:74: parameters.history: this value is given twice: [{cycles: 10.0}]"),
+    ("[[{cycles: 10}]], cycles: [1, 2]", "history takes the place of cycles: leave out one or the other"),
     ("[[{cycles: 10}], [{cycles: -1}]]", "4:84: parameters.history[0].cycles: expected a number of at least 0, got -1"),
 ]
 

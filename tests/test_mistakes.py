@@ -72,6 +72,12 @@ MISTAKES = [
     ("1 ms", "1 Hz", "11:20: parameters.relaxation_time: expected a time (such as '1 ms'), got '1 Hz'"),
     ("[0.1 N, 1 N]", "[0.1 Newtn]", "unknown unit 'Newtn' (did you mean 'newton'?), got '0.1 Newtn'"),
     ("{geometric: [1 mm/s,", "{geometric: [1 kmh,", "unknown unit 'kmh' (did you mean 'km/h'?), got '1 kmh'"),
+    (
+        "10 MPa",
+        "10 grad",
+        "10:18: parameters.shear_modulus: unknown unit 'grad', expected a pressure (such as '10 MPa')",
+    ),
+    ("[0.1 N, 1 N]", "10 kg", "expected a force (such as '1 mN') (1 kg weighs 9.81 N), got '10 kg'"),
     # ranges
     (VELOCITY, "1 mm/s, 1 m/s", f"{VELOCITIES} '1 mm/s, 1 m/s' {SEVERAL}"),
     (VELOCITY, "1 mm/s to 1 m/s", f"{VELOCITIES} '1 mm/s to 1 m/s' {SEVERAL}"),
@@ -96,6 +102,8 @@ MISTAKES = [
     ("hurst: 0.7", "material: {dma: rubber.csv}", "dma: unknown key (did you mean 'dma_table'?)"),
     ("hurst: 0.7", "surface: road.txt", "expected a mapping, got 'road.txt' (write|{profile: road.txt}"),
     ("accuracy: 1 %", "measured: rig.csv", "measured: expected a mapping, got 'rig.csv' (write {table: rig.csv})"),
+    ("hurst: 0.7", "surface: {profile: no.csv}", "no.csv (names begin at the folder of the campaign file)"),
+    ("hurst: 0.7", "surface: {profile: README.ms}", "README.ms (did you mean 'README.md'?)"),
     # bodies
     (
         "hurst: 0.7",

@@ -141,8 +141,23 @@ def test_an_interrupted_cell_goes_on_where_it_stopped(tmp_path, monkeypatch):
     assert (resumed.status == 1).all()
 
 
+def test_check_prints_what_the_command_prints(tmp_path):
+    asked = {**SMALL, "parameters": {**SMALL["parameters"], "velocity": [1, 2], "shear_modulus": 10}}
+    found = mdr_dask.check(asked)
+    assert (found.cases, found.results) == (4, 24)
+    campaign = tmp_path / "study.yaml"
+    campaign.write_text(mdr_dask.read(asked).text)
+    command = [sys.executable, "-m", "mdr_dask", "check", str(campaign)]
+    told = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert repr(found).splitlines()[1:-1] == told.stdout.splitlines()[1:]
+    assert found.questions[0].startswith("parameters.shear_modulus: 10 is read as 10 Pa")
+    assert found.questions[0] in told.stderr
+    with pytest.warns(UserWarning, match="shear_modulus"):
+        mdr_dask.run(asked, tmp_path / "asked.zarr", progress=False)
+
+
 REFUSED = [
-    (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key"),
+    (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key (did"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
     (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
     (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study, got a Dataset without"),
@@ -154,6 +169,7 @@ def test_exceptions_say_what_the_command_line_says(call, error, told):
     with pytest.raises(error) as refused:
         call()
     assert told in str(refused.value)
+    assert "campaign:" not in str(refused.value)
 
 
 def test_unknown_laws_and_figures_are_one_sentence(study):

@@ -96,7 +96,10 @@ WRONG = {
         "2:5: column temperature: expected a value above 0, got '-300 C'",
     ),
     "overflow": ("f [Hz],E' [MPa]\n1,1e305\n", "2:3: $expected a finite number"),
-    "decimal comma in commas": ("f [Hz],E' [Pa]\n1,5,2\n", "2:1: expected 2 values as in line 1, got 3"),
+    "decimal comma in commas": (
+        "f [Hz],E' [Pa]\n1,5,2\n",
+        "2:1: expected 2 values as in line 1, got 3 (put semicolons between the values if they have decimal commas)",
+    ),
     "too wide": (
         ",".join("x" * 2000) + "\n" + ",".join("1" * 2000) + "\n",
         "1:1: expected at most 1000 columns, got 2000",

@@ -20,9 +20,9 @@ LONG = {20000: 64, 50000: 64, 97200: 32, 200000: 32}  # points, and oversampling
 ROUNDING = 1e-9
 
 
-def solve(hurst, points, force, reach, realisation, oversampling, accuracy=0.01):
-    """Return the outputs of cases on one line, one for every force and reach."""
-    force, reach = np.atleast_1d(force), np.atleast_1d(reach)
+def solve(hurst, points, force, deborah, realisation, oversampling, accuracy=0.01):
+    """Return the outputs of cases on one line, one for every force and Deborah number."""
+    force, deborah = np.atleast_1d(force), np.atleast_1d(deborah)
     parameters = SlidingFriction(
         length=1.0,
         points=points,
@@ -32,10 +32,10 @@ def solve(hurst, points, force, reach, realisation, oversampling, accuracy=0.01)
         shear_modulus=1.0,
         relaxation_time=1.0,
         normal_force=float(force[0]),
-        velocity=float(reach[0]),
+        velocity=float(deborah[0]),
     )
     outputs = OUTPUTS if oversampling == "auto" else OUTPUTS[:1]
-    columns = {"normal_force": force, "velocity": reach}
+    columns = {"normal_force": force, "velocity": deborah}
     return MODEL.compute(Block(parameters, columns, force.size, (realisation,), 1, outputs, accuracy)).values
 
 
@@ -57,10 +57,10 @@ def honesty(cases=500, accuracy=0.01, seed=0):
         if fine:
             points, force = int(generator.choice([9000, 30000])), 10 ** generator.uniform(0, 2)
         slope = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
-        reach = 10 ** generator.uniform(-2, 3) / slope if k % 5 else 10 ** generator.uniform(-8, 2)
+        deborah = 10 ** generator.uniform(-2, 3) / slope if k % 5 else 10 ** generator.uniform(-8, 2)
         line = 1000 * seed + k
-        found = solve(hurst, points, force, reach, line, "auto", accuracy)
-        exact = solve(hurst, points, force, reach, line, 64 if fine else 128)
+        found = solve(hurst, points, force, deborah, line, "auto", accuracy)
+        exact = solve(hurst, points, force, deborah, line, 64 if fine else 128)
         errors[k], estimates[k] = (column.item() for column in judged(found, exact))
     return summary(errors, estimates)
 
@@ -70,10 +70,10 @@ def long_lines(hurst, points, lines=8, accuracy=0.01, seed=0, speeds=20):
     generator = np.random.default_rng((seed, points))
     columns = []
     for line in range(lines):
-        reach = 5e-2 * 10 ** generator.uniform(-4, 3, speeds)
+        deborah = 5e-2 * 10 ** generator.uniform(-4, 3, speeds)
         force = np.where(np.arange(speeds) % 2, 15.0, 10 ** generator.uniform(0, 2, speeds))
-        found = solve(hurst, points, force, reach, 1000 * seed + line, "auto", accuracy)
-        columns.append(judged(found, solve(hurst, points, force, reach, 1000 * seed + line, LONG[points])))
+        found = solve(hurst, points, force, deborah, 1000 * seed + line, "auto", accuracy)
+        columns.append(judged(found, solve(hurst, points, force, deborah, 1000 * seed + line, LONG[points])))
     errors, estimates = np.concatenate(columns, axis=1)
     return *summary(errors, estimates), float(np.mean(errors <= accuracy))
 
@@ -85,8 +85,8 @@ def light_planes(cases=400, accuracies=(0.05, 0.01, 0.002), seed=0):
         hurst = float(generator.choice([0, 1, generator.uniform(), generator.uniform()]))
         points = int(generator.choice([74, 100, 500, 1274, 2000]))
         force, slow = 10 ** generator.uniform(-6, 0), 10 ** generator.uniform(-6, np.log10(0.3))
-        reach = slow / roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
-        case = hurst, points, force, reach, 1000 * seed + k
+        deborah = slow / roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
+        case = hurst, points, force, deborah, 1000 * seed + k
         exact = solve(*case, 128)
         rows.append([judged(solve(*case, "auto", accuracy), exact) for accuracy in accuracies])
     return np.moveaxis(np.array(rows)[..., 0], 0, -1)

@@ -43,8 +43,8 @@ def line_and_body(generator, rough, on_plane):
 
 def kelvin_case(generator, rough, on_plane):
     line, force, slope = line_and_body(generator, rough, on_plane)
-    reach = 10 ** generator.uniform(-2, 3) / slope if generator.uniform() < 0.8 else 10 ** generator.uniform(-8, 2)
-    kelvin = {"shear_modulus": 1.0, "relaxation_time": 1.0, "normal_force": force, "velocity": float(reach)}
+    deborah = 10 ** generator.uniform(-2, 3) / slope if generator.uniform() < 0.8 else 10 ** generator.uniform(-8, 2)
+    kelvin = {"shear_modulus": 1.0, "relaxation_time": 1.0, "normal_force": force, "velocity": float(deborah)}
     return SlidingFriction(**line, **kelvin)
 
 

@@ -24,21 +24,21 @@ GRIDS = (1, 2, 4, 8, 16, 32)
 LINES, POINTS, REPEATS = 10, 1000, 3
 
 
-def by_scheme(height, slope, reach, load, scheme):
+def by_scheme(height, slope, deborah, load, scheme):
     solve = sliding.stepped_sliding if scheme == "backward_euler" else sliding.steady_sliding
-    return solve(periodic_line(height, slope if scheme == "hermite" else None), reach, load)
+    return solve(periodic_line(height, slope if scheme == "hermite" else None), deborah, load)
 
 
 def measure(hurst, force, velocity):
     """Return {scheme: [(oversampling, rms relative error, seconds a case)]}."""
     amplitude = roughness.amplitudes(POINTS // 2, hurst)
-    reach = np.array([velocity / roughness.spectral_slope(amplitude)])
+    deborah = np.array([velocity / roughness.spectral_slope(amplitude)])
     load = np.array([force / 4])
 
     def solve(realisation, grid, scheme):
         phase = roughness.phases(0, realisation, POINTS // 2)
         height, slope = (roughness.line(amplitude, phase, POINTS * grid, order) for order in (0, 1))
-        found, seconds = timed(by_scheme, height, slope, reach, load, scheme, calls=REPEATS)
+        found, seconds = timed(by_scheme, height, slope, deborah, load, scheme, calls=REPEATS)
         return found.drag[0], seconds
 
     exact = np.array([solve(line, 128, "hermite")[0] for line in range(LINES)])

@@ -12,10 +12,10 @@ POINTS = 1000
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
-@pytest.mark.parametrize("reach", [0.002, 0.02])
-def test_bench_jump(benchmark, hurst, reach):
+@pytest.mark.parametrize("deborah", [0.002, 0.02])
+def test_bench_jump(benchmark, hurst, deborah):
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(1, 0, POINTS // 2)
     line = periodic_line(*(roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1)))
     course = Course(np.geomspace(1e-4, 20, 40), np.pi * POINTS, 12)
-    found = benchmark(velocity_jump, line, 0.3, (reach, 1.2 * reach), course)
+    found = benchmark(velocity_jump, line, 0.3, (deborah, 1.2 * deborah), course)
     assert found.outcome == Outcome.CONVERGED

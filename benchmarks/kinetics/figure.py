@@ -21,8 +21,8 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
-POINTS, HURST, LOAD, REACH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
-LAW = (REACH * np.pi * POINTS) ** (1 - HURST)
+POINTS, HURST, LOAD, DEBORAH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
+LAW = (DEBORAH * np.pi * POINTS) ** (1 - HURST)
 WINDOWS = 0.3, 1.0, 8 / LAW
 LAST = 6.0
 FULL_RATE, NO_RATE = 0, 1
@@ -118,7 +118,7 @@ def stepped(height: np.ndarray, way: int, last: float) -> tuple[np.ndarray, np.n
     """Return times and mu - mu_2 of backward Euler with steps of one cell."""
     n = height.size
     height = np.roll(height, -1 - int(np.argmax(height)))
-    cells = np.array([REACH * n])
+    cells = np.array([DEBORAH * n])
     depth = steady_by_steps(height - height[-1], True, cells, np.array([LOAD * n]))[0][0] - height[-1]
     u, now, fade = np.empty(n), depth + height[-1], 1 / (1 + 1 / cells[0])
     for i in range(n):
@@ -134,7 +134,7 @@ def graded(amplitude: np.ndarray, phase: np.ndarray, times: np.ndarray) -> np.nd
     nodes = 4 * POINTS
     line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
     course = Course(times, np.pi * POINTS, 12)
-    jump = velocity_jump(periodic_line(*line), LOAD, (REACH, REACH * (1 + CHANGE)), course)
+    jump = velocity_jump(periodic_line(*line), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), course)
     trace: np.ndarray = (jump.trace - jump.after) / LOAD
     return trace
 
@@ -182,7 +182,7 @@ def rates_of(time: np.ndarray, lines: np.ndarray) -> list[np.ndarray]:
 def lines_of(count: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Return times and mu - mu_2 of every line by every way."""
     amplitude = roughness.amplitudes(POINTS // 2, HURST)
-    cell = 1 / (REACH * (1 + CHANGE) * POINTS)
+    cell = 1 / (DEBORAH * (1 + CHANGE) * POINTS)
     early, uniform = np.append(0.0, np.geomspace(1e-4, LAST, 60)), np.arange(1, int(LAST / cell)) * cell
     times: dict[str, np.ndarray] = {}
     traces: dict[str, list[np.ndarray]] = {}

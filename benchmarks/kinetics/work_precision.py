@@ -10,6 +10,7 @@ fine grids, and the two results are extrapolated at second order.
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 from numba import njit
@@ -17,11 +18,13 @@ from numba import njit
 from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.follow import follow_kelvin
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
 
-POINTS, REACH, CHANGE, LOAD, RUN_IN = 500, 0.05, 0.2, 0.3, 10.0
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from references.followed_kelvin import follow_kelvin
+
+POINTS, DEBORAH, CHANGE, LOAD, RUN_IN = 500, 0.05, 0.2, 0.3, 10.0
 TIMES = np.geomspace(0.01, 3, 20)
 FINEST = 16
 
@@ -35,13 +38,13 @@ def line(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
 
 def march(oversampling: int, per_decade: float) -> np.ndarray:
     course = Course(TIMES, np.pi * POINTS, per_decade)
-    found = velocity_jump(periodic_line(*line(oversampling)), LOAD, (REACH, REACH * (1 + CHANGE)), course)
+    found = velocity_jump(periodic_line(*line(oversampling)), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), course)
     return (found.trace - found.after) / found.after
 
 
 def steps(nodes: int) -> tuple[np.ndarray, int]:
     """Return moments of fixed steps of one cell at v_2, from rest to the last time, and the number before the jump."""
-    step = 1 / nodes / (REACH * (1 + CHANGE))
+    step = 1 / nodes / (DEBORAH * (1 + CHANGE))
     before, after = int(RUN_IN / step), int(RUN_IN / step)
     return step * np.arange(before + after + 1), before
 
@@ -50,13 +53,13 @@ def followed(oversampling: int) -> np.ndarray:
     """Follow every element, pressed at rest, at v_1 for 10 tau and at v_2 for 10 tau."""
     height, slope = line(oversampling)
     moments, before = steps(height.size)
-    jump, reach = moments[before], REACH * (1 + CHANGE)
-    reaches = np.where(moments <= jump, REACH, reach)
-    travels = np.minimum(moments, jump) * REACH + np.maximum(moments - jump, 0) * reach
+    jump, deborah = moments[before], DEBORAH * (1 + CHANGE)
+    deborahs = np.where(moments <= jump, DEBORAH, deborah)
+    travels = np.minimum(moments, jump) * DEBORAH + np.maximum(moments - jump, 0) * deborah
     depth = rest_depth(height)
     pressed = np.maximum(height + depth, 0)
     state = follow_kelvin(
-        height, slope, Schedule(moments, travels, reaches, np.full(moments.size, LOAD)), pressed, depth
+        height, slope, Schedule(moments, travels, deborahs, np.full(moments.size, LOAD)), pressed, depth
     )
     return at_times(moments - jump, state.drag)
 
@@ -108,12 +111,12 @@ def backward_euler(height: np.ndarray, ratios: np.ndarray, depth: float, load: f
 def papers(oversampling: int) -> np.ndarray:
     """March from rest at v_1 for 10 tau and at v_2 for 10 tau, with steps of one cell."""
     height, _ = line(oversampling)
-    n, reach = height.size, REACH * (1 + CHANGE)
-    before, after = int(RUN_IN * REACH * n), int(RUN_IN * reach * n)
-    ratios = np.repeat([REACH * n, reach * n], [before, after])
+    n, deborah = height.size, DEBORAH * (1 + CHANGE)
+    before, after = int(RUN_IN * DEBORAH * n), int(RUN_IN * deborah * n)
+    ratios = np.repeat([DEBORAH * n, deborah * n], [before, after])
     drag = np.empty(ratios.size)
     backward_euler(height, ratios, rest_depth(height), LOAD, drag)
-    return at_times((np.arange(ratios.size) - before + 1) / (reach * n), drag)
+    return at_times((np.arange(ratios.size) - before + 1) / (deborah * n), drag)
 
 
 def main() -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from references.areal import areal_surface
 from scipy.optimize import brentq
 
 from benchmarks.accuracy.points import Point
@@ -125,7 +124,7 @@ def by_lines() -> np.ndarray:
 def rough() -> Iterator[Point]:
     """Yield the largest error of the stiffness of one rough punch; everything beyond the punch is far below."""
     place = (np.arange(PUNCH) + 0.5) / PUNCH - 0.5
-    surface = punches.HEIGHT * areal_surface(punches.spectrum(HURST, PUNCH), (PUNCH, PUNCH), (1.0, 1.0), 1, 0)
+    surface = punches.HEIGHT * punches.areal_surface(punches.spectrum(HURST, PUNCH), (PUNCH, PUNCH), (1.0, 1.0), 1, 0)
     surface[np.hypot(place[:, None], place) >= 0.5] = -1.0
 
     def depths(press, tolerance):

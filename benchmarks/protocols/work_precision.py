@@ -22,7 +22,7 @@ from mdr_dask.physics.transients.elements.follow import follow_line, steady_star
 from mdr_dask.physics.transients.elements.foundation import KELVIN, foundation
 from mdr_dask.physics.transients.elements.steps import Schedule
 
-POINTS, REACH, CHANGE, LOAD = 100, 0.1, 0.2, 0.3
+POINTS, DEBORAH, CHANGE, LOAD = 100, 0.1, 0.2, 0.3
 TIMES = np.concatenate([np.geomspace(0.05, 0.95, 10), 1 + np.geomspace(0.05, 0.95, 10)])
 SOLIDS = {
     "Kelvin": KELVIN,
@@ -51,7 +51,7 @@ def followed(under, solid, cells: float) -> np.ndarray:
     nodes = under.height.size - 1
     state, depth, _ = steady_start(under, solid, 0.0, LOAD)
     travel, drags = 0.0, []
-    for begin, speed in ((0.0, REACH), (1.0, REACH * (1 + CHANGE))):
+    for begin, speed in ((0.0, DEBORAH), (1.0, DEBORAH * (1 + CHANGE))):
         moments = phase_moments(begin, speed, nodes, cells)
         one, wanted = np.ones(moments.size), TIMES[(begin < TIMES) & (begin + 1 > TIMES)]
         way = travel + speed * (moments - begin)
@@ -62,7 +62,7 @@ def followed(under, solid, cells: float) -> np.ndarray:
 
 
 @njit
-def _euler(height, slope, moduli, times, viscosity, load, reaches, moments, drags):
+def _euler(height, slope, moduli, times, viscosity, load, deborahs, moments, drags):
     """Take steps of one cell: forces are linear in u_new, and a_new = (a + b u) / (1 + b) with b = dt / tau."""
     n = height.size
     depth, now, travel = 0.0, 0.0, 0
@@ -71,7 +71,7 @@ def _euler(height, slope, moduli, times, viscosity, load, reaches, moments, drag
     for m in range(moduli.size):
         arms[:, m] = start
     under, grade, free = np.empty(n), np.empty(n), np.empty(n)
-    for speed in reaches:
+    for speed in deborahs:
         step = 1 / (n * speed)
         b = step / times
         stiff = 1 + viscosity / step + (moduli / (1 + b)).sum()
@@ -99,10 +99,10 @@ def _euler(height, slope, moduli, times, viscosity, load, reaches, moments, drag
 
 def backward_euler(under, solid) -> np.ndarray:
     """Return the drag at `TIMES` by backward Euler in steps of one cell."""
-    reaches = np.array([REACH, REACH * (1 + CHANGE)])
+    deborahs = np.array([DEBORAH, DEBORAH * (1 + CHANGE)])
     moments, drags = np.empty((2, under.height.size))
     slope = under.enter * under.enter.size
-    count = _euler(under.height[:-1], slope, solid.moduli, solid.times, solid.viscosity, LOAD, reaches, moments, drags)
+    count = _euler(under.height[:-1], slope, solid.moduli, solid.times, solid.viscosity, LOAD, deborahs, moments, drags)
     first = moments[:count] <= 1 + 1e-9
     parts = [(first, TIMES < 1), (~first, TIMES > 1)]
     return np.concatenate([np.interp(TIMES[t], moments[:count][rows], drags[:count][rows]) for rows, t in parts])

@@ -133,8 +133,9 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
     kept = f"{progress.kept} kept, " if progress.kept else ""
     spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
     click.echo(f"{what}: {kept}{progress.done} done, {progress.failed} failed{spared}")
+    blocks = "1 block" if progress.blocks == 1 else f"{progress.blocks} blocks"
     click.echo(
-        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {progress.blocks} blocks, "
+        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {blocks}, "
         f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
         err=True,
     )

@@ -78,10 +78,11 @@ def spacing(values: tuple[float, ...]) -> str:
 def cost_lines(costs: Estimate) -> Iterator[str]:
     """Yield counts, size and time of a study, from the first round to the last one that there may be."""
     more = costs.rounds
-    each = _range(costs.realisations, costs.at_most / costs.realisations)
-    yield f"{_range(costs.cases, costs.growth)} cases x {each} realisations = {_range(costs.results, more)} results"
-    yield f"{_range(costs.solves, more)} solves remain after sharing, in {_range(costs.blocks, more)} blocks"
-    yield f"about {_range(costs.files, more)} files in the store"
+    cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
+    yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
+    solves, remain = _counted("solve", costs.solves, more), "remain" if costs.solves * more > 1 else "remains"
+    yield f"{solves} {remain} after sharing, in {_counted('block', costs.blocks, more)}"
+    yield f"about {_counted('file', costs.files, more)} in the store"
     sizes = " to ".join(dict.fromkeys(human_bytes(count * costs.bytes) for count in (1, more)))
     times = " to ".join(dict.fromkeys(seconds(START + count * costs.seconds) for count in (1, more)))
     compiling = f"; compiling, the first time, about {seconds(costs.compiling)} more" if costs.compiling else ""
@@ -134,6 +135,7 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
     ]
 
 
-def _range(first: int, more: float) -> str:
-    """Return a count of the first round, and what it comes to at most."""
-    return f"{first}" if more == 1 else f"{first} to {round(first * more)}"
+def _counted(what: str, first: int, more: float) -> str:
+    """Return a count of the first round, and what it comes to at most, with its noun."""
+    last = round(first * more)
+    return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"

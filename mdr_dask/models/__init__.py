@@ -67,6 +67,8 @@ def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
     except ModuleNotFoundError as error:
         hint = "install its package, or put its folder on PYTHONPATH" if module.startswith(str(error.name)) else error
         raise ModelError(f"cannot import {module!r} for model {name!r}: {hint}") from None
+    except AttributeError as error:
+        raise ModelError(f"cannot load model {name!r}: {error} (expected module:NAME of a Model)") from None
     except Exception as error:
         raise ModelError(f"cannot load model {name!r}: {type(error).__name__}: {error}") from None
     if not isinstance(found, Model):

@@ -41,12 +41,13 @@ class Parameters(BaseModel):
 
     `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
     parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
-    ones inside structures, that are given together.
+    ones inside structures, that are given together. `replaced` has parameters, and the one whose place each takes.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
     gone: ClassVar[Mapping[str, str]] = {}
     ways: ClassVar[tuple[Ways, ...]] = ()
+    replaced: ClassVar[Mapping[str, str]] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -62,6 +63,11 @@ class Parameters(BaseModel):
             given = {name for way in ways for name in way if getattr(self, name) is not None}
             if not any(given == set(way) for way in ways):
                 raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+
+    @property
+    def idle(self) -> dict[str, str]:
+        """The parameters that have no say, each with the one that takes its place."""
+        return {other: name for name, other in self.replaced.items() if getattr(self, name) not in (None, ())}
 
 
 @lru_cache(maxsize=256)

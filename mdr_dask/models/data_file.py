@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.tables import decoded, described
 
 #: Bytes of a file beyond which it is no table to tell of.
@@ -60,7 +60,9 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
     directory = info.context["directory"] if info.context else "."
     path = Path(directory, value).resolve()
     if not path.is_file():
-        raise ValueError(f"no such file: {path}")
+        hint = did_you_mean(path.name, [each.name for each in Path(directory).iterdir() if each.is_file()])
+        near = hint if "mean" in hint else " (names begin at the folder of the campaign file)"
+        raise ValueError(f"no such file: {path}{near}")
     return DataFile(name=value, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
 
 

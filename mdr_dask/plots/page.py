@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.units import to_si
 
 #: Letters and lines of a figure whose size is asked for, in points: journals print it as it is.
@@ -70,7 +70,9 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
     from matplotlib.style import context, library
 
     if file is not None and not (Path(file).is_file() or file in library):
-        raise DataError(f"no style file of matplotlib, and none of its own styles: {file!r}")
+        hint = did_you_mean(file, [*library])
+        near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
+        raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {file!r}")
     token = _PAGE.set(asked)
     try:
         with rc_context(LETTERS if asked.width else {}), context([file] if file else []):

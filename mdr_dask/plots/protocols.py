@@ -34,8 +34,8 @@ def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
     return case, VelocityJump.model_validate(curves.parameters_at(case)), told
 
 
-def course(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return times in units of tau from before the course to `last`, with the velocity and the load then, in SI."""
+def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times in units of tau from before the loading history to `last`, with velocity and load then, in SI."""
     unit = case.time_unit()
     before, parts = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
     columns = [np.array([[-BEFORE * last, 0.0], [before, before], [case.normal_force, case.normal_force]])]
@@ -70,7 +70,7 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
             drawing.law(top, [0, last], [after, after], of=values, color="0.5", ls=":", lw=1, label=steady)
         top.set_title(name or case.protocol.shape, fontsize="small")
         top.set_ylabel(label)
-        time, speed, force = course(case, last)
+        time, speed, force = loading_history(case, last)
         for axes, row, name, colour in zip(below, (speed, force), DRIVEN, style.COLOURS[1:], strict=False):
             like = values.get(name)  # absent where the history has it in its own numbers
             row = style.quantity(name, like).of(row)

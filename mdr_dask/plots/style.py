@@ -27,6 +27,8 @@ LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 #: Panels of one figure that can still be read.
 MOST_PANELS = 6
+#: Most of the height of a figure that its title takes before it is printed smaller.
+TITLE_SHARE = 0.2
 #: Characters to an inch in letters of one point.
 SMALL_PRINT = 120
 #: What everything drawn carries as its gid: data and their bars, laws, and guides, which stand in no table.
@@ -169,9 +171,16 @@ def plain(text: str) -> str:
 
 
 def title(figure: Figure, subject: str, *fixed: str) -> None:
-    """Write the subject of a figure over it, and in small print what is held fixed and what bars mean."""
-    lines = [line for text in (subject, *fixed) if text for line in _wrapped(figure, text)]
-    figure.suptitle("\n".join(lines), fontsize="medium")
+    """Write the subject of a figure over it, what is held fixed and what bars mean; in smaller print the more it is."""
+    from matplotlib import rcParams
+    from matplotlib.font_manager import font_scalings
+
+    for size in ("medium", "small", "x-small"):
+        lines = [line for text in (subject, *fixed) if text for line in _wrapped(figure, text, font_scalings[size])]
+        height = 1.2 / 72 * float(rcParams["font.size"]) * font_scalings[size] * len(lines)
+        if height <= TITLE_SHARE * figure.get_figheight():
+            break
+    figure.suptitle("\n".join(lines), fontsize=size)
 
 
 def leave_out(figure: Figure, sentences: Iterable[str]) -> None:
@@ -195,9 +204,9 @@ def _letters() -> float:
     return SMALL_PRINT / float(rcParams["font.size"])
 
 
-def _wrapped(figure: Figure, text: str) -> list[str]:
+def _wrapped(figure: Figure, text: str, size: float = 1.0) -> list[str]:
     """Return lines as wide as a figure, counted as they are seen; a value stays with its symbol and its unit."""
-    most = max(30, int(_letters() * figure.get_figwidth()))
+    most = max(30, int(_letters() / size * figure.get_figwidth()))
     joined = re.sub(r" = (\S+) (?=[^\s,;]+(?:[,;)]|$))", "\u00a0=\u00a0\\1\u00a0", text).replace(" = ", "\u00a0=\u00a0")
     return [line.replace("\u00a0", " ") for line in broken(joined, most).split("\n")]
 

@@ -47,13 +47,13 @@ class Judge:
         assert max(ratios) < WORST
 
 
-def kelvin(reach):
-    return Body(np.empty(0), np.empty(0), reach), {"shear_modulus": 1.0, "relaxation_time": reach}
+def kelvin(deborah):
+    return Body(np.empty(0), np.empty(0), deborah), {"shear_modulus": 1.0, "relaxation_time": deborah}
 
 
-def series(moduli, reaches, dashpot):
-    prony = {"static_modulus": 1.0, "moduli": tuple(moduli), "times": tuple(reaches), "viscosity": dashpot}
-    return Body(np.array(moduli), np.array(reaches), dashpot), {"material": {"prony": prony}}
+def series(moduli, deborahs, dashpot):
+    prony = {"static_modulus": 1.0, "moduli": tuple(moduli), "times": tuple(deborahs), "viscosity": dashpot}
+    return Body(np.array(moduli), np.array(deborahs), dashpot), {"material": {"prony": prony}}
 
 
 def decades(low, high):

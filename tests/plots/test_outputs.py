@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 from drawn import check_picture, mismatches, rows, stored
 from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
 
 from mdr_dask.errors import DataError
 from mdr_dask.plots import curves, page, style
@@ -231,3 +232,11 @@ def test_what_is_held_is_held_in_the_middle_or_where_the_best_is(best, place, sa
         assert [sentence.startswith(start) for sentence, start in zip(sentences, (said, "3 of 4"), strict=True)]
     nowhere = xr.DataArray(np.full(5, np.nan), dims="a")
     assert curves.hold(data, ["a"], nowhere)[0]["a"].item() == 2
+
+
+def test_a_long_title_is_small_print_that_leaves_room_for_the_curves():
+    figure = Figure(figsize=(3.35, 2.9), layout="constrained")
+    axes = figure.subplots()
+    style.title(figure, "friction against velocity", ", ".join(f"parameter {k} = {k} mm" for k in range(12)), "bars")
+    figure.draw_without_rendering()
+    assert axes.get_window_extent().height > 0.5 * figure.bbox.height

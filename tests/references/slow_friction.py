@@ -19,10 +19,10 @@ COARSEST, WORK = 2**12, 2**22  # cells to begin with, and cells times arms in th
 
 @dataclass(frozen=True)
 class Body:
-    """A linear solid as a line of length 1 passes by: static modulus 1, arms with their reaches, and the dashpot's."""
+    """A linear solid as a line of length 1 passes by: static modulus 1, arms and dashpot with their Deborah numbers."""
 
     moduli: np.ndarray
-    reaches: np.ndarray
+    deborahs: np.ndarray
     dashpot: float
 
 
@@ -36,10 +36,10 @@ class Reference:
 
 
 @njit
-def _coefficients(step, reaches, keep, hold, gain):
+def _coefficients(step, deborahs, keep, hold, gain):
     """Write what an arm keeps over a step, takes of the displacement before, and of a displacement that grows by 1."""
-    for m in range(reaches.size):
-        x = step / reaches[m]
+    for m in range(deborahs.size):
+        x = step / deborahs[m]
         keep[m] = np.exp(-x)
         gain[m] = 1 + np.expm1(-x) / x if x > 1e-4 else 0.5 * x - x * x / 6
         hold[m] = -np.expm1(-x)
@@ -70,22 +70,22 @@ def _move(before, u, keep, hold, gain, arms):
 
 
 @njit
-def _loss(before, u, step, moduli, reaches, dashpot, arms_before, arms):
+def _loss(before, u, step, moduli, deborahs, dashpot, arms_before, arms):
     """Return what arms and dashpot lose in a step in which the displacement is a straight line."""
     speed = (u - before) / step
     lost = dashpot * speed * speed * step
     for m in range(moduli.size):
         first, last = before - arms_before[m], u - arms[m]
-        if reaches[m] > step:
-            lost += moduli[m] * step / reaches[m] * (first * first + first * last + last * last) / 3
+        if deborahs[m] > step:
+            lost += moduli[m] * step / deborahs[m] * (first * first + first * last + last * last) / 3
         else:
-            moved = reaches[m] * (arms[m] - arms_before[m])
+            moved = deborahs[m] * (arms[m] - arms_before[m])
             lost += moduli[m] * (speed * moved - 0.5 * (last * last - first * first))
     return lost
 
 
 @njit
-def _pass(w, moduli, reaches, dashpot, arms, fresh, u, sums):
+def _pass(w, moduli, deborahs, dashpot, arms, fresh, u, sums):
     """Follow an element from node to node; sums are integrals of u and of the loss, and nodes in contact at the ends.
 
     What the arms would be had they come with nothing is in `fresh`.
@@ -93,7 +93,7 @@ def _pass(w, moduli, reaches, dashpot, arms, fresh, u, sums):
     whole = 1 / (w.size - 1)
     keep, hold, gain = np.empty(moduli.size), np.empty(moduli.size), np.empty(moduli.size)
     part_keep, part_hold, part_gain = np.empty(moduli.size), np.empty(moduli.size), np.empty(moduli.size)
-    _coefficients(whole, reaches, keep, hold, gain)
+    _coefficients(whole, deborahs, keep, hold, gain)
     old = np.empty(moduli.size)
     sums[:] = 0.0
     fresh[:] = 0.0
@@ -107,21 +107,21 @@ def _pass(w, moduli, reaches, dashpot, arms, fresh, u, sums):
             used_keep, used_hold, used_gain = part_keep, part_hold, part_gain
             flight = min((u - w[i - 1]) / (u - w[i - 1] + w[i] - free + 1e-300), 0.999999)
             step = flight * whole
-            _coefficients(step, reaches, part_keep, part_hold, part_gain)
+            _coefficients(step, deborahs, part_keep, part_hold, part_gain)
             free = _free(u, step, moduli, dashpot, part_keep, part_hold, part_gain, arms)
             old[:] = arms
             _move(u, free, part_keep, part_hold, part_gain, arms)
             _move(u, free, part_keep, part_hold, part_gain, fresh)
             sums[0] += 0.5 * step * (u + free)
-            sums[1] += _loss(u, free, step, moduli, reaches, dashpot, old, arms)
+            sums[1] += _loss(u, free, step, moduli, deborahs, dashpot, old, arms)
             u, step = free, whole - step
-            _coefficients(step, reaches, part_keep, part_hold, part_gain)
+            _coefficients(step, deborahs, part_keep, part_hold, part_gain)
         then = w[i] if touching else free
         old[:] = arms
         _move(u, then, used_keep, used_hold, used_gain, arms)
         _move(u, then, used_keep, used_hold, used_gain, fresh)
         sums[0] += 0.5 * step * (u + then)
-        sums[1] += _loss(u, then, step, moduli, reaches, dashpot, old, arms)
+        sums[1] += _loss(u, then, step, moduli, deborahs, dashpot, old, arms)
         sums[2] += touching and (i == 1 or i == w.size - 1)
         u, was = then, touching
     return u
@@ -137,15 +137,15 @@ def _ahead(states, images):
 
 def _solved(w, body, periodic, arms):
     """Return load and loss of a line of nodes, or None where the state is not found or leaves the line."""
-    moduli, reaches, sums, fresh = body.moduli, body.reaches, np.zeros(3), np.empty(body.moduli.size)
-    solid = moduli, reaches, body.dashpot
+    moduli, deborahs, sums, fresh = body.moduli, body.deborahs, np.zeros(3), np.empty(body.moduli.size)
+    solid = moduli, deborahs, body.dashpot
     if not periodic:
         arms[:] = 0.0
         u = _pass(w, *solid, arms, fresh, 0.0, sums)
         # beyond the line what is stored is lost, and the integral of u is what dashpot and arms hold
-        beyond = body.dashpot * u + moduli @ (reaches * arms)
+        beyond = body.dashpot * u + moduli @ (deborahs * arms)
         return None if sums[2] else (sums[0] + beyond, sums[1] + _energy(u, moduli, arms))
-    lost = -np.expm1(-1 / reaches)
+    lost = -np.expm1(-1 / deborahs)
     u, states, images = max(w[0], 0.0), [], []
     for _ in range(TURNS):
         began, u_began = arms.copy(), u

@@ -126,6 +126,7 @@ class FrettingWear(Parameters):
             ("stick_radius",),
         ),
     )
+    replaced: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
@@ -215,6 +216,9 @@ class FrettingWear(Parameters):
     def _history(self) -> FrettingWear:
         if self.history and self.wear_rule != "exact":
             raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
+        for other, name in self.idle.items():
+            if getattr(self, other) != type(self).model_fields[other].default:
+                raise ValueError(f"{name} takes the place of {other}: leave out one or the other")
         return self
 
     def notes(self) -> tuple[str, ...]:
@@ -293,7 +297,7 @@ def units(parameters: FrettingWear) -> dict[str, str]:
 _SOLVE = "mdr_dask.models.fretting_wear.solve"
 MODEL = Model(
     name="fretting_wear",
-    version=5,
+    version=6,
     summary="fretting wear of bodies of revolution: exact, by the fast rule, and in the limit",
     parameters=FrettingWear,
     outputs=OUTPUTS,

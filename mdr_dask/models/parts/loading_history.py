@@ -26,15 +26,15 @@ class Jump(Parameters):
     shape: Literal["jump"] = "jump"
 
 
-class _Course(Parameters):
-    """What every other course has."""
+class _History(Parameters):
+    """What every other loading history has."""
 
     start: Literal["steady", "rest"] = Field(
         default="steady", description="before t = 0: slides steadily at `velocity`, or rests, under `normal_force`"
     )
 
 
-class Steps(_Course):
+class Steps(_History):
     """Velocity and load that are constant between times."""
 
     shape: Literal["steps"]
@@ -48,7 +48,7 @@ class Steps(_Course):
         return self
 
 
-class Ramp(_Course):
+class Ramp(_History):
     """Velocity and load that change linearly from t = 0 on, and are constant then."""
 
     shape: Literal["ramp"]
@@ -57,7 +57,7 @@ class Ramp(_Course):
     force: float | None = quantity("N", "normal force at its end; else the same", default=None, gt=0)
 
 
-class Oscillation(_Course):
+class Oscillation(_History):
     """A velocity that oscillates about `velocity`, and perhaps a load about `normal_force`."""
 
     shape: Literal["oscillation"]
@@ -66,7 +66,7 @@ class Oscillation(_Course):
     force_amplitude: float = quantity("N", "amplitude of the normal force, below it", default=0.0, ge=0)
 
 
-class TableFile(_Course):
+class TableFile(_History):
     """Velocity and load from a table, linear between its rows; two rows of the same time are a jump."""
 
     shape: Literal["table"]
@@ -96,12 +96,12 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
 
 
 def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[float, list[Piece]]:
-    """Return the velocity before t = 0, and the course from there on for ever.
+    """Return the velocity before t = 0, and the loading history from there on for ever.
 
     Raises
     ------
     DataError
-        If a table does not hold a course.
+        If a table does not hold a loading history.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 

@@ -29,7 +29,7 @@ class VelocityJump(SlidingBody):
     )
     steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
-    protocol: Protocol = Field(default=Jump(), description="the course of velocity and load from t_0 = 0 on")
+    protocol: Protocol = Field(default=Jump(), description="loading history: velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
         "1", "times (t - t_0) / tau at which friction is wanted", default=TIMES, strict=False, min_length=2
     )
@@ -87,7 +87,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=7,
+    version=8,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

@@ -6,7 +6,7 @@ becomes ``gamma G`` (Wear 19, 91).
 
 The asperities are the springs of the MDR: a line as long as its longest wave stands for a square of that edge, and
 its springs of stiffness ``E* dx`` carry ``E* dx`` times their overlap. Squares side by side are alike, so their mean
-pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach until the room left between
+pressure is ``E*/wavelength`` times the mean overlap of the two lines. The lines approach until the gap left between
 them is the film: ``<(d - z)+> = h`` with d the distance of their means; above two rms heights d and h are the same.
 Heights are Gaussian.
 """
@@ -25,7 +25,7 @@ _NEGLIGIBLE = 1e-9
 _LEAST_LOGARITHM = -256.0
 #: Greatest lack of balance of the load, over the tolerance.
 _BALANCE = 100.0
-#: Distance of the means of two lines in rms heights at which there is no room left in double precision.
+#: Distance of the means of two lines in rms heights at which there is no gap left in double precision.
 _CLOSED = -37.0
 #: Greatest number of Newton steps to a distance; five are usual.
 _MOST_STEPS = 100
@@ -38,18 +38,18 @@ def mean_overlap(distance: float) -> float:
     return max(exp(-(distance**2) / 2) / sqrt(2 * pi) - distance * erfc(distance / sqrt(2)) / 2, 0.0)
 
 
-def distance_of_means(room: float) -> float:
-    """Return the distance d of the means, in rms heights, at which ``<(d - z)+>`` is the room given."""
-    if room > _APART:
-        return room
-    # the room at d is the overlap at -d; its logarithm is concave in d, so Newton comes from the left without fail
-    if mean_overlap(-_CLOSED) >= room:
+def distance_of_means(gap: float) -> float:
+    """Return the distance d of the means, in rms heights, at which ``<(d - z)+>`` is the mean gap given."""
+    if gap > _APART:
+        return gap
+    # the gap at d is the overlap at -d; its logarithm is concave in d, so Newton comes from the left without fail
+    if mean_overlap(-_CLOSED) >= gap:
         return _CLOSED
     middle = mean_overlap(0.0)
-    distance = room if room > middle else max(-sqrt(2 * log(middle / room)), _CLOSED)
+    distance = gap if gap > middle else max(-sqrt(2 * log(middle / gap)), _CLOSED)
     for _ in range(_MOST_STEPS):
         left = mean_overlap(-distance)
-        step = 2 * left / erfc(-distance / sqrt(2)) * log(left / room)
+        step = 2 * left / erfc(-distance / sqrt(2)) * log(left / gap)
         distance -= step
         if abs(step) < 1e-13 * (1 + abs(distance)):
             break

@@ -73,8 +73,8 @@ class Lanes(NamedTuple):
     ----------
     state : array, shape (ROWS, cases)
         `U` and `FADE` end as u and its derivative at the end of the line.
-    near : array, shape (ROWS + 2, cases + LANES)
-        The state of the cases of a queue, with their decay and depth.
+    packed : array, shape (ROWS + 2, cases + LANES)
+        The state of the cases of the queue, with their decay and depth.
     queue : array, shape (cases,)
         Cases that touch or leave in a block.
     sums : array, shape (SUMS, cases)
@@ -82,7 +82,7 @@ class Lanes(NamedTuple):
     """
 
     state: FloatArray
-    near: FloatArray
+    packed: FloatArray
     queue: IntArray
     sums: FloatArray
 
@@ -90,8 +90,8 @@ class Lanes(NamedTuple):
 @kernel
 def lanes_for(cases: int) -> Lanes:
     """Return the workspace of a sweep."""
-    near = np.empty((ROWS + 2, cases + LANES))
-    return Lanes(np.empty((ROWS, cases)), near, np.empty(cases, np.int64), np.empty((SUMS, cases)))
+    packed = np.empty((ROWS + 2, cases + LANES))
+    return Lanes(np.empty((ROWS, cases)), packed, np.empty(cases, np.int64), np.empty((SUMS, cases)))
 
 
 @compiled
@@ -184,22 +184,22 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
 def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
     """Take the cases of the queue from node to node, together."""
     decay, depth = moving.decay, moving.depth
-    workspace, near, queue, sums = lanes
+    workspace, packed, queue, sums = lanes
     for q in range(queued):
         k = queue[q]
-        near[U, q], near[FADE, q] = workspace[U, k], workspace[FADE, k]
-        near[ROWS, q], near[ROWS + 1, q] = decay[k], depth[k]
-        near[LOAD, q] = near[RATE, q] = near[LOSS, q] = 0.0
+        packed[U, q], packed[FADE, q] = workspace[U, k], workspace[FADE, k]
+        packed[ROWS, q], packed[ROWS + 1, q] = decay[k], depth[k]
+        packed[LOAD, q] = packed[RATE, q] = packed[LOSS, q] = 0.0
     # full vectors are quicker than the rest of one
     full = -(-queued // LANES) * LANES
-    near[:, queued:full] = 0.0
-    _walk(height, rise, near[ROWS, :full], near[ROWS + 1, :full], near)
+    packed[:, queued:full] = 0.0
+    _walk(height, rise, packed[ROWS, :full], packed[ROWS + 1, :full], packed)
     for q in range(queued):
         k = queue[q]
-        workspace[U, k], workspace[FADE, k] = near[U, q], near[FADE, q]
-        sums[CARRIED, k] += near[LOAD, q]
-        sums[STIFFNESS, k] += near[RATE, q]
-        sums[DRAG, k] += near[LOSS, q]
+        workspace[U, k], workspace[FADE, k] = packed[U, q], packed[FADE, q]
+        sums[CARRIED, k] += packed[LOAD, q]
+        sums[STIFFNESS, k] += packed[RATE, q]
+        sums[DRAG, k] += packed[LOSS, q]
 
 
 @compiled

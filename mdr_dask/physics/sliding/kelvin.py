@@ -66,7 +66,7 @@ class Places(NamedTuple):
 
 @kernel
 def places_for(patches: int) -> Places:
-    """Return room for the places of some patches."""
+    """Return arrays for the places of some patches."""
     return Places(np.empty(patches), np.empty(patches))
 
 

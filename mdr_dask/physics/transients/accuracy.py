@@ -32,6 +32,8 @@ class Settings(NamedTuple):
     of_others, of_contact : float
         Of the larger relative change of friction before and after, and of that of the length in contact: two grids may
         agree by chance in one number.
+    of_ends : float
+        Of the larger error of friction before and after, for their difference at the jump.
     of_transient : float
         Of the change of the transient from half the nodes and half the steps.
     few, of_few, of_a_peak : float
@@ -47,6 +49,7 @@ class Settings(NamedTuple):
     of_change_before: float = 0.1
     of_others: float = 0.5
     of_contact: float = 0.1
+    of_ends: float = 0.1
     of_transient: float = 2.0
     few: float = 20.0
     of_few: float = 0.3
@@ -195,7 +198,7 @@ def _refined(problem: JumpProblem, aim: JumpAim, coarse: Ends, fine: Ends) -> tu
     """Return the levels on the coarsest grid on which all that are wanted meet the accuracy, and their errors."""
     points, oversampling, allowed = problem.line.points, aim.oversampling, aim.accuracy or 0.0
     levels, change = np.stack(Levels.of(fine)), _change(coarse, fine)
-    errors = np.maximum(SETTINGS.of_first_change * change, _least(fine, points, oversampling)) * np.abs(levels)
+    errors = _errors(SETTINGS.of_first_change * change, _least(fine, points, oversampling), levels)
     wanted = np.array([name in aim.levels for name in Levels._fields])
     while oversampling < SETTINGS.finest:
         late = ~(errors <= allowed * np.abs(levels)) & wanted[:, None]
@@ -208,10 +211,17 @@ def _refined(problem: JumpProblem, aim: JumpAim, coarse: Ends, fine: Ends) -> tu
         change[:, missing] = _change(near, finer)
         levels[:, missing] = np.stack(Levels.of(finer))
         known = np.maximum(SETTINGS.of_change * change[:, missing], SETTINGS.of_change_before * before)
-        known = np.maximum(known, _least(finer, points, oversampling))
-        errors[:, missing] = known * np.abs(levels[:, missing])
+        errors[:, missing] = _errors(known, _least(finer, points, oversampling), levels[:, missing])
         fine = fine.replaced(missing, finer)
     return Levels(*levels), Levels(*errors)
+
+
+def _errors(change: FloatArray, least: FloatArray, levels: FloatArray) -> FloatArray:
+    """Return absolute errors of levels from what counts of their relative changes; the jump shares that of its ends."""
+    errors = np.maximum(change, least) * np.abs(levels)
+    before, jump, after = (Levels._fields.index(name) for name in ("before", "jump", "after"))
+    errors[jump] = np.maximum(errors[jump], SETTINGS.of_ends * np.maximum(errors[before], errors[after]))
+    return errors
 
 
 def _change(coarse: Ends, fine: Ends) -> FloatArray:

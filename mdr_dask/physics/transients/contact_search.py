@@ -71,7 +71,7 @@ class Workspace(NamedTuple):
 
 
 def workspace_for(patches: int, barriers: Barriers) -> Workspace:
-    """Return room for a number of patches and some more, with the barriers of a Deborah number."""
+    """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
     return Workspace(start, end, np.zeros(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS), barriers)

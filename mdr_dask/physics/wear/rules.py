@@ -239,11 +239,14 @@ def _between(bracket: Bracket) -> float:
 
 @inlined
 def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
-    """Return the bracket with one more value, by the Illinois rule of false position."""
+    """Return the bracket with one more value, by the rule of Anderson and Björck: the end that stays loses weight."""
     low, low_value, high, high_value, newer = bracket
+    before = low_value if value > 0.0 else high_value
+    share = 1.0 - value / before
+    share = share if share > 0.0 else 0.5
     if value > 0.0:
-        return Bracket(x, value, high, 0.5 * high_value if newer == -1 else high_value, -1)
-    return Bracket(low, 0.5 * low_value if newer == 1 else low_value, x, value, 1)
+        return Bracket(x, value, high, share * high_value if newer == -1 else high_value, -1)
+    return Bracket(low, share * low_value if newer == 1 else low_value, x, value, 1)
 
 
 @inlined

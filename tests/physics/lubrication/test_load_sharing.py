@@ -1,4 +1,4 @@
-"""Load shared by film and asperities: sums of Gaussian heights, the balance, its limits, and the room between lines."""
+"""Load shared by film and asperities: sums of Gaussian heights, the balance, its limits, and the gap between lines."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ def test_mean_overlap_is_the_integral_over_gaussian_heights(distance: float) -> 
     assert mean_overlap(distance) == pytest.approx(by_quadrature, rel=1e-8)
 
 
-@pytest.mark.parametrize("room", [1e-100, 1e-12, 1e-3, 0.3989, 1.0, 3.0, 8.999, 9.001, 40.0, 1e6])
-def test_room_between_the_lines_is_the_film(room: float) -> None:
-    distance = distance_of_means(room)
-    assert mean_overlap(-distance) == pytest.approx(room, rel=1e-9)
-    assert distance <= room
-    if room >= 3:
-        assert distance == pytest.approx(room, rel=2e-4)  # far apart, the film is the distance
+@pytest.mark.parametrize("gap", [1e-100, 1e-12, 1e-3, 0.3989, 1.0, 3.0, 8.999, 9.001, 40.0, 1e6])
+def test_gap_between_the_lines_is_the_film(gap: float) -> None:
+    distance = distance_of_means(gap)
+    assert mean_overlap(-distance) == pytest.approx(gap, rel=1e-9)
+    assert distance <= gap
+    if gap >= 3:
+        assert distance == pytest.approx(gap, rel=2e-4)  # far apart, the film is the distance
 
 
 def test_every_film_has_a_distance() -> None:
-    rooms = np.geomspace(1e-300, 1e3, 4000)
-    distances = np.array([distance_of_means(float(room)) for room in rooms])
+    gaps = np.geomspace(1e-300, 1e3, 4000)
+    distances = np.array([distance_of_means(float(gap)) for gap in gaps])
     assert np.all(np.diff(distances) >= 0)
 
 
 def test_pressure_is_that_of_the_springs_of_two_lines() -> None:
-    """MDR springs of two generated lines, pressed until the room between them is the film: E* times overlap."""
+    """MDR springs of two generated lines, pressed until the gap between them is the film: E* times overlap."""
     points = 400_000
     amplitude = RMS / np.sqrt(2) * roughness.amplitudes(40_000, 0.7, longest=300.0)
     phase = roughness.phases(7, 0, 80_000).reshape(-1, 2)

@@ -20,22 +20,22 @@ def rough(modes=100, hurst=0.7, oversampling=4, realisation=0, seed=1):
     return height, slope, roughness.spectral_slope(amplitude)
 
 
-def friction(height, slope, reach, load, scheme):
-    reaches, loads = np.broadcast_arrays(np.atleast_1d(reach).astype(float), np.atleast_1d(load).astype(float))
-    steady = on_line(height, slope, reaches, loads, scheme)
+def friction(height, slope, deborah, load, scheme):
+    deborahs, loads = np.broadcast_arrays(np.atleast_1d(deborah).astype(float), np.atleast_1d(load).astype(float))
+    steady = on_line(height, slope, deborahs, loads, scheme)
     assert np.all(steady.status == Outcome.CONVERGED)
     return steady.drag / loads
 
 
-def march(height, reach, depth, turns=3):
+def march(height, deborah, depth, turns=3):
     """Step elements through the line in time by backward Euler, without any trick of the solver."""
-    n, decay = height.size, reach * height.size / (1 + reach * height.size)
+    n, decay = height.size, deborah * height.size / (1 + deborah * height.size)
     u = 0.0
     for _ in range(turns):
         normal = drag = 0.0
         for i in range(n):
             w, free = height[i] + depth, decay * u
-            force = w + reach * n * (w - u) if w > free else 0.0
+            force = w + deborah * n * (w - u) if w > free else 0.0
             normal += force / n
             drag += force * (height[i] - height[i - 1])
             u = max(w, free)
@@ -43,24 +43,24 @@ def march(height, reach, depth, turns=3):
 
 
 @pytest.mark.parametrize("hurst", [0, 0.7, 1])
-@pytest.mark.parametrize("reach", [1e-5, 1e-3, 1e-1])
+@pytest.mark.parametrize("deborah", [1e-5, 1e-3, 1e-1])
 @pytest.mark.parametrize("load", [0.01, 0.3, 5.0])
-def test_backward_euler_agrees_with_time_stepping(hurst, reach, load):
+def test_backward_euler_agrees_with_time_stepping(hurst, deborah, load):
     height, _, _ = rough(50, hurst, 1)
-    steady = on_line(height, None, np.array([reach]), np.array([load]), "backward_euler")
-    normal, drag = march(height, reach, steady.depth[0], turns=3 + int(20 * reach))
+    steady = on_line(height, None, np.array([deborah]), np.array([load]), "backward_euler")
+    normal, drag = march(height, deborah, steady.depth[0], turns=3 + int(20 * deborah))
     # both do the same arithmetic in another order
     assert normal == pytest.approx(load, rel=1e-10)
     assert drag == pytest.approx(steady.drag[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("reach", [1e-3, 1e-1])
+@pytest.mark.parametrize("deborah", [1e-3, 1e-1])
 @pytest.mark.parametrize("load", [0.1, 2.0])
-def test_exact_sweep_agrees_with_fine_time_steps(reach, load):
+def test_exact_sweep_agrees_with_fine_time_steps(deborah, load):
     height, slope, _ = rough(20, 0.7, 32)
-    best = friction(height, slope, reach, load, "hermite")[0]
+    best = friction(height, slope, deborah, load, "hermite")[0]
     fine, _, _ = rough(20, 0.7, 2048)
-    coarse, finer = (friction(line, None, reach, load, "backward_euler")[0] for line in (fine[::2], fine))
+    coarse, finer = (friction(line, None, deborah, load, "backward_euler")[0] for line in (fine[::2], fine))
     # first order: one Richardson step removes the error of the time steps but for terms of second order
     assert best == pytest.approx(2 * finer - coarse, rel=2e-3)
 
@@ -68,21 +68,21 @@ def test_exact_sweep_agrees_with_fine_time_steps(reach, load):
 @pytest.mark.parametrize("hurst", [0, 0.5, 1])
 def test_full_contact_is_exact(hurst):
     height, slope, gradient = rough(500, hurst, 2)
-    reach = np.geomspace(1e-9, 1e-2, 8)
-    load = 2 * np.max(np.abs(height)) + 2 * reach * np.max(np.abs(slope))
+    deborah = np.geomspace(1e-9, 1e-2, 8)
+    load = 2 * np.max(np.abs(height)) + 2 * deborah * np.max(np.abs(slope))
     # thesis eq. 3.14: F_x / (4 G) = v tau grad^2 for a line of unit length
-    expected = reach * gradient**2 / load
-    assert friction(height, slope, reach, load, "hermite") == pytest.approx(expected, rel=1e-10)
+    expected = deborah * gradient**2 / load
+    assert friction(height, slope, deborah, load, "hermite") == pytest.approx(expected, rel=1e-10)
 
 
 @pytest.mark.parametrize("scheme", EXACT)
 @pytest.mark.parametrize("load", [1e-3, 0.1, 2.0])
 def test_friction_has_no_floor_at_low_velocity(scheme, load):
     height, slope, _ = rough(200, 0.3)
-    reach = np.geomspace(1e-14, 1e-6, 9)
-    mu = friction(height, slope, reach, load, scheme)
+    deborah = np.geomspace(1e-14, 1e-6, 9)
+    mu = friction(height, slope, deborah, load, scheme)
     # v -> 0: mu / v tends to a constant; the slowest are 1e8 times slower than the fastest
-    assert mu[:-1] / reach[:-1] == pytest.approx(mu[0] / reach[0], rel=1e-3)
+    assert mu[:-1] / deborah[:-1] == pytest.approx(mu[0] / deborah[0], rel=1e-3)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -97,18 +97,18 @@ def test_load_is_met_by_the_displacement_marched_at_the_depth_found(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_heights_scale_out(scheme):
     height, slope, _ = rough(100, 0.7)
-    reach, load = np.geomspace(1e-5, 1e1, 7), 0.4
-    one = friction(height, slope, reach, load, scheme)
-    scaled = friction(height * 1e-6, slope * 1e-6, reach, load * 1e-6, scheme) * 1e6
+    deborah, load = np.geomspace(1e-5, 1e1, 7), 0.4
+    one = friction(height, slope, deborah, load, scheme)
+    scaled = friction(height * 1e-6, slope * 1e-6, deborah, load * 1e-6, scheme) * 1e6
     assert scaled == pytest.approx(one, rel=1e-7)
 
 
 @pytest.mark.parametrize(("scheme", "order"), [("backward_euler", 0.8), ("piecewise_linear", 1.8), ("hermite", 2.5)])
 def test_order_of_convergence(scheme, order):
     lines = {factor: rough(50, 0.7, factor)[:2] for factor in (4, 16, 64)}
-    reach, load = np.geomspace(1e-4, 1e-1, 7), 0.5
-    mu = {factor: friction(*line, reach, load, scheme) for factor, line in lines.items()}
-    reference = friction(*lines[64], reach, load, "hermite")
+    deborah, load = np.geomspace(1e-4, 1e-1, 7), 0.5
+    mu = {factor: friction(*line, deborah, load, scheme) for factor, line in lines.items()}
+    reference = friction(*lines[64], deborah, load, "hermite")
     errors = [np.sqrt(np.mean((mu[factor] / reference - 1) ** 2)) for factor in (4, 16)]
     assert np.log(errors[0] / errors[1]) / np.log(4) > order
 
@@ -124,17 +124,17 @@ def test_bad_numbers_are_a_status():
 
 
 @pytest.mark.parametrize("load", [0.05, 2.0])
-@pytest.mark.parametrize("reach", [1e-3, 1e-1, 10.0])
-def test_friction_is_the_energy_lost(load, reach):
+@pytest.mark.parametrize("deborah", [1e-3, 1e-1, 10.0])
+def test_friction_is_the_energy_lost(load, deborah):
     """F_x = 4 G v tau times the integral of u'^2, with u marched finely as the running maximum of w exp(s / v tau)."""
     height, slope, _ = rough(30, 0.7, 400)
-    steady = on_line(height, slope, np.array([reach]), np.array([load]))
+    steady = on_line(height, slope, np.array([deborah]), np.array([load]))
     n, w = height.size, height + steady.depth[0]
-    decay, u = np.exp(-1 / (reach * n)), np.empty(2 * n)
+    decay, u = np.exp(-1 / (deborah * n)), np.empty(2 * n)
     u[0] = max(w[0], 0.0)
     for i in range(1, 2 * n):
         u[i] = max(w[i % n], decay * u[i - 1])
-    lost = reach * np.sum(np.diff(u[n - 1 :]) ** 2) * n
+    lost = deborah * np.sum(np.diff(u[n - 1 :]) ** 2) * n
     # the running maximum at the nodes is first order where u turns: 12000 nodes
     assert steady.drag[0] == pytest.approx(lost, rel=5e-3)
     assert np.mean(u[n:]) == pytest.approx(load, rel=1e-3)
@@ -152,9 +152,9 @@ def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
     h0, t0 = np.repeat(height, fine), np.repeat(rise, fine)
     h1, t1 = np.repeat(np.roll(height, -1), fine), np.repeat(np.roll(rise, -1), fine)
     dense = h0 * (1 + 2 * x) * (1 - x) ** 2 + h1 * x**2 * (3 - 2 * x) + t0 * x * (1 - x) ** 2 - t1 * x**2 * (1 - x)
-    reaches, loads = (grid.ravel() for grid in np.meshgrid(10.0 ** np.arange(-3, 2), [0.05, 0.5, 2.0, 5.0]))
-    ours = on_line(height, rise * n, reaches, loads)
-    reference = on_line(dense, None, reaches, loads, "piecewise_linear")
+    deborahs, loads = (grid.ravel() for grid in np.meshgrid(10.0 ** np.arange(-3, 2), [0.05, 0.5, 2.0, 5.0]))
+    ours = on_line(height, rise * n, deborahs, loads)
+    reference = on_line(dense, None, deborahs, loads, "piecewise_linear")
     assert np.all(ours.status == 0)
     # second order of the reference, and its shorter contacts at light loads
     assert ours.depth == pytest.approx(reference.depth, rel=1e-5, abs=1e-5)
@@ -166,11 +166,11 @@ def test_touching_and_leaving_several_times_in_a_cell(seed, monkeypatch):
 def test_time_steps_by_blocks_are_those_node_by_node(hurst):
     n = 1100  # four blocks and a rest
     height = roughness.line(roughness.amplitudes(n // 2, hurst), roughness.phases(3, 0, n // 2), n)
-    reaches, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
-    found = on_line(height, None, reaches, loads, "backward_euler")
+    deborahs, loads = (grid.ravel() for grid in np.meshgrid([1e-5, 1e-3, 0.1, 10.0], [0.01, 1.0, 4.0]))
+    found = on_line(height, None, deborahs, loads, "backward_euler")
     assert np.all(found.status == 0)
     line = np.roll(height, -1 - int(np.argmax(height)))
-    decay = reaches * n / (1 + reaches * n)
+    decay = deborahs * n / (1 + deborahs * n)
     u, total, drag = line[-1] + found.depth, 0.0, 0.0
     for before, here in zip(np.roll(line, 1), line, strict=True):
         now = np.maximum(here + found.depth, decay * u)

@@ -13,8 +13,8 @@ SCHEMES = ("hermite", "piecewise_linear", "backward_euler")
 exponents = st.floats(-15, 15)
 
 
-def solve(height, slope, reach, load, scheme):
-    return on_line(height, slope, np.array([reach]), np.array([load]), scheme)
+def solve(height, slope, deborah, load, scheme):
+    return on_line(height, slope, np.array([deborah]), np.array([load]), scheme)
 
 
 @settings(max_examples=150, deadline=None)
@@ -22,21 +22,21 @@ def solve(height, slope, reach, load, scheme):
     hurst=st.floats(0, 1),
     points=st.sampled_from([16, 50, 300]),
     oversampling=st.sampled_from([1, 2, 5]),
-    reach=exponents,
+    deborah=exponents,
     load=exponents,
     height=st.floats(-9, 6),
     scheme=st.sampled_from(SCHEMES),
     realisation=st.integers(0, 1000),
 )
-def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, scheme, realisation):
+def test_any_case_is_solved(hurst, points, oversampling, deborah, load, height, scheme, realisation):
     amplitude = roughness.amplitudes(points // 2, hurst)
     phase = roughness.phases(0, realisation, points // 2)
     h, slope = (10**height * roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1))
     carried = 10 ** (load + height)
-    steady = solve(h, slope, 10**reach, carried, scheme)
+    steady = solve(h, slope, 10**deborah, carried, scheme)
     if steady.status[0] == Outcome.DEPTH_NOT_FOUND:
         # the dashpot alone holds the load on a length, or at a depth, that is lost in the rounding of the line
-        assert load - reach < -12
+        assert load - deborah < -12
         return
     assert steady.status[0] == Outcome.CONVERGED
     # the highest point, which lies above the nodes by part of the range, is pressed in; at most all of the line is
@@ -54,14 +54,14 @@ def test_any_case_is_solved(hurst, points, oversampling, reach, load, height, sc
     exponent=st.floats(1, 6),
     coefficient=st.floats(-3, 3),
     roughness_height=st.floats(-12, -1),
-    reach=exponents,
+    deborah=exponents,
     load=exponents,
     scheme=st.sampled_from(SCHEMES),
 )
-def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, reach, load, scheme):
+def test_any_indenter_is_solved_or_leaves_its_line(exponent, coefficient, roughness_height, deborah, load, scheme):
     amplitude, phase = roughness.amplitudes(32, 0.7), roughness.phases(0, 0, 32)
     height, slope = (10**roughness_height * roughness.line(amplitude, phase, 128, order) for order in (0, 1))
-    numbers = (10**coefficient, exponent, np.array([10**reach]), np.array([10**load]), scheme)
+    numbers = (10**coefficient, exponent, np.array([10**deborah]), np.array([10**load]), scheme)
     steady = under_indenter(height, slope, *numbers)
     assert steady.status[0] in (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
     assert np.isfinite(steady.drag[0]) == (steady.status[0] == Outcome.CONVERGED)
@@ -82,9 +82,9 @@ def test_a_flat_line_has_no_friction(scheme):
 def test_spikes_and_steps_are_solved(scheme):
     height = np.where(np.arange(200) > 120, 1.0, 0.0)
     height[40] = 1e6
-    reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
-    steady = on_line(height, np.zeros(200), reach, load, scheme)
-    rounding = load / 1e6 / np.maximum(reach, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
+    deborah, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-8, 1e8, 9), np.geomspace(1e-6, 1e8, 8)))
+    steady = on_line(height, np.zeros(200), deborah, load, scheme)
+    rounding = load / 1e6 / np.maximum(deborah, 1) < 1e-12  # of the spike, over which the dashpot alone holds the load
     found = steady.status == Outcome.CONVERGED
     assert np.all(found | rounding)
     assert np.all(steady.drag[found] >= 0)
@@ -95,22 +95,22 @@ def test_spikes_and_steps_are_solved(scheme):
 def test_neighbours_and_order_do_not_change_a_bit(scheme, points):
     amplitude, phase = roughness.amplitudes(points // 2, 0.3), roughness.phases(0, 0, points // 2)
     h, slope = (roughness.line(amplitude, phase, 2 * points, order) for order in (0, 1))
-    reach, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
-    together = on_line(h, slope, reach, load, scheme)
-    shuffle = np.random.default_rng(0).permutation(reach.size)
-    shuffled = on_line(h, slope, reach[shuffle], load[shuffle], scheme)
+    deborah, load = (grid.ravel() for grid in np.meshgrid(np.geomspace(1e-7, 1e2, 12), np.geomspace(1e-4, 1e3, 15)))
+    together = on_line(h, slope, deborah, load, scheme)
+    shuffle = np.random.default_rng(0).permutation(deborah.size)
+    shuffled = on_line(h, slope, deborah[shuffle], load[shuffle], scheme)
     for name, column in vars(together).items():
         assert np.array_equal(column[shuffle], vars(shuffled)[name])
         for k in (0, 77, 179):
-            alone = solve(h, slope, reach[k], load[k], scheme)
+            alone = solve(h, slope, deborah[k], load[k], scheme)
             assert vars(alone)[name][0] == column[k]
 
 
 def test_a_guess_does_not_change_a_bit():
     amplitude, phase = roughness.amplitudes(200, 0.7), roughness.phases(0, 3, 200)
     h, slope = (roughness.line(amplitude, phase, 800, order) for order in (0, 1))
-    reach, load = np.geomspace(1e-5, 1e1, 20), np.geomspace(1e-3, 1e2, 20)
-    cold = on_line(h, slope, reach, load)
+    deborah, load = np.geomspace(1e-5, 1e1, 20), np.geomspace(1e-3, 1e2, 20)
+    cold = on_line(h, slope, deborah, load)
     for factor in (1e-3, 0.999, 1.5, 1e3):
-        warm = on_line(h, slope, reach, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
+        warm = on_line(h, slope, deborah, load, guesses=(cold.depth + np.max(h)) * factor - np.max(h))
         assert np.array_equal(cold.drag, warm.drag)

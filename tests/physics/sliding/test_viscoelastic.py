@@ -56,9 +56,9 @@ def test_standard_solid_agrees_with_slow_time_stepping():
 def test_kelvin_limit_is_the_kelvin_solver(velocity, force):
     height, spacing, amplitude = line(16)
     ours = material_on_line(height, spacing, kelvin(1e7, 1e-3), velocity, force)
-    reach, load = np.array([velocity * 1e-3 / LENGTH]), np.array([force / (4e7 * LENGTH)])
+    deborah, load = np.array([velocity * 1e-3 / LENGTH]), np.array([force / (4e7 * LENGTH)])
     slope = roughness.line(amplitude, roughness.phases(1, 0, POINTS // 2), height.size, 1)
-    kelvin_state = on_line(height, slope, reach, load)
+    kelvin_state = on_line(height, slope, deborah, load)
     wanted = kelvin_state.drag[0] / (load[0] * LENGTH)
     assert ours.friction_coefficient == pytest.approx(wanted, rel=max(3 * ours.error, 2.5e-3))  # a few points touch
     assert ours.depth == pytest.approx(kelvin_state.depth[0], abs=2e-3 * RMS)
@@ -179,11 +179,11 @@ def test_error_estimate_covers_the_true_error():
 
 def parabola(velocity, radius, modulus, time, force):
     """Closed form: contact from -sqrt(d R) to the zero of w + v tau w' (physics of the smooth Kelvin parabola)."""
-    reach = velocity * time
+    deborah = velocity * time
 
     def forces(depth):
-        lead, trail = -np.sqrt(depth * radius), -reach + np.sqrt(reach**2 + depth * radius)
-        stress = np.polynomial.Polynomial([depth, -2 * reach / radius, -1 / radius])
+        lead, trail = -np.sqrt(depth * radius), -deborah + np.sqrt(deborah**2 + depth * radius)
+        stress = np.polynomial.Polynomial([depth, -2 * deborah / radius, -1 / radius])
         both = [stress.integ(), (stress * np.polynomial.Polynomial([0, -2 / radius])).integ()]
         return [4 * modulus * (p(trail) - p(lead)) for p in both]
 

@@ -10,10 +10,10 @@ from mdr_dask.physics.surfaces import shapes as indenter
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
 
 
-def solve(load, reach, coefficient, exponent):
-    load, reach = np.atleast_1d(load).astype(float), np.atleast_1d(reach).astype(float)
+def solve(load, deborah, coefficient, exponent):
+    load, deborah = np.atleast_1d(load).astype(float), np.atleast_1d(deborah).astype(float)
     results = np.empty((load.size, indenter.COLUMNS))
-    indenter.smooth(load, reach, np.full(load.size, coefficient), np.full(load.size, exponent), results)
+    indenter.smooth(load, deborah, np.full(load.size, coefficient), np.full(load.size, exponent), results)
     return results.T
 
 
@@ -25,29 +25,29 @@ def test_mapping_keeps_the_load_of_the_body(exponent):
 
 
 def test_a_parabola_agrees_with_its_quadratic():
-    radius, reach, depth = 2.0, 0.3, 0.05
-    a, b = np.sqrt(depth * radius), -reach + np.sqrt(reach**2 + depth * radius)
+    radius, deborah, depth = 2.0, 0.3, 0.05
+    a, b = np.sqrt(depth * radius), -deborah + np.sqrt(deborah**2 + depth * radius)
 
     def force(x):
-        return depth - x**2 / radius - reach * 2 * x / radius
+        return depth - x**2 / radius - deborah * 2 * x / radius
 
     load = quad(force, -a, b)[0]
     drag = quad(lambda x: -force(x) * 2 * x / radius, -a, b)[0]
-    found = solve(load, reach, 1 / radius, 2.0)[:, 0]
+    found = solve(load, deborah, 1 / radius, 2.0)[:, 0]
     assert found[:4] == pytest.approx([depth, drag, a, b], rel=1e-11)
 
 
 @pytest.mark.parametrize(("coefficient", "exponent"), SHAPES)
-@pytest.mark.parametrize("reach", [1e-12, 1e-4, 1e-1, 1e4])
-def test_closed_form_agrees_with_quadrature(coefficient, exponent, reach):
+@pytest.mark.parametrize("deborah", [1e-12, 1e-4, 1e-1, 1e4])
+def test_closed_form_agrees_with_quadrature(coefficient, exponent, deborah):
     load = 0.02
-    depth, drag, a, b, stretch = solve(load, reach, coefficient, exponent)[:, 0]
+    depth, drag, a, b, stretch = solve(load, deborah, coefficient, exponent)[:, 0]
 
     def slope(x):
         return -np.sign(x) * coefficient * exponent * abs(x) ** (exponent - 1)
 
     def force(x):
-        return depth - coefficient * abs(x) ** exponent + reach * slope(x)
+        return depth - coefficient * abs(x) ** exponent + deborah * slope(x)
 
     parts = [(-a, 0.0), (0.0, b)]
     integrals = [
@@ -62,10 +62,10 @@ def test_closed_form_agrees_with_quadrature(coefficient, exponent, reach):
 @pytest.mark.parametrize(("coefficient", "exponent"), [shape for shape in SHAPES if shape[1] != 1.5])
 def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
     nodes = 2000
-    reach = np.geomspace(1e-10, 1e2, 13)
+    deborah = np.geomspace(1e-10, 1e2, 13)
     load = np.full(13, 0.02)
-    steady = under_indenter(np.zeros(nodes), np.zeros(nodes), coefficient, exponent, reach, load)
-    exact = solve(load, reach, coefficient, exponent)
+    steady = under_indenter(np.zeros(nodes), np.zeros(nodes), coefficient, exponent, deborah, load)
+    exact = solve(load, deborah, coefficient, exponent)
     assert np.all(steady.status == Outcome.CONVERGED)
     # cubic cells hold a cone and a parabola exactly; a quartic to the fourth order
     assert steady.drag == pytest.approx(exact[indenter.DRAG], rel=1e-6)
@@ -75,10 +75,10 @@ def test_sweep_agrees_with_the_closed_form(coefficient, exponent):
 
 @pytest.mark.parametrize("scheme", ["piecewise_linear", "backward_euler"])
 def test_other_schemes_tend_to_the_closed_form(scheme):
-    load, reach = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
-    exact = solve(load, reach, 0.5, 2.0)[indenter.DRAG]
+    load, deborah = np.full(3, 0.02), np.array([1e-2, 0.1, 1.0])
+    exact = solve(load, deborah, 0.5, 2.0)[indenter.DRAG]
     errors = [
-        np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, reach, load, scheme).drag / exact - 1))
+        np.max(np.abs(under_indenter(np.zeros(n), None, 0.5, 2.0, deborah, load, scheme).drag / exact - 1))
         for n in (2000, 8000)
     ]
     assert errors[1] < 0.3 * errors[0]

@@ -36,30 +36,30 @@ def bowl(nodes: int, coefficient: float = 10.0) -> CubicLine:
     return indented_line(np.zeros(nodes), np.zeros(nodes), PowerLaw(coefficient, 2.0))
 
 
-def moments_to(last: float, reach: float, nodes: int, cells: float = 0.5) -> np.ndarray:
-    step = cells / nodes / reach
+def moments_to(last: float, deborah: float, nodes: int, cells: float = 0.5) -> np.ndarray:
+    step = cells / nodes / deborah
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
     return np.unique(np.concatenate([grown, np.arange(grown[-1] + step, last, step), TIMES[last > TIMES]]))
 
 
 def jump(
-    line: CubicLine, solid: Foundation, reaches: tuple[float, float], load: float, last: float, cells: float = 0.5
+    line: CubicLine, solid: Foundation, deborahs: tuple[float, float], load: float, last: float, cells: float = 0.5
 ) -> tuple[np.ndarray, Response]:
-    state, depth, status = steady_start(line, solid, reaches[0], load)
+    state, depth, status = steady_start(line, solid, deborahs[0], load)
     assert status == Outcome.CONVERGED
-    moments = moments_to(last, reaches[1], line.height.size - 1, cells)
+    moments = moments_to(last, deborahs[1], line.height.size - 1, cells)
     one = np.ones(moments.size)
     found = follow_line(
-        line, solid, Schedule(moments, moments * reaches[1], reaches[1] * one, load * one), state, depth
+        line, solid, Schedule(moments, moments * deborahs[1], deborahs[1] * one, load * one), state, depth
     )
     assert found.status == Outcome.CONVERGED
     return moments, found
 
 
 def missing(found: Response) -> float:
-    """Return the part of the work that is neither stored nor lost."""
-    work, lost, stored = (row[-1] - row[0] for row in (found.work, found.lost, found.stored))
-    return abs(work - lost - stored) / work
+    """Return the part of the work that is neither stored nor dissipated."""
+    work, dissipated, stored = (row[-1] - row[0] for row in (found.work, found.dissipated, found.stored))
+    return abs(work - dissipated - stored) / work
 
 
 @pytest.mark.parametrize("solid", [KELVIN, STANDARD, SERIES])
@@ -81,9 +81,9 @@ def test_work_is_that_of_drag_and_load() -> None:
     assert errors[1] < errors[0] / 4**SECOND
 
 
-def at_times(line: CubicLine, solid: Foundation, reaches: tuple[float, float], cells: float = 0.5) -> np.ndarray:
+def at_times(line: CubicLine, solid: Foundation, deborahs: tuple[float, float], cells: float = 0.5) -> np.ndarray:
     """Return the drag at 0+ and at `TIMES`."""
-    moments, found = jump(line, solid, reaches, 0.3, 1.5, cells)
+    moments, found = jump(line, solid, deborahs, 0.3, 1.5, cells)
     return found.drag[np.append(0, np.searchsorted(moments, TIMES))]
 
 
@@ -98,10 +98,10 @@ def test_second_order_in_the_grid(solid: Foundation) -> None:
 @pytest.mark.parametrize("change", [0.2, -0.2])
 def test_second_order_in_the_grid_against_the_march(change: float) -> None:
     """The solver for one jump shares nothing with this one but the line; the immediate value at its own."""
-    reaches = 0.1, 0.1 * (1 + change)
-    march = velocity_jump(periodic_line(*rough(64)), 0.3, reaches, Course(TIMES, np.pi * POINTS, 96))
+    deborahs = 0.1, 0.1 * (1 + change)
+    march = velocity_jump(periodic_line(*rough(64)), 0.3, deborahs, Course(TIMES, np.pi * POINTS, 96))
     exact = np.append(march.at, march.trace)
-    found = [np.abs(at_times(periodic_line(*rough(o)), KELVIN, reaches) / exact - 1) for o in (4, 16)]
+    found = [np.abs(at_times(periodic_line(*rough(o)), KELVIN, deborahs) / exact - 1) for o in (4, 16)]
     assert found[1][0] < 2e-4
     assert found[1].max() < 2e-4
     assert found[1].max() < found[0].max() / 4**SECOND
@@ -125,7 +125,7 @@ def test_every_course_keeps_the_balance() -> None:
     found = follow_line(line, STANDARD, Schedule(moments, 0.05 * (1 - np.cos(2 * moments)), speed, load), state, depth)
     assert found.status == Outcome.CONVERGED
     assert missing(found) < BALANCE
-    assert np.all(np.diff(found.lost) > -1e-15)
+    assert np.all(np.diff(found.dissipated) > -1e-15)
 
 
 @pytest.mark.parametrize(("solid", "last"), [(STANDARD, 25.0), (SERIES, 40.0)])
@@ -182,7 +182,7 @@ def test_full_contact_is_exact(solid: Foundation) -> None:
     moments, found = jump(periodic_line(np.cos(k * x), -k * np.sin(k * x)), solid, (before, after), 20.0, 1.0)
     exact = 0.5 * solid.viscosity * after * k * k * np.ones(moments.size)
     for modulus, tau in zip(solid.moduli, solid.times, strict=True):
-        first, last = (1j * k * reach / (1j * k * reach + 1 / tau) for reach in (before, after))
+        first, last = (1j * k * deborah / (1j * k * deborah + 1 / tau) for deborah in (before, after))
         wave = last + (first - last) * np.exp(-(1j * k * after + 1 / tau) * moments)
         exact += 0.5 * modulus * np.real(wave * np.conj(1j * k))
     assert np.allclose(found.drag, exact, rtol=1e-5)  # chords of a wave of 1000 nodes

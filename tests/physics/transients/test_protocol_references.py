@@ -26,7 +26,7 @@ SECOND, FIRST = 1.8, 0.9  # orders, less what edges that cross elements add; a c
 TIMES = np.geomspace(0.02, 0.95 * LAST, 14)
 
 
-def reach(time: Array) -> Array:
+def deborah(time: Array) -> Array:
     """Return a speed that jumps at 0 and grows smoothly."""
     return 0.06 + 0.02 * time / LAST
 
@@ -47,7 +47,7 @@ def followed(line: CubicLine, solid: Foundation, before: float, cells: float = 0
     grown = np.concatenate([[0.0], np.cumsum(np.geomspace(1e-3, 1, 20) * step)])
     moments = np.concatenate([grown, np.linspace(grown[-1], LAST, int((LAST - grown[-1]) / step) + 2), TIMES])
     moments = np.unique(moments)
-    found = follow_line(line, solid, Schedule(moments, travel(moments), reach(moments), load(moments)), state, depth)
+    found = follow_line(line, solid, Schedule(moments, travel(moments), deborah(moments), load(moments)), state, depth)
     assert found.status == Outcome.CONVERGED
     return moments, found
 
@@ -157,7 +157,7 @@ def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
 
     start = brentq(lambda d: forces(d, 0.0, 0.05)[0] - LOAD, 1e-3, 1, xtol=1e-15)
     solved = solve_ivp(
-        lambda t, d: [rate_of(d[0], reach(t), load(t))],
+        lambda t, d: [rate_of(d[0], deborah(t), load(t))],
         (0, LAST),
         [start],
         t_eval=TIMES,
@@ -165,8 +165,8 @@ def test_dashpot_under_indenters(coefficient: float, exponent: float) -> None:
         atol=1e-13,
         method="LSODA",
     )
-    drag = [forces(d, rate_of(d, reach(t), load(t)), reach(t))[1] for t, d in zip(TIMES, solved.y[0], strict=True)]
-    instant = forces(start, rate_of(start, reach(0.0), LOAD), reach(0.0))[1]
+    drag = [forces(d, rate_of(d, deborah(t), load(t)), deborah(t))[1] for t, d in zip(TIMES, solved.y[0], strict=True)]
+    instant = forces(start, rate_of(start, deborah(0.0), LOAD), deborah(0.0))[1]
     errors, first = [], []
     for nodes in (200, 800):
         line = without_kinks(indented_line(np.zeros(nodes), np.zeros(nodes), PowerLaw(coefficient, exponent)))

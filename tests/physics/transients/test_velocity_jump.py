@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from references.followed_kelvin import follow_kelvin
 from schemes import on_line
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -7,13 +8,12 @@ from scipy.optimize import brentq
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.elements.follow import follow_kelvin
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jump, velocity_jumps
 
 POINTS, OVERSAMPLING = 100, 8
-REACH, LOAD = 0.1, 0.3
+DEBORAH, LOAD = 0.1, 0.3
 TIMES = np.geomspace(1e-3, 20, 30)
 MODES_EXACT = 1e-12  # rounding of sums over some thousand nodes
 WAVENUMBER = np.pi * POINTS
@@ -41,14 +41,14 @@ def solved(
 
 def jump(change: float = 0.2, per_decade: float = 24, load: float = LOAD, oversampling: int = OVERSAMPLING) -> Jump:
     height, slope = line(oversampling=oversampling)
-    return solved(height, slope, load, (REACH, REACH * (1 + change)), TIMES, per_decade)
+    return solved(height, slope, load, (DEBORAH, DEBORAH * (1 + change)), TIMES, per_decade)
 
 
 @pytest.mark.parametrize("change", [0.2, -0.2, 0.3])
 def test_ends_in_the_direct_steady_state(change: float) -> None:
     found = jump(change)
     height, slope = line()
-    steady = on_line(height, slope, np.array([REACH, REACH * (1 + change)]), np.full(2, LOAD))
+    steady = on_line(height, slope, np.array([DEBORAH, DEBORAH * (1 + change)]), np.full(2, LOAD))
     assert found.outcome == Outcome.CONVERGED
     assert np.allclose([found.before, found.after], steady.drag, rtol=1e-6)
     assert found.depth[-1] == pytest.approx(steady.depth[1], rel=1e-9)
@@ -63,32 +63,32 @@ def test_full_contact_jumps_straight_to_the_end() -> None:
     grad2 = np.mean(slope**2)
     assert np.allclose(found.trace, found.after, rtol=0, atol=0)
     assert found.at == pytest.approx(found.after, rel=MODES_EXACT)
-    assert np.isclose(found.after, 1.2 * REACH * grad2, rtol=MODES_EXACT)  # mu = 4 eta v L grad^2 / F_N, eq. 3.14
-    assert np.isclose(found.before, REACH * grad2, rtol=MODES_EXACT)
+    assert np.isclose(found.after, 1.2 * DEBORAH * grad2, rtol=MODES_EXACT)  # mu = 4 eta v L grad^2 / F_N, eq. 3.14
+    assert np.isclose(found.before, DEBORAH * grad2, rtol=MODES_EXACT)
 
 
 def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np.ndarray]:
     """Follow every element with steps of half its spacing from a steady state reached by sliding at v_1."""
     height, slope = line(oversampling=elements)
     nodes = height.size
-    first = on_line(height, slope, np.array([REACH]), np.array([LOAD]))
-    step = 0.5 / nodes / REACH
-    run_in = np.arange(0, 2 / REACH + 1e-9, step)  # two turns: exp(-20) of the start is left
+    first = on_line(height, slope, np.array([DEBORAH]), np.array([LOAD]))
+    step = 0.5 / nodes / DEBORAH
+    run_in = np.arange(0, 2 / DEBORAH + 1e-9, step)  # two turns: exp(-20) of the start is left
     u = np.maximum(first.depth[0] + height, 0.0)
     u *= LOAD / u.mean()
     same = np.full(run_in.size, LOAD)
     state = follow_kelvin(
-        height, slope, Schedule(run_in, run_in * REACH, np.full(run_in.size, REACH), same), u, float(first.depth[0])
+        height, slope, Schedule(run_in, run_in * DEBORAH, np.full(run_in.size, DEBORAH), same), u, float(first.depth[0])
     )
-    reach = REACH * (1 + change)
+    deborah = DEBORAH * (1 + change)
     start = np.geomspace(1e-4, 1, 30) * step
     moments = np.concatenate([[0.0], np.cumsum(start)])
     moments = np.concatenate([moments, np.arange(moments[-1] + step, last, step)])
-    travels = run_in[-1] * REACH + moments * reach
+    travels = run_in[-1] * DEBORAH + moments * deborah
     after = follow_kelvin(
         height,
         slope,
-        Schedule(moments, travels, np.full(moments.size, reach), np.full(moments.size, LOAD)),
+        Schedule(moments, travels, np.full(moments.size, deborah), np.full(moments.size, LOAD)),
         state.displacement,
         float(state.depth[-1]),
     )
@@ -100,7 +100,7 @@ def reference(change: float, elements: int, last: float) -> tuple[np.ndarray, np
 def test_agrees_with_following_every_element(change: float) -> None:
     height, slope = line()
     times = np.geomspace(0.02, 0.9, 12)
-    fast = solved(height, slope, LOAD, (REACH, REACH * (1 + change)), times, 48)
+    fast = solved(height, slope, LOAD, (DEBORAH, DEBORAH * (1 + change)), times, 48)
     errors = []
     for elements in (4, 8, 16):
         moments, drag = reference(change, elements, 1.0)
@@ -114,19 +114,19 @@ def test_jump_condition_against_ever_finer_steps() -> None:
     errors = []
     for elements in (256, 1024):
         fine_height, fine_slope = line(oversampling=elements)
-        steady = on_line(fine_height, fine_slope, np.array([REACH]), np.array([LOAD]))
+        steady = on_line(fine_height, fine_slope, np.array([DEBORAH]), np.array([LOAD]))
         w = steady.depth[0] + fine_height
         u = w.copy()
-        fade = np.exp(-1 / fine_height.size / REACH)
+        fade = np.exp(-1 / fine_height.size / DEBORAH)
         u = np.roll(u, -int(np.argmax(fine_height)))
         w = u.copy()
         for i in range(1, u.size):
             u[i] = max(w[i], u[i - 1] * fade)
         u = np.roll(u, int(np.argmax(fine_height)))
-        reach = 1.2 * REACH
+        deborah = 1.2 * DEBORAH
         one = np.ones(1)
         state = follow_kelvin(
-            fine_height, fine_slope, Schedule(0 * one, 0 * one, reach * one, LOAD * one), u, float(steady.depth[0])
+            fine_height, fine_slope, Schedule(0 * one, 0 * one, deborah * one, LOAD * one), u, float(steady.depth[0])
         )
         errors.append(abs(state.drag[0] / found.at - 1))
     assert errors[1] < 0.5 * errors[0]
@@ -135,7 +135,7 @@ def test_jump_condition_against_ever_finer_steps() -> None:
 
 def test_trace_begins_at_the_jump() -> None:
     height, slope = line()
-    found = solved(height, slope, LOAD, (REACH, 1.2 * REACH), np.array([0.0, 1e-7, 1.0]))
+    found = solved(height, slope, LOAD, (DEBORAH, 1.2 * DEBORAH), np.array([0.0, 1e-7, 1.0]))
     assert found.trace[0] == pytest.approx(found.at, rel=1e-12)
     # the trace leaves with a finite slope of the order of q_max v
     assert found.trace[1] == pytest.approx(found.at, rel=1e-4)
@@ -161,10 +161,10 @@ def smooth_bump() -> tuple[np.ndarray, np.ndarray]:
 
 def test_single_hill_against_an_independent_integration() -> None:
     """Elements enter a light contact undeformed, so that the depth follows an ordinary differential equation."""
-    reach, load = 0.01, 0.002
+    deborah, load = 0.01, 0.002
     height, slope = smooth_bump()
     times = np.geomspace(1e-3, 3, 20)
-    found = solved(height, slope, load, (reach, 1.2 * reach), times, 96, wavenumber=2 * np.pi)
+    found = solved(height, slope, load, (deborah, 1.2 * deborah), times, 96, wavenumber=2 * np.pi)
 
     def edges(d: float, rate: float, v: float) -> tuple[float, float]:
         lead = -np.arccos(min(-d, 1.0)) / (2 * np.pi)  # w = d + cos(2 pi x) = 0 where undeformed elements arrive
@@ -185,8 +185,8 @@ def test_single_hill_against_an_independent_integration() -> None:
     def rate_of(d: float, v: float) -> float:
         return brentq(lambda rate: forces(d, rate, v)[0] - load, -0.5, 0.5, xtol=1e-14)
 
-    d1 = brentq(lambda d: forces(d, 0.0, reach)[0] - load, -1 + 1e-6, 0.0, xtol=1e-15)
-    v2 = 1.2 * reach
+    d1 = brentq(lambda d: forces(d, 0.0, deborah)[0] - load, -1 + 1e-6, 0.0, xtol=1e-15)
+    v2 = 1.2 * deborah
     truth = solve_ivp(
         lambda _, d: [rate_of(d[0], v2)], (0, 3), [d1], t_eval=times, rtol=1e-10, atol=1e-13, method="LSODA"
     )
@@ -199,16 +199,16 @@ def test_single_hill_against_an_independent_integration() -> None:
 
 def test_bad_numbers_are_a_status() -> None:
     height, slope = line()
-    for load, reaches in ((np.nan, (0.1, 0.12)), (0.3, (0.1, -0.1)), (0.0, (0.1, 0.12))):
-        assert solved(height, slope, load, reaches, TIMES).outcome == Outcome.INVALID
+    for load, deborahs in ((np.nan, (0.1, 0.12)), (0.3, (0.1, -0.1)), (0.0, (0.1, 0.12))):
+        assert solved(height, slope, load, deborahs, TIMES).outcome == Outcome.INVALID
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-2])
 def test_march_ends_where_friction_stays_within_the_accuracy(accuracy: float) -> None:
     height, slope = line()
-    reaches = REACH, 1.2 * REACH
-    long = solved(height, slope, LOAD, reaches, TIMES, 24)
-    short = solved(height, slope, LOAD, reaches, TIMES, 24, accuracy)
+    deborahs = DEBORAH, 1.2 * DEBORAH
+    long = solved(height, slope, LOAD, deborahs, TIMES, 24)
+    short = solved(height, slope, LOAD, deborahs, TIMES, 24, accuracy)
     assert 0 < short.moments < long.moments
     assert np.max(np.abs(short.trace - long.trace)) < accuracy * long.after
 
@@ -216,10 +216,10 @@ def test_march_ends_where_friction_stays_within_the_accuracy(accuracy: float) ->
 def test_transient_within_the_accuracy_is_not_computed() -> None:
     height, slope = line()
     accuracy, skipped = 1e-2, 0
-    for reach in np.geomspace(1e-5, 1, 16):
-        reaches = reach, 1.2 * reach
-        long = solved(height, slope, LOAD, reaches, TIMES, 8)
-        short = solved(height, slope, LOAD, reaches, TIMES, 8, accuracy)
+    for deborah in np.geomspace(1e-5, 1, 16):
+        deborahs = deborah, 1.2 * deborah
+        long = solved(height, slope, LOAD, deborahs, TIMES, 8)
+        short = solved(height, slope, LOAD, deborahs, TIMES, 8, accuracy)
         assert (short.before, short.at, short.after) == (long.before, long.at, long.after)
         error = np.max(np.abs(short.trace - long.trace))
         assert error < accuracy * long.after
@@ -231,10 +231,10 @@ def test_transient_within_the_accuracy_is_not_computed() -> None:
     assert 0 < skipped < 16
 
 
-@pytest.mark.parametrize("reach", [1e-3, REACH])
-def test_a_path_is_retraced_at_every_second_moment(reach: float) -> None:
+@pytest.mark.parametrize("deborah", [1e-3, DEBORAH])
+def test_a_path_is_retraced_at_every_second_moment(deborah: float) -> None:
     """On the grid of the march itself the difference is that of the steps; on a coarser one that of the nodes, too."""
-    loads, deborah, apart = np.array([LOAD]), np.array([[reach, 1.2 * reach]]), []
+    loads, deborah, apart = np.array([LOAD]), np.array([[deborah, 1.2 * deborah]]), []
     grids = [PreparedLine.of(periodic_line(*line(oversampling=nodes))) for nodes in (8, 4)]
     ends = [ends_on(grid, loads, deborah) for grid in grids]
     jumps = velocity_jumps(grids[0], loads, deborah, ends[0], Course(TIMES, WAVENUMBER, 12))
@@ -250,7 +250,7 @@ def test_a_path_is_retraced_at_every_second_moment(reach: float) -> None:
 
 
 def test_a_path_without_a_solution_on_the_other_grid_is_unknown() -> None:
-    loads, deborah = np.array([LOAD]), np.array([[REACH, 1.2 * REACH]])
+    loads, deborah = np.array([LOAD]), np.array([[DEBORAH, 1.2 * DEBORAH]])
     grid = PreparedLine.of(periodic_line(*line()))
     ends = ends_on(grid, loads, deborah)
     jumps = velocity_jumps(grid, loads, deborah, ends, Course(TIMES, WAVENUMBER, 8))

@@ -10,7 +10,7 @@ from mdr_dask.physics.transients.velocity_jump import Course, velocity_jumps
 POINTS = 500
 TIMES = np.geomspace(1e-3, 20, 30)
 LOADS = np.array([0.0025, 0.075, 0.75, 7.5, 25.0])  # 0.01 to 100 N of the campaign
-REACHES = np.geomspace(1e-5, 1, 9)  # 0.1 mm/s to 10 m/s
+DEBORAHS = np.geomspace(1e-5, 1, 9)  # 0.1 mm/s to 10 m/s
 CHANGES = np.array([-0.2, 0.2, 0.3])
 
 
@@ -19,8 +19,8 @@ def test_extremes_come_to_rest(hurst: float) -> None:
     """Between the extremes of thesis chapter 4, near full contact at v tau > L too, nothing runs away."""
     amplitude, phase = roughness.amplitudes(POINTS // 2, hurst), roughness.phases(2014, 0, POINTS // 2)
     line = periodic_line(*(roughness.line(amplitude, phase, 4 * POINTS, order) for order in (0, 1)))
-    load, reach, change = (axis.ravel() for axis in np.meshgrid(LOADS, REACHES, CHANGES))
-    both = np.column_stack([reach, reach * (1 + change)])
+    load, deborah, change = (axis.ravel() for axis in np.meshgrid(LOADS, DEBORAHS, CHANGES))
+    both = np.column_stack([deborah, deborah * (1 + change)])
     line = PreparedLine.of(line)
     jumps = velocity_jumps(line, load, both, ends_on(line, load, both), Course(TIMES, np.pi * POINTS, 8))
     failed = sum(jump.outcome != Outcome.CONVERGED for jump in jumps)

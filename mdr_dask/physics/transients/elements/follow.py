@@ -1,4 +1,4 @@
-"""Friction under any course of velocity and load: every element followed in time, at second order in the step.
+"""Friction under any loading history: every element followed in time, at second order in the step.
 
 This is the general and slow way; a single jump on a periodic line is solved by `velocity_jump`.
 """
@@ -13,20 +13,19 @@ from scipy.optimize import brentq
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import copy_into, kernel
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.surfaces.cubic_line import CubicLine, periodic_line
-from mdr_dask.physics.transients.elements.edges import Edges, under_elements
+from mdr_dask.physics.surfaces.cubic_line import CubicLine
+from mdr_dask.physics.transients.elements.edges import Edges
 from mdr_dask.physics.transients.elements.foundation import (
-    KELVIN,
     Foundation,
     Lapse,
     Release,
     Rise,
     advance,
+    element_workspace,
     fading,
     flight,
     fly,
     release,
-    scratch_for,
 )
 from mdr_dask.physics.transients.elements.steps import (
     ROWS,
@@ -40,7 +39,6 @@ from mdr_dask.physics.transients.elements.steps import (
 TURNS = 3000  # of an element around the line before it is as it was
 STEADY = 1e-14  # of the depth at the start
 NEARLY = 1e-6  # of the load: what the steady state at the start may miss
-TOUCHING = 1e-12  # of its height: what touches but for rounding
 
 
 class Response(NamedTuple):
@@ -52,8 +50,8 @@ class Response(NamedTuple):
         F_x / (4 G L) in the unit of height squared over length; depth; its derivative by t / tau; fraction in contact.
     stored : array, shape (moments,)
         Energy stored over 4 G L.
-    work, lost : array, shape (moments,)
-        Work done on the elements and energy lost since the first moment, over 4 G L; their difference is what the
+    work, dissipated : array, shape (moments,)
+        Work done on the elements and energy dissipated since the first moment, over 4 G L; their difference is what the
         stored energy has grown by, but for rounding. An element that leaves a line that does not close counts with
         all that it will lose.
     displacement : array, shape (n,)
@@ -69,7 +67,7 @@ class Response(NamedTuple):
     contact: FloatArray
     stored: FloatArray
     work: FloatArray
-    lost: FloatArray
+    dissipated: FloatArray
     displacement: FloatArray
     status: Outcome
     state: State
@@ -178,7 +176,7 @@ def _orbit(
     """
     n = line.height.size - 1
     every, step = n // state.displacement.size, 1 / (n * deborah)
-    lapse = Lapse(step, np.empty(solid.rates.size), np.empty(solid.times.size), scratch_for(solid))
+    lapse = Lapse(step, np.empty(solid.rates.size), np.empty(solid.times.size), element_workspace(solid))
     fading(solid, step, lapse.decay, lapse.fades)
     arms, free_arms, last = np.zeros((1, solid.times.size)), np.zeros((1, solid.times.size)), np.zeros(solid.times.size)
     top = int(np.argmax(line.height[:n])) if line.periodic else 0
@@ -204,7 +202,7 @@ def _orbit(
                 rise = Rise(w0, w1, deborah * n * line.enter[i], deborah * n * line.leave[i])
                 part, leaves = release(solid, lapse, rise, arms, 0)
             after = flight(solid, lapse, u, part if part < 1 else 0.0, leaves, arms, 0)
-            free = fly(solid, free, free_arms, 0, lapse.decay, lapse.scratch.modes)
+            free = fly(solid, free, free_arms, 0, lapse.decay, lapse.workspace.modes)
             u, touching, _, _ = advance(solid, lapse, (w0, w1), (u, touching), Release(part, leaves, after), arms, 0)
         change = abs(u - before)
         for m in range(arms.size):
@@ -221,7 +219,7 @@ def follow_line(
     state: State,
     depth: float,
 ) -> Response:
-    """Follow every element of any linear foundation under any line through a course of velocity and load.
+    """Follow every element of any linear foundation under any line through a loading history.
 
     Within a step an element in contact is moved at constant speed, one in flight recovers by the modes of the solid,
     and it is let go or touched inside the step where force or gap vanish. The total of the loads decides the mean
@@ -245,35 +243,5 @@ def follow_line(
     now = _copy(state)
     out = np.full((ROWS, schedule.moments.size), np.nan)
     status = follow_elements(solid, line, schedule, now, depth, out)
-    drag, depths, rate, contact, stored, work, lost = out
-    return Response(drag, depths, rate, contact, stored, work, lost, now.displacement, Outcome(status), now)
-
-
-def follow_kelvin(
-    height: FloatArray,
-    slope: FloatArray,
-    schedule: Schedule,
-    displacement: FloatArray,
-    depth: float,
-) -> Response:
-    """Follow every element of a Kelvin foundation on a periodic line; time in tau.
-
-    Parameters
-    ----------
-    height, slope : array, shape (n,)
-        Profile of unit length, as in :func:`~mdr_dask.physics.surfaces.cubic_line.periodic_line`.
-    schedule : Schedule
-        As in :func:`follow_line`; time in tau.
-    displacement : array, shape (n,)
-        Of every element at the first moment; the profile stands over element j at ``x_j + travel``.
-    depth : float
-        Depth at the first moment.
-    """
-    line = periodic_line(height, slope)
-    under, grade = np.empty(height.size), np.empty(height.size)
-    under_elements(line, float(schedule.travels[0]), under, grade)
-    w = depth + under
-    touching = np.abs(w - displacement) < TOUCHING * (abs(depth) + np.abs(under) + displacement)
-    u = np.where(touching, w, displacement)
-    state = untouched(u.size, 0)._replace(displacement=u, free=u.copy(), touching=touching)
-    return follow_line(line, KELVIN, schedule, state, depth)
+    drag, depths, rate, contact, stored, work, dissipated = out
+    return Response(drag, depths, rate, contact, stored, work, dissipated, now.displacement, Outcome(status), now)

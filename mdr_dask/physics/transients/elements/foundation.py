@@ -76,7 +76,7 @@ def foundation(moduli: ArrayLike, times: ArrayLike, viscosity: float) -> Foundat
 KELVIN = foundation([], [], 1.0)
 
 
-class Scratch(NamedTuple):
+class ElementWorkspace(NamedTuple):
     """Workspace of one element: modes, decay over part of a step, fading over it, and arms, shape (1, arms)."""
 
     modes: FloatArray
@@ -86,10 +86,10 @@ class Scratch(NamedTuple):
 
 
 @kernel
-def scratch_for(solid: Foundation) -> Scratch:
+def element_workspace(solid: Foundation) -> ElementWorkspace:
     """Return the workspace of one element."""
     modes, arms = solid.rates.size, solid.times.size
-    return Scratch(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
+    return ElementWorkspace(np.empty(modes), np.empty(modes), np.empty(arms), np.empty((1, arms)))
 
 
 class Lapse(NamedTuple):
@@ -98,7 +98,7 @@ class Lapse(NamedTuple):
     time: float
     decay: FloatArray
     fades: FloatArray
-    scratch: Scratch
+    workspace: ElementWorkspace
 
 
 class Rise(NamedTuple):
@@ -175,15 +175,15 @@ def press(
         return 0.0, 0.0
     speed = (u1 - u0) / step
     work = 0.5 * (u1 * u1 - u0 * u0) + solid.viscosity * speed * speed * step
-    lost = solid.viscosity * speed * speed * step
+    dissipated = solid.viscosity * speed * speed * step
     for m in range(solid.times.size):
         tau, fade = solid.times[m], fades[m]
         a = speed * tau
         b = (u0 - arms[i, m]) - a
         work += solid.moduli[m] * speed * (a * step + b * tau * (1 - fade))
-        lost += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
+        dissipated += solid.moduli[m] * (a * a * step / tau + 2 * a * b * (1 - fade) + 0.5 * b * b * (1 - fade * fade))
         arms[i, m] = u1 - (a + b * fade)
-    return work, lost
+    return work, dissipated
 
 
 @compiled
@@ -213,7 +213,7 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: in
     begin = pull(solid, rise.w0, arms, i) + solid.viscosity * rise.rise0
     if begin <= 0:
         return 0.0, rise.w0
-    strains = lapse.scratch.arms
+    strains = lapse.workspace.arms
     for m in range(solid.times.size):
         strains[0, m] = arms[i, m]
     press(solid, rise.w0, rise.w1, strains, 0, lapse.time, lapse.fades)
@@ -228,15 +228,15 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: in
 @inlined
 def flight(solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int) -> float:
     """Return where an element ends if it is pressed to `leaves` for a part of a time and free for the rest."""
-    scratch = lapse.scratch
+    workspace = lapse.workspace
     for m in range(solid.times.size):
-        scratch.arms[0, m] = arms[i, m]
+        workspace.arms[0, m] = arms[i, m]
     if part <= 0:
-        return fly(solid, u0, scratch.arms, 0, lapse.decay, scratch.modes)
-    fading(solid, part * lapse.time, scratch.decay, scratch.fades)
-    press(solid, u0, leaves, scratch.arms, 0, part * lapse.time, scratch.fades)
-    fading(solid, (1 - part) * lapse.time, scratch.decay, scratch.fades)
-    return fly(solid, leaves, scratch.arms, 0, scratch.decay, scratch.modes)
+        return fly(solid, u0, workspace.arms, 0, lapse.decay, workspace.modes)
+    fading(solid, part * lapse.time, workspace.decay, workspace.fades)
+    press(solid, u0, leaves, workspace.arms, 0, part * lapse.time, workspace.fades)
+    fading(solid, (1 - part) * lapse.time, workspace.decay, workspace.fades)
+    return fly(solid, leaves, workspace.arms, 0, workspace.decay, workspace.modes)
 
 
 @inlined
@@ -253,27 +253,27 @@ def advance(
 
     `w` is where the line begins and ends, `element` the displacement and contact at the start.
     """
-    (w0, w1), (u0, touching), step, scratch = w, element, lapse.time, lapse.scratch
+    (w0, w1), (u0, touching), step, workspace = w, element, lapse.time, lapse.workspace
     before = stored(solid, u0, arms, i)
     if w1 > let_go.after:
         if touching:
-            work, lost = press(solid, u0, w1, arms, i, step, lapse.fades)
-            return w1, True, work, lost
+            work, dissipated = press(solid, u0, w1, arms, i, step, lapse.fades)
+            return w1, True, work, dissipated
         part = (u0 - w0) / ((u0 - w0) + (w1 - let_go.after)) if u0 > w0 else 0.0
-        fading(solid, part * step, scratch.decay, scratch.fades)
-        u = fly(solid, u0, arms, i, scratch.decay, scratch.modes) if part > 0 else u0
+        fading(solid, part * step, workspace.decay, workspace.fades)
+        u = fly(solid, u0, arms, i, workspace.decay, workspace.modes) if part > 0 else u0
         loss = before - stored(solid, u, arms, i) if part > 0 else 0.0
         rest = (1 - part) * step
-        fading(solid, rest, scratch.decay, scratch.fades)
-        work, lost = press(solid, u, w1, arms, i, rest, scratch.fades)
-        return w1, True, work, lost + loss
+        fading(solid, rest, workspace.decay, workspace.fades)
+        work, dissipated = press(solid, u, w1, arms, i, rest, workspace.fades)
+        return w1, True, work, dissipated + loss
     part, leaves = let_go.part, let_go.leaves
     if not touching or part <= 0:
-        u = fly(solid, u0, arms, i, lapse.decay, scratch.modes)
+        u = fly(solid, u0, arms, i, lapse.decay, workspace.modes)
         return u, False, 0.0, before - stored(solid, u, arms, i)
-    fading(solid, part * step, scratch.decay, scratch.fades)
-    work, lost = press(solid, u0, leaves, arms, i, part * step, scratch.fades)
-    fading(solid, (1 - part) * step, scratch.decay, scratch.fades)
+    fading(solid, part * step, workspace.decay, workspace.fades)
+    work, dissipated = press(solid, u0, leaves, arms, i, part * step, workspace.fades)
+    fading(solid, (1 - part) * step, workspace.decay, workspace.fades)
     before = stored(solid, leaves, arms, i)
-    u = fly(solid, leaves, arms, i, scratch.decay, scratch.modes)
-    return u, False, work, lost + before - stored(solid, u, arms, i)
+    u = fly(solid, leaves, arms, i, workspace.decay, workspace.modes)
+    return u, False, work, dissipated + before - stored(solid, u, arms, i)

@@ -1,4 +1,4 @@
-"""All elements of a viscoelastic foundation through a course of velocity and load, and around a line until steady.
+"""All elements of a viscoelastic foundation through a loading history, and around a line until steady.
 
 Units: the static modulus is 1, heights are free, lengths over that of the line, times over one time of the material.
 """
@@ -15,23 +15,23 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
 from mdr_dask.physics.transients.elements.foundation import (
+    ElementWorkspace,
     Foundation,
     Lapse,
     Release,
     Rise,
-    Scratch,
     advance,
     at_rest,
+    element_workspace,
     fading,
     flight,
     fly,
     pull,
     release,
-    scratch_for,
     stored,
 )
 
-DRAG, DEPTH, RATE, CONTACT, STORED, WORK, LOST = range(7)
+DRAG, DEPTH, RATE, CONTACT, STORED, WORK, DISSIPATED = range(7)
 ROWS = 7
 CORRECTIONS = 2  # of the moments of release and the depth within a step
 
@@ -60,7 +60,7 @@ class State(NamedTuple):
 
 @compiled
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
-    """Return the mean displacement that the course of the load decides, whatever is in contact."""
+    """Return the mean displacement that the loading history decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
     count, arms = solid.rates.size, solid.times.size
     inward, strain, mean = solid.inward, state.arms, state.displacement.sum() / n
@@ -112,15 +112,15 @@ def _instant(
 @compiled
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
-    n, lost = state.displacement.size, 0.0
+    n, dissipated = state.displacement.size, 0.0
     for j in range(n):
         if (j + old) // n != (j + new) // n:
-            lost += stored(solid, state.displacement[j], state.arms, j)
+            dissipated += stored(solid, state.displacement[j], state.arms, j)
             state.displacement[j] = state.free[j] = 0.0
             state.arms[j, :] = 0.0
             state.edges.place[j] = -1.0
             state.touching[j] = False
-    return lost / n
+    return dissipated / n
 
 
 class Schedule(NamedTuple):
@@ -170,7 +170,7 @@ class StepWorkspace(NamedTuple):
     power: FloatArray
     decay: FloatArray
     fades: FloatArray
-    scratch: Scratch
+    element: ElementWorkspace
 
 
 @kernel
@@ -191,7 +191,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
         rows[10],
         np.empty(solid.rates.size),
         np.empty(solid.times.size),
-        scratch_for(solid),
+        element_workspace(solid),
     )
 
 
@@ -199,7 +199,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
-    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
     for j in range(workspace.under.size):
         if not state.touching[j]:
             continue
@@ -219,8 +219,8 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
     u, touching, after = state.displacement, state.touching, workspace.after
-    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.scratch)
-    work, lost = 0.0, 0.0
+    lapse = Lapse(step.time, workspace.decay, workspace.fades, workspace.element)
+    work, dissipated = 0.0, 0.0
     for j in range(n):
         w0, w1, was = step.depth + workspace.old_under[j], depth + workspace.under[j], touching[j]
         if not was:
@@ -230,12 +230,12 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
         elif plain:
             state.free[j] *= workspace.decay[0]
         elif damping > 0:
-            state.free[j] = fly(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.scratch.modes)
+            state.free[j] = fly(solid, state.free[j], state.free_arms, j, workspace.decay, workspace.element.modes)
         if not was and w1 <= after[j]:
             if plain:
-                lost += 0.5 * (u[j] * u[j] - after[j] * after[j])
+                dissipated += 0.5 * (u[j] * u[j] - after[j] * after[j])
             else:
-                lost += stored(solid, u[j], state.arms, j) - stored(solid, after[j], workspace.after_arms, j)
+                dissipated += stored(solid, u[j], state.arms, j) - stored(solid, after[j], workspace.after_arms, j)
             u[j] = after[j]
             for m in range(solid.times.size):
                 state.arms[j, m] = workspace.after_arms[j, m]
@@ -243,7 +243,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
         if was and plain and w1 > after[j]:
             gone = damping * (w1 - u[j]) ** 2 / step.time
             work += 0.5 * (w1 * w1 - u[j] * u[j]) + gone
-            lost += gone
+            dissipated += gone
             u[j] = w1
             continue
         let_go = Release(workspace.parts[j], workspace.leaves[j], after[j])
@@ -251,8 +251,8 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
         if not touching[j]:
             state.free[j] = u[j]
         work += done
-        lost += gone
-    return work / n, lost / n
+        dissipated += gone
+    return work / n, dissipated / n
 
 
 @compiled
@@ -274,7 +274,7 @@ def _step(
         for m in range(solid.times.size):
             workspace.after_arms[j, m] = state.arms[j, m]
         workspace.after[j] = fly(
-            solid, state.displacement[j], workspace.after_arms, j, workspace.decay, workspace.scratch.modes
+            solid, state.displacement[j], workspace.after_arms, j, workspace.decay, workspace.element.modes
         )
     depth = guess
     for _ in range(CORRECTIONS):
@@ -285,8 +285,8 @@ def _step(
     depth, good = depth_for(workspace.under, workspace.after, mean, depth)
     if not good:
         return depth, 0.0, 0.0, False
-    work, lost = _move(solid, state, workspace, step, depth)
-    return depth, work, lost, True
+    work, dissipated = _move(solid, state, workspace, step, depth)
+    return depth, work, dissipated, True
 
 
 @compiled
@@ -346,7 +346,7 @@ def follow_elements(
     n = line.height.size - 1
     workspace, modes = _workspace_for(solid, n), np.empty(solid.rates.size)
     shift = under_elements(line, travels[0], workspace.under, workspace.slope)
-    rate, work, lost = 0.0, 0.0, 0.0
+    rate, work, dissipated = 0.0, 0.0, 0.0
     if solid.viscosity == 0:
         depth, work, good = _instant(solid, state, workspace.under, loads[0], depth)
         if not good:
@@ -359,14 +359,14 @@ def follow_elements(
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
-                lost += _forget(solid, state, old_shift, shift)
+                dissipated += _forget(solid, state, old_shift, shift)
             fading(solid, time, workspace.decay, workspace.fades)
             mean = mean_after(solid, state, loads[now - 1], loads[now], time, modes)
             step = Step(time, old_depth, deborahs[now - 1], deborahs[now])
             depth, done, gone, good = _step(solid, state, workspace, step, mean, depth + rate * time)
             if not good:
                 return Outcome.DEPTH_NOT_FOUND
-            work, lost = work + done, lost + gone
+            work, dissipated = work + done, dissipated + gone
             if solid.viscosity == 0:
                 rate = (depth - old_depth) / time
         first = -1 if line.periodic else (-shift) % n
@@ -375,7 +375,7 @@ def follow_elements(
         drive = Drive(deborahs[now], loads[now], first)
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
-        out[STORED, now], out[WORK, now], out[LOST, now] = _state_energy(solid, state), work, lost
+        out[STORED, now], out[WORK, now], out[DISSIPATED, now] = _state_energy(solid, state), work, dissipated
     return Outcome.CONVERGED
 
 
