@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 
-from benchmarks.accuracy import contact, sliding
+from benchmarks.accuracy import campaigns, contact, sliding, surfaces
 from benchmarks.accuracy.points import Point, write
 
 SOLVERS: dict[str, Callable[[bool], Iterator[Point]]] = {
@@ -22,6 +22,9 @@ SOLVERS: dict[str, Callable[[bool], Iterator[Point]]] = {
     "films": contact.films,
     "rollers": contact.rollers,
     "master_curves": contact.master_curves,
+    "measured_lines": surfaces.measured_lines,
+    "maps": surfaces.maps,
+    **campaigns.CAMPAIGNS,
 }
 
 

@@ -68,12 +68,12 @@ def ways():
     return found
 
 
-def compared(families: int = 6) -> Iterator[Point]:
+def compared(families: int = 4, shapes: tuple[str, ...] = tuple(SHAPES)) -> Iterator[Point]:
     """Yield median time, error and half width of each method, and the share of factors inside, for each shape."""
     methods = ways()
     for method in methods.values():
         method(*family(FIRST_SEED - 1, SCATTER, "sigmoid", False)[:2])  # compiles
-    for shape in SHAPES:
+    for shape in shapes:
         judged = {name: [] for name in methods}
         for seed in range(FIRST_SEED, FIRST_SEED + families):
             groups, pieces, shifts, _ = family(seed, SCATTER, shape, False)

@@ -15,7 +15,6 @@ from benchmarks.accuracy.points import Point
 from benchmarks.peers.beside import OURS, in_turns, single_threaded
 from benchmarks.peers.page import tell
 from mdr_dask.physics.sliding.problem import Aim, solve
-from tests.references import slow_friction as slow
 
 GRIDS = (1, 2, 4, 8, 16, 32, 64, 128)
 GOALS = (0.1, 0.03, 0.01)
@@ -56,7 +55,7 @@ def compared() -> Iterator[Point]:
     """Yield what the least errors that reach a goal take of each method."""
     for case, (hurst, depth, deborah) in sliding.CASES.items():
         line, reference = sliding.rough(hurst)
-        truth = sliding.exact(reference, depth, slow.Body(np.empty(0), np.empty(0), deborah), True, False)
+        truth = sliding.exact(reference, depth, sliding.slow.Body(np.empty(0), np.empty(0), deborah), True, False)
 
         def ours(accuracy, line=line, deborah=deborah, truth=truth):
             aim = Aim(("drag",), accuracy, "auto", "hermite")

@@ -39,11 +39,11 @@ ABOUT = {
         "not compared, since lines do not have them.",
     ),
     "master curves": (
-        "Six families of ten curves with a scatter of 0.01 decades and known shift factors: median processor "
+        "Four families a shape of ten curves with a scatter of 0.01 decades and known shift factors: median processor "
         "time of a family, median error of a factor in decades, median half width of 95 % stated for it, and the "
         "share of factors inside. mastercurves (GPL-3.0) merges neighbours by Gaussian processes, in its second "
         "row with the scatter told. pyvisco (MIT) meets power laws of neighbours and states no error.",
-        "pyvisco is made for moduli that only rise, not for the bump. Some of its fits end without a result.",
+        "pyvisco is made for moduli that only rise. Where some of its fits end without a result, the row says so.",
     ),
     "Abel transform": (
         "Pressure from the line load at equidistant radii: largest error. PyAbel (MIT) has its matrices in memory; "

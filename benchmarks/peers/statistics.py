@@ -13,6 +13,7 @@ from benchmarks.surfaces.punches import areal_surface
 from mdr_dask.physics.surfaces import measured, roughness
 from mdr_dask.physics.surfaces.maps import SurfaceMap, spectrum_of_map, wavenumbers
 from mdr_dask.physics.surfaces.spectrum import self_affine
+from mdr_dask.physics.surfaces.waves import waves_of
 
 POINTS, SIDE, HURST = 2**16, 512, 0.8
 #: Points of the shortest wave.
@@ -40,8 +41,8 @@ def maps(shortest: int) -> tuple[np.ndarray, dict[str, float]]:
 
 
 def of_line(height):
-    q, density = measured.power_spectrum(height, 1.0)
-    return measured.rms_height(height), measured.rms_slope(height, 1.0), q, density
+    waves = waves_of(height)
+    return measured.rms_height(height), waves.rms_slope(), np.abs(waves.coefficients) ** 2
 
 
 def of_map(height):

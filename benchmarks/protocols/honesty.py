@@ -9,6 +9,7 @@ difference of the coefficient over its largest value, as the estimate is.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -65,27 +66,39 @@ def solve(case: dict[str, object], realisation: int) -> dict[str, np.ndarray] | 
     return alone(MODEL, VelocityJump.model_validate(case), realisation, OUTPUTS, 7)
 
 
-def main() -> None:
-    cases = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    generator, rows, failed = np.random.default_rng(2014), [], 0
+def solved(cases: int, seed: int) -> Iterator[tuple[float, float, dict[str, object]]]:
+    """Yield error and estimate over the largest friction, and the case; cases without a solution are left out."""
+    generator = np.random.default_rng(seed)
     for number in range(cases):
         case = random_case(generator)
         coarse = solve(case, number)
         fine = solve(case | {"oversampling": 24, "steps_per_decade": 24}, number)
-        if coarse is None or fine is None:
-            failed += 1
-            continue
-        true = float(np.max(np.abs(coarse[FRICTION] - fine[FRICTION])) / np.max(np.abs(fine[FRICTION])))
-        estimate = float(np.max(coarse[ESTIMATE]) / np.max(np.abs(fine[FRICTION])))
-        rows.append((true, estimate, str(case["protocol"]), str(case["indenter"]), "material" in case))
+        if coarse is not None and fine is not None:
+            largest = np.max(np.abs(fine[FRICTION]))
+            true = float(np.max(np.abs(coarse[FRICTION] - fine[FRICTION])) / largest)
+            yield true, float(np.max(coarse[ESTIMATE]) / largest), case
+
+
+def judged(cases: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return errors and estimates."""
+    true, estimate = np.array([row[:2] for row in solved(cases, seed)]).T
+    return true, estimate
+
+
+def main() -> None:
+    cases = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    rows = list(solved(cases, 2014))
     true, estimate = np.array([row[:2] for row in rows]).T
     met = true <= np.maximum(estimate, FLOOR)
-    print(f"{len(rows)} cases, {failed} failed; estimate covers {100 * met.mean():.1f} %")
+    print(f"{len(rows)} cases, {cases - len(rows)} failed; estimate covers {100 * met.mean():.1f} %")
     ratio = estimate / np.maximum(true, 1e-12)
     print(f"estimate / error: median {np.median(ratio):.1f}")
     print(f"error: median {np.median(true):.1e}, 95 % below {np.quantile(true, 0.95):.1e}")
     for k in np.flatnonzero(~met):
-        print(f"  {true[k]:.1e} estimated {estimate[k]:.1e}: {rows[k][2:]}")
+        case = rows[k][2]
+        print(
+            f"  {true[k]:.1e} estimated {estimate[k]:.1e}: {case['protocol']}, {case['indenter']}, {'material' in case}"
+        )
 
 
 if __name__ == "__main__":

@@ -62,10 +62,11 @@ def _draw_contact(axes: Axes, curve: drawing.Curve, output: str, joined: bool) -
 
 
 def _draw_growth(axes: Axes, curve: drawing.Curve, force: Any, fraction: Any) -> None:
-    """Draw the power law of eq. 3.12 through the lightest load that is known."""
-    known = np.flatnonzero(np.isfinite(fraction) & (fraction > 0))
-    if known.size:
-        first = known[np.argmin(force[known])]
+    """Draw the power law of eq. 3.12 through the lightest load that is known, as far as loads are known."""
+    known = np.isfinite(fraction) & (fraction > 0)
+    if known.any():
+        force, fraction = force[known], fraction[known]
+        first = np.argmin(force)
         law = fraction[first] * (force / force[first]) ** (1 / (1 + float(curve.data["hurst"])))
         drawing.law(axes, force, np.minimum(law, 1), "--", name="eq. 3.12", of=curve.data, lw=0.8, color=curve.colour)
 

@@ -14,11 +14,12 @@ import re
 import numpy as np
 import planted
 import pytest
+import xarray as xr
 from drawn import LAST, check_laws, check_picture, expected, mismatches
 
 from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.plots import available, curves, page, style
+from mdr_dask.plots import available, curves, drawing, page, scaling, style
 
 V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 8]}\n"
 FEW_V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 8]}\n"
@@ -346,3 +347,11 @@ def test_laws_are_fitted_to_a_sampled_study_or_say_why_not(shape, stores):
 def test_no_figure_is_called_like_an_output():
     for name in models.names():
         assert not {output.name for output in models.load(name).outputs} & set(available(name))
+
+
+def test_a_law_ends_where_its_loads_did_not_converge():
+    _, (axes,) = drawing.panels(1)
+    curve = drawing.Curve(xr.Dataset(coords={"hurst": 1.0}), "", "k", "-", "o")
+    scaling._draw_growth(axes, curve, np.array([1e-30, 0.1, 0.4]), np.array([np.nan, 0.1, 0.3]))
+    (law,) = axes.lines
+    np.testing.assert_allclose(law.get_xydata(), [[0.1, 0.1], [0.4, 0.2]])

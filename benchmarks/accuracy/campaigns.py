@@ -1,0 +1,221 @@
+"""Whole campaigns of every model: error of discretisation and statistics together, against their processor time.
+
+Each goes through the runner into a store on disk, on one thread: with fixed grids and numbers of lines, and told no
+more than what is wanted. The error is rms over cases and seeds, relative to the rms of the truth, which a finer setting
+and other lines give.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.accuracy.points import Point
+from benchmarks.friction import campaigns as friction
+from benchmarks.measures import timed
+from mdr_dask import execute, store
+from mdr_dask.campaign import loads
+
+SEED_OF_TRUTH = 99
+TOLD = "accuracy and until"
+
+
+@dataclass(frozen=True)
+class Study:
+    """A campaign, with words in capitals for what differs.
+
+    Parameters
+    ----------
+    text, output
+        The campaign without realisations, and what is judged.
+    scenes : dict
+        What is put for the words, easy to hard.
+    fixed, wanted, truth
+        By method and setting, for each accuracy wanted, and for the truth: what is put for SETTING and REST.
+    short : pair
+        Of a rough setting, and of another that it is judged by where there is little time.
+    seeds : int
+        With how many each is judged.
+    """
+
+    text: str
+    output: str
+    scenes: dict[str, dict[str, str]]
+    fixed: dict[tuple[str, str], tuple[str, str]]
+    wanted: dict[float, tuple[str, str]]
+    truth: tuple[str, str]
+    short: tuple[tuple[str, str], tuple[str, str]]
+    seeds: int = 1
+
+    def run(self, folder: Path, scene: str, setting: tuple[str, str], seed: int) -> tuple[np.ndarray, float]:
+        """Return the mean output of every case, and the processor time of the run."""
+        text = f"{self.text}seed: {seed}\n"
+        for word, value in (self.scenes[scene] | dict(zip(("SETTING", "REST"), setting, strict=True))).items():
+            text = text.replace(word, value)
+        study, url = loads(text, "campaign.yaml", "."), tempfile.mkdtemp(dir=folder) + "/store.zarr"
+        progress, seconds = timed(lambda: execute.run(study, url, execute.Resources(threads=1), lambda _: None))
+        assert progress.failed == 0
+        return store.datasets(url)[""][self.output].mean("realisation").to_numpy(), seconds
+
+    def judged(self, folder: Path, scene: str, setting: tuple[str, str], truth: np.ndarray) -> tuple[float, float]:
+        """Return mean seconds, and the rms error over cases and seeds."""
+        found, seconds = zip(*(self.run(folder, scene, setting, seed) for seed in range(self.seeds)), strict=True)
+        return float(np.mean(seconds)), float(np.sqrt(np.mean((np.array(found) - truth) ** 2) / np.mean(truth**2)))
+
+    def points(self, solver: str, short: bool) -> Iterator[Point]:
+        """Yield all settings of all scenes, or a rough one of the first against another."""
+        wanted = {(TOLD, f"asked {accuracy:g}"): each for accuracy, each in self.wanted.items()}
+        settings = {(TOLD, "short"): self.short[0]} if short else self.fixed | wanted
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for scene in list(self.scenes)[: 1 if short else None]:
+                truth, _ = self.run(folder, scene, self.short[1] if short else self.truth, SEED_OF_TRUTH)
+                for (method, setting), each in settings.items():
+                    yield Point(solver, scene, method, setting, *self.judged(folder, scene, each, truth))
+
+
+def told(accuracy: float, output: str, rest: str = "") -> str:
+    """Return what a campaign is told that wants a standard error."""
+    return f"realisations: {{at_least: 8, at_most: 4096, until: {{{output}: {accuracy:g}}}}}\n{rest}"
+
+
+JUMPS = Study(
+    """
+name: jumps
+model: velocity_jump
+parameters:
+  length: 10 mm
+  points: 500
+  hurst: 0.7
+  rms_roughness: 10 um
+  shear_modulus: 10 MPa
+  relaxation_time: 1 ms
+  velocity: {geometric: [20 mm/s, 1 m/s, 4]}
+  normal_force: {geometric: [FORCES, 2]}
+  SETTING
+outputs: [friction_coefficient_jump]
+REST
+""",
+    "friction_coefficient_jump",
+    {
+        "easy: heavy": {"FORCES": "10 N, 100 N"},
+        "typical": {"FORCES": "1 N, 3 N"},
+        "hard: light": {"FORCES": "10 mN, 0.1 N"},
+    },
+    {
+        (f"oversampling {grid}", f"{lines} lines"): (f"oversampling: {grid}", f"realisations: {lines}\nerrors: false\n")
+        for grid in (2, 4, 16)
+        for lines in (16, 64, 256)
+    },
+    {a: ("", told(a, "friction_coefficient_jump", f"accuracy: {a:g}\n")) for a in (0.1, 0.05, 0.02)},
+    ("", "realisations: 1000\naccuracy: 0.005\n"),
+    (("", "realisations: 8\naccuracy: 0.1\n"), ("", "realisations: 16\naccuracy: 0.05\n")),
+    3,
+)
+ROLLERS = Study(
+    """
+name: rollers
+model: mixed_lubrication
+parameters:
+  normal_force: [200 N, 800 N]
+  rotation_speed: {geometric: [1 rpm, 30 rpm, 4]}
+  temperature: HEAT
+  rms_roughness: 0.2 um
+  SETTING
+outputs: [breakthrough_probability]
+REST
+""",
+    "breakthrough_probability",
+    {"easy: 80 C": {"HEAT": "80 degC"}, "typical: 60 C": {"HEAT": "60 degC"}, "hard: 40 C": {"HEAT": "40 degC"}},
+    {
+        (f"{points} points", f"{lines} lines"): (f"points: {points}", f"realisations: {lines}\n")
+        for points in (10_000, 100_000, 1_000_000)
+        for lines in (4, 16)
+    },
+    {
+        a: (
+            "",
+            "realisations: {at_least: 4, at_most: 64, until: {breakthrough_probability: "
+            f"{{relative: {a:g}, absolute: {a / 4:g}}}}}}}\n",
+        )
+        for a in (0.1, 0.05, 0.02)
+    },
+    ("", "realisations: 64\n"),
+    (("points: 20000", "realisations: 4\n"), ("points: 20000", "realisations: 8\n")),
+    2,
+)
+FILMS = Study(
+    """
+name: films
+model: ehl_line
+parameters:
+  load_parameter: LOAD
+  speed_parameter: {geometric: [1e-12, 1e-10, 3]}
+  material_parameter: [2504, 5007, 10014]
+outputs: [central_film]
+REST
+""",
+    "central_film",
+    {"easy: light": {"LOAD": "2e-5"}, "typical": {"LOAD": "1e-4"}, "hard: heavy": {"LOAD": "5e-4"}},
+    {},
+    {a: ("", f"accuracy: {a:g}\n") for a in (0.1, 0.01, 1e-3, 3e-4)},
+    ("", "accuracy: 2e-5\n"),
+    (("", "accuracy: 0.01\n"), ("", "accuracy: 1e-3\n")),
+)
+WEAR = Study(
+    """
+name: wear
+model: fretting_wear
+parameters:
+  indenter: BODY
+  stick_radius: [0.3, 0.55, 0.8]
+  cycles: [0.5, 2, 8]
+  hold: HELD
+  SETTING
+outputs: [wear_volume]
+REST
+""",
+    "wear_volume",
+    {
+        "easy: parabola": {"BODY": "{shape: parabola}", "HELD": "depth"},
+        "typical: cone, force held": {"BODY": "{shape: cone}", "HELD": "force"},
+        "hard: n = 8": {"BODY": "{shape: power, exponent: 8}", "HELD": "depth"},
+    },
+    {("fast rule", ""): ("wear_rule: fast", "")},
+    {a: (f"accuracy: {a:g}", "") for a in (0.1, 0.01, 1e-3, 1e-4)},
+    ("accuracy: 1e-5", ""),
+    (("accuracy: 0.1", ""), ("accuracy: 0.01", "")),
+)
+
+
+def sliding(short: bool) -> Iterator[Point]:
+    """Yield the campaigns of sliding friction, which have a page of their own too."""
+    with tempfile.TemporaryDirectory() as folder:
+        for scene in list(friction.SCENES)[: 1 if short else None]:
+            truth = friction.run(
+                folder, scene, "hermite", "auto", 20 if short else friction.TRUTH, SEED_OF_TRUTH, 0.005
+            )[0]
+            fixed = {} if short else friction.fixed(folder, scene, truth)
+            for method, rows in fixed.items():
+                for error, lines, seconds in rows:
+                    yield Point("campaigns of sliding friction", scene, method, f"{lines:.0f} lines", seconds, error)
+            for accuracy in friction.WANTED[: 1 if short else None]:
+                until = told(accuracy, "friction_coefficient").partition(": ")[2]
+                error, _, seconds = friction.measured(
+                    folder, scene, truth, until, 1 if short else friction.MOST_SEEDS, "hermite", "auto", accuracy
+                )
+                yield Point("campaigns of sliding friction", scene, TOLD, f"asked {accuracy:g}", seconds, error)
+
+
+CAMPAIGNS: dict[str, Callable[[bool], Iterator[Point]]] = {
+    "campaigns_of_friction": sliding,
+    "campaigns_of_jumps": partial(JUMPS.points, "campaigns of velocity jumps"),
+    "campaigns_of_rollers": partial(ROLLERS.points, "campaigns of mixed lubrication"),
+    "campaigns_of_films": partial(FILMS.points, "campaigns of line contacts"),
+    "campaigns_of_wear": partial(WEAR.points, "campaigns of wear"),
+}
