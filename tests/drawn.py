@@ -90,9 +90,21 @@ def check_picture(figure) -> None:
         before = known[np.clip(np.searchsorted(known, ends) - 1, 0, None)]
         assert np.all(np.minimum(abs(near - ends), abs(before - ends)) <= 1e-9 * abs(ends) + 1e-300)
     for axes in figure.axes:
+        _check_look(axes)
         for artist in [*axes.lines, *axes.collections]:
             if axes.get_label() != "<colorbar>" and _shows_data(artist, axes):
                 assert artist.get_gid(), f"{artist} is in no table"
+
+
+def _check_look(axes) -> None:
+    """A legend stands in its panel or beside it; colours that part at white part at zero."""
+    if legend := axes.get_legend():
+        corners = axes.transAxes.inverted().transform(legend.get_bbox_to_anchor().get_points())
+        assert np.all((corners > -0.6) & (corners < 1.6))
+    for part in axes.collections:
+        if _is(part, "QuadMesh") and part.get_cmap().name.startswith("RdBu"):
+            low, high = part.get_clim()
+            assert -low == high > 0
 
 
 #: Laws as figures name them, in closed form once more; each has to be drawn wherever its figure is.

@@ -80,3 +80,10 @@ def test_an_error_that_knows_nothing_is_not_left_out() -> None:
     low, high = bootstrap.interval(np.concatenate([stack, rows]), 9)
     assert np.allclose((low[1], high[1]), (0.0, 4.0), atol=0.05)
     assert np.all(high[[0, 2]] - low[[0, 2]] < 0.1)
+
+
+def test_errors_reach_as_far_up_as_they_move_up_and_as_far_down_as_they_move_down() -> None:
+    """What is fitted need not follow its data evenly: errors that move it up by 3 move it down by 1."""
+    same = np.full((1 + bootstrap.RESAMPLES, 1), 5.0)
+    low, high = bootstrap.interval(np.concatenate([same, [[8.0]], [[4.0]], [[4.5]], [[5.2]]]), 10)
+    assert (low[0], high[0]) == pytest.approx((3.5, 8.2))

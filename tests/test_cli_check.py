@@ -176,7 +176,7 @@ def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, 
     monkeypatch.chdir(tmp_path)
     Path("rig.csv").write_text(
         "# of a rig\nvelocity [mm/s], relaxation_times, friction_coefficient, standard_error\n"
-        "1, 0.01, 0.3, 0.01\n20, 1, 0.2, 0.01\n1, 100, 0.2, 0.01\n"
+        "1, 0.01, 0.3, 0.01\n10.005, 1, 0.2, 0.01\n1, 100, 0.2, 0.01\n10.000001, 1, 0.2, 0.01\n"
     )
     Path("rig.yaml").write_text(
         "name: rig\nmodel: velocity_jump\nmeasured: {table: rig.csv}\nparameters:\n"
@@ -186,10 +186,10 @@ def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, 
     assert main(["check", "rig.yaml"]) == 0
     told = capsys.readouterr().out
     for line in (
-        "measured rig.csv: 3 rows of friction_coefficient, standard_error",
-        "measured rig.csv: conditions velocity 1 mm/s to 20 mm/s, relaxation_times 0.01 to 100",
+        "measured rig.csv: 4 rows of friction_coefficient, standard_error",
+        "measured rig.csv: conditions velocity 1 mm/s to 10.01 mm/s, relaxation_times 0.01 to 100",
         "measured rig.csv: unknowns material_kelvin_relaxation_time",
-        "measured rig.csv: outside the study, and refused by the fit: line 4, velocity 20 mm/s; "
+        "measured rig.csv: outside the study, and refused by the fit: line 4, velocity 10.01 mm/s; "
         "line 5, relaxation_times 100",
     ):
         assert f"  {line}\n" in told

@@ -135,6 +135,9 @@ def test_a_figure_of_an_output_has_its_data_and_their_origin_beside_it(filled, c
     assert main(["plot", filled, "friction_coefficient", "rms_slope", "--effects", "-o", "drawn"]) == 0
     assert (Path("drawn") / "small-rms_slope-effects.csv").exists()
     assert "Traceback" not in capsys.readouterr().err
+    capsys.readouterr()
+    assert main([*command, "--units", "velocity=km/h", "--units", "contact_fraction=%", "-o", "drawn/mu.pdf"]) == 0
+    assert "--units contact_fraction: shown in no figure that was drawn" in capsys.readouterr().err
     named = ["plot", filled, "velocity", "--where", "friction_coefficient < 1e-4", "-o", "drawn/slow.png"]
     assert main(named) == 0
     assert "not drawn: cases other than friction_coefficient < 1e-4" in capsys.readouterr().err

@@ -17,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
 from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store import Hold, files, locks
+from mdr_dask.store import Hold, files, locks, runners
 from mdr_dask.task import run_block
 
 
@@ -185,3 +185,8 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
         store.lock(url),
     ):
         pass
+
+
+def test_an_owner_gives_several_signs_of_life_before_it_counts_as_gone():
+    assert 4 * locks.BEAT < locks.SILENCE
+    assert 10 * runners.KNOCK < runners.GLANCE < runners.SILENT

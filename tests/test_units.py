@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mdr_dask import models
 from mdr_dask.campaign.reference import output_rows, parameter_rows
-from mdr_dask.units import expected, registry, to_si
+from mdr_dask.units import expected, registry, seconds, to_si
 
 
 @pytest.mark.parametrize(
@@ -122,3 +122,20 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
     with pytest.raises(ValueError, match="expected"):
         to_si(value, "m")
     assert time.process_time() - began < 1
+
+
+@pytest.mark.parametrize(
+    ("duration", "said"),
+    [
+        (0.123, "0.12 s"),
+        (9.96, "10 s"),
+        (59.4, "59 s"),
+        (60.0, "1 min 0 s"),
+        (599.0, "9 min 59 s"),
+        (3599.0, "59 min"),
+        (3600.0, "1 h 0 min"),
+        (90000.0, "25 h 0 min"),
+    ],
+)
+def test_durations_are_said_as_a_person_says_them(duration, said):
+    assert seconds(duration) == said

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from mdr_dask.campaign import loads
+from mdr_dask.campaign.definition import Spread
 from mdr_dask.errors import CampaignError
 
 HEAD = "name: a\nmodel: rubbing\nparameters:\n  length: 20 mm\n"
@@ -108,3 +109,15 @@ def test_cells_may_carry_units(tmp_path):
     assert values(series, "normal_force") == (0.001, 2000.0)
     assert values(series, "scheme") == ("exact", "euler")
     assert values(series, "shift") == (True, False)
+
+
+@pytest.mark.parametrize(("low", "high"), [(2.0, 50.0), (50.0, 2.0)])
+@pytest.mark.parametrize("geometric", [False, True])
+def test_shares_of_an_interval_lead_to_its_values_and_back(low, high, geometric):
+    spread = Spread(low, high, geometric, whole=False)
+    shares = np.array([0.0, 0.25, 0.8, 1.0])
+    values = spread.at(shares)
+    assert values[0] == low
+    assert values[-1] == high
+    assert values[1] == pytest.approx(low * (high / low) ** 0.25 if geometric else low + 0.25 * (high - low))
+    assert np.allclose(spread.shares(values), shares, atol=1e-12)

@@ -126,6 +126,12 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {"realisations": 1},
         {"stribeck"},
     ),
+    "rollers: many speeds": (
+        planted.ROLLERS + "  normal_force: 200 N\n  rotation_speed: {geometric: [10 rpm, 1000 rpm, 14]}\n"
+        "  temperature: [40 degC, 60 degC]\n",
+        {},
+        {"temperature", "stribeck"},
+    ),
     "rollers: creep too": (
         planted.ROLLERS + OPERATION + "  slide_roll_ratio: [0.0, 0.05, 0.1]\n",
         {"failed": True},
@@ -262,6 +268,10 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
     told = style.left_out(figure)
     if len(groups) == 1 and not re.search("values of|series|cases|not known", told) and name not in PARTLY:
         assert mismatches(known, data).empty
+    if len(groups) == 1:
+        (one,) = groups.values()
+        cut = [axis for axis in data.columns.intersection(list(one.dims)) if 1 < data[axis].nunique() < one[axis].size]
+        assert told or not cut, f"values of {cut} are left out without a word"
     for column in data.columns.intersection(LAST):
         moved = data.tail(1).assign(
             **{column: 1.001 * data[column].tail(1) + 1e-3 * data[column].abs().max() * (data[column].tail(1) == 0)}
