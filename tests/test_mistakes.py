@@ -39,6 +39,7 @@ MISTAKES = [
     ("realisations", "repeats", "4:1: repeats: unknown key (did you mean 'realisations'?)"),
     ("parameters:", "parameter:", "5:1: parameter: unknown key (did you mean 'parameters'?)"),
     ("sliding_friction", "friction", "2:8: model: unknown model 'friction' (did you mean 'sliding_friction'?)"),
+    ("sliding_friction", "json:MODEL", "'json' has no attribute 'MODEL' (expected module:NAME of a Model)"),
     ("accuracy: 1 %", "outputs: [mu]", "outputs[0]: unknown output 'mu' (did you mean 'friction_coefficient'?)"),
     ("accuracy: 1 %", "outputs: film", "14:10: outputs: expected a list, got 'film' (write [film])"),
     ("accuracy: 1 %", "output: [mu]", "14:1: output: unknown key (did you mean 'outputs'?)"),

@@ -74,6 +74,10 @@ WRONG = [
         "no figure of sliding_friction is called 'nothing'; known: calibration, contact, lines, regions, velocity",
     ),
     ("plot STORE friction_coefficient", "friction_coefficient is an output: say --over AXIS, or --effects"),
+    (
+        "plot STORE friction_coefficient --over velocity --style graysale",
+        "expected a style file, or the name of a style of matplotlib (did you mean 'grayscale'?), got 'graysale'",
+    ),
     ("plot STORE friction_coefficient --over speed", "no axis 'speed' (did you mean 'velocity'?)"),
     (
         "plot STORE friction_coefficient --over velocity --effects",
@@ -89,7 +93,6 @@ WRONG = [
         "plot STORE friction_coefficient --over velocity --size 85",
         "expected a width such as '85mm', or width and height",
     ),
-    ("plot STORE friction_coefficient --over velocity --style x.mplstyle", "no style file of matplotlib"),
     ("plot STORE velocity --by normal_force", "--by is for an output with --over or --effects"),
     ("plot STORE nowhere.zarr velocity", "nowhere.zarr: no store here"),
     ("plot STORE velocity --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),

@@ -181,11 +181,14 @@ class _Marched(_Group):
         return self._of(jumps, loads, which), loads.size
 
     def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return loads and Deborah numbers of the different cases, and the entry of every member."""
+        """Return loads and Deborah numbers of the different cases, and the entry of every member.
+
+        Those of a speed come one after the other: what a line does at a Deborah number is worked out once for them.
+        """
         before = self.problems.deborah[self.members]
         change = np.asarray(self.block.column("velocity_change"), dtype=np.float64)[self.members]
-        numbers = np.stack([self.problems.loads[self.members], before, before * (1 + change)])
-        (loads, *deborah), which = np.unique(numbers, axis=1, return_inverse=True)
+        numbers = np.stack([before, before * (1 + change), self.problems.loads[self.members]])
+        (*deborah, loads), which = np.unique(numbers, axis=1, return_inverse=True)
         return loads, np.column_stack(deborah), which
 
     @staticmethod

@@ -7,6 +7,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, copy_into
@@ -64,6 +66,13 @@ def _take(given: FloatArray, first: int, stride: int, turn: FloatArray) -> None:
         turn[i] = turn[i - n]
 
 
+@lru_cache(maxsize=4)
+def _end_factors(n: int) -> NDArray[np.complex128]:
+    """Return the factors of `ends_of` for every wave of a line of n nodes, from the mean on."""
+    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
+    return np.append(0.0, 1j * (1 / wave - 0.5 / np.tan(wave / 2)))
+
+
 def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     """Return what the trapezia over nodes leave of the integrals of height and slope squared, shape (2, n).
 
@@ -71,11 +80,9 @@ def ends_of(height: FloatArray, slope: FloatArray) -> FloatArray:
     derivatives do not see the shortest waves, whose slopes are all that a clipped peak has.
     """
     n = height.size
-    wave = 2 * np.pi / n * np.arange(1, n // 2 + 1)
-    parts = np.fft.rfft([height, (slope / n) ** 2])
-    parts[:, 0] = 0.0
-    parts[:, 1:] *= 1j * (1 / wave - 0.5 / np.tan(wave / 2))
-    return np.asarray(np.fft.irfft(parts, n), dtype=np.float64)
+    parts = fft.rfft([height, (slope / n) ** 2])
+    parts *= _end_factors(n)
+    return np.asarray(fft.irfft(parts, n, overwrite_x=True), dtype=np.float64)
 
 
 def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolved: bool, ends: FloatArray) -> Nodes:
