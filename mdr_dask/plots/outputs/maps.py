@@ -47,7 +47,7 @@ def draw_map(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, list[s
     quantity = style.quantity(view.output, series[0][view.output])
     words = style.with_unit(quantity.symbol, quantity.unit)
     figure.colorbar(colours, ax=axes_of, label=style.broken(words))
-    words = " over {} and {}".format(*(name.replace("_", " ") for name in view.over)).strip()
+    words = " against {} and {}".format(*(name.replace("_", " ") for name in view.over)).strip()
     title(
         figure,
         subject(found, view, words),
