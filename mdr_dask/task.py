@@ -6,6 +6,7 @@ import ctypes
 import os
 import platform
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -71,7 +72,8 @@ class Work:
 class Outcome:
     """What a task sends home: counts and times, never numbers of the study.
 
-    Of the time to compute, `compile_seconds` went by while this process compiled kernels.
+    Of the time to compute, `compile_seconds` went by while this process compiled kernels. `warned` counts the results
+    that are done and have a message all the same.
     """
 
     counts: tuple[int, ...]
@@ -80,6 +82,7 @@ class Outcome:
     compute_seconds: float
     write_seconds: float
     compile_seconds: float = 0.0
+    warned: int = 0
 
     @property
     def seconds(self) -> float:
@@ -121,9 +124,10 @@ def run_block(work: Work) -> Outcome:
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
     compiled = clock.seconds - compiled if clock else 0.0
-    _write(work, values if work.wanted.any() else {}, status, _record(work, result, status, middle - started))
-    written = time.perf_counter() - middle
-    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written, compiled)
+    record = _record(work, result, status, middle - started)
+    _write(work, values if work.wanted.any() else {}, status, record)
+    written, warned = time.perf_counter() - middle, _warned(record)
+    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written, compiled, warned)
 
 
 def finished(work: Work) -> Outcome | None:
@@ -135,7 +139,8 @@ def finished(work: Work) -> Outcome | None:
     if record is None or not store.is_written(work.place, record):
         return None
     _, status = store.read_block(work.place, ())
-    return Outcome(_counts(work, status), record["solves"], work.estimate, record["compute_seconds"], 0.0)
+    seconds, warned = record["compute_seconds"], _warned(record)
+    return Outcome(_counts(work, status), record["solves"], work.estimate, seconds, 0.0, warned=warned)
 
 
 def _other_version(work: Work) -> str:
@@ -153,6 +158,10 @@ def _write(
 
 def _counts(work: Work, status: NDArray[np.int8]) -> tuple[int, ...]:
     return tuple(np.bincount(status[work.wanted | work.spared], minlength=len(Status)).tolist())
+
+
+def _warned(record: Mapping[str, Any]) -> int:
+    return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
 def _compute(model: Model[Any], block: Block[Any]) -> Result:

@@ -80,7 +80,11 @@ def test_a_case_that_raises_is_data(example, capsys):
     ("name", "module", "sentence"),
     [
         ("absent_module:MODEL", None, "cannot import 'absent_module' .* put its folder on PYTHONPATH"),
-        ("wear_rate:NOTHING", MODULE, "cannot load model 'wear_rate:NOTHING': AttributeError"),
+        (
+            "wear_rate:NOTHING",
+            MODULE,
+            "cannot load model 'wear_rate:NOTHING': module 'wear_rate' has no attribute 'NOTHING'",
+        ),
         ("wear_rate:solve", MODULE, "expected 'wear_rate:solve' to be a mdr_dask Model, got function"),
         ("wear_rate:MODEL", "1 / 0", "ZeroDivisionError: division by zero"),
         ("wear_rate:MODEL", "import lacking", "No module named 'lacking'"),

@@ -95,10 +95,11 @@ def _wait_for(capsys, line):
 
 def test_every_kind_of_result_counts_once():
     """A block of each status, in the order of the statuses: missing, done, not converged, failed, not needed."""
-    outcome = Outcome((0, 40, 3, 2, 7), 5, 1.5, 4.0, 0.5, 9.0)
+    outcome = Outcome((0, 40, 3, 2, 7), 5, 1.5, 4.0, 0.5, 9.0, warned=6)
     once = Progress(total=200, kept=10, estimated=6.0).after(outcome, 2.0)
     assert (once.done, once.failed, once.not_needed, once.solves, once.blocks) == (40, 5, 7, 5, 1)
     assert once.to_do == 200 - 10 - 40 - 5 - 7
     assert (once.compute_seconds, once.compile_seconds, once.write_seconds) == (4.0, 4.0, 0.5)  # never more than all
     twice = once.after(outcome, 3.0)
+    assert twice.warned == 12
     assert (twice.not_needed, twice.to_do, twice.finished, twice.wall_seconds) == (14, 86, 3.0, 3.0)

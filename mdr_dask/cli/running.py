@@ -141,6 +141,8 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
     )
     if progress.failed:
         click.echo(f"which ones, and why: mdr-dask status {url} --failures", err=True)
+    if progress.warned:
+        click.echo(f"{progress.warned} done with a warning: mdr-dask status {url} --messages", err=True)
 
 
 def _shared(progress: Progress) -> str:

@@ -16,6 +16,8 @@ class Progress:
     ----------
     total, kept, done, failed, not_needed : int
         All results of the campaign so far, those found in the store, and those of this run.
+    warned : int
+        Those of this run that are done, and have a message: an accuracy that was missed, a law beyond its range.
     blocks, solves : int
         Blocks run and solutions really computed in this run.
     estimated, finished : float
@@ -30,6 +32,7 @@ class Progress:
     done: int = 0
     failed: int = 0
     not_needed: int = 0
+    warned: int = 0
     blocks: int = 0
     solves: int = 0
     estimated: float = 0.0
@@ -65,6 +68,7 @@ class Progress:
             done=self.done + counts[Status.DONE],
             failed=self.failed + counts[Status.FAILED] + counts[Status.NOT_CONVERGED],
             not_needed=self.not_needed + counts[Status.NOT_NEEDED],
+            warned=self.warned + outcome.warned,
             blocks=self.blocks + 1,
             solves=self.solves + outcome.solves,
             finished=self.finished + outcome.estimate,

@@ -169,8 +169,7 @@ ROWS = {
     ),
     "wear, history": (
         "fretting_wear",
-        FRETTING
-        | BALL
+        {name: value for name, value in (FRETTING | BALL).items() if name != "cycles"}
         | {"cells": 40, "history": ({"cycles": 1e4}, {"cycles": 1e4, "amplitude_factor": 1.5, "load_factor": 1.2})},
         FREE,
     ),

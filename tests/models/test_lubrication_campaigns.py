@@ -202,7 +202,7 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
     )  # fmt: skip
     results(LINE, ("line_load: 80 kN/m", "line_load: 80 N/m"), ("outputs: [", "outputs: [formula_central_film, "))
     told = {}
-    capsys.readouterr()
+    assert capsys.readouterr().err.count(" done with a warning: mdr-dask status results/") == 3
     for name in ("mixed", "loaded", "line"):
         assert main(["status", f"results/{name}.zarr", "--messages"]) == 0
         told[name] = capsys.readouterr().out

@@ -156,15 +156,15 @@ def test_creep_keeps_the_probability_of_the_rig():
     assert still.mean() == pytest.approx(0.717, abs=0.04)
 
 
-def test_errors_of_a_turn_are_the_steps_to_the_halved_grid():
+def test_errors_of_a_turn_are_twice_the_steps_to_the_halved_grid():
     """The difference to every second point is computed on the halved line itself."""
     fine = MODEL.compute(block(shortest_wavelength=1e-5)).values
     coarse = MODEL.compute(block(points=10_000, shortest_wavelength=1e-5)).values
     # the lines agree to rounding, and the window of the coarse line may be a point shorter
     for name, size in (("breakthrough_probability", 1.0), ("contact_length", 1e-5), ("contact_conductance", 50.0)):
-        step = abs(fine[name] - coarse[name])
-        assert fine[f"{name}_error"] == pytest.approx(step, abs=0.02 * size)
-    resistance = abs(fine["contact_resistance"] - coarse["contact_resistance"])
+        step = 2 * abs(fine[name] - coarse[name])
+        assert fine[f"{name}_error"] == pytest.approx(step, abs=0.04 * size)
+    resistance = 2 * abs(fine["contact_resistance"] - coarse["contact_resistance"])
     assert fine["contact_resistance_error"] == pytest.approx(resistance, rel=0.1)
 
 

@@ -215,7 +215,9 @@ def test_sizes_are_read():
 
 def test_a_style_that_is_not_there_is_one_sentence():
     with (
-        pytest.raises(DataError, match=r"no style file of matplotlib.*'nowhere\.mplstyle'"),
+        pytest.raises(
+            DataError, match=r"expected a style file, or the name of a style of matplotlib .*'nowhere\.mplstyle'"
+        ),
         page.drawing_for(page.Page(), "nowhere.mplstyle"),
     ):
         pass
