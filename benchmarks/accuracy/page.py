@@ -185,8 +185,8 @@ HONESTY = """## Whether stated errors hold
 
 Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms: the share whose error is
 below the stated one, and the median of stated over error. The judgements are [a table](evidence/honesty.csv). Shares of
-20 cases are known to ten per cent. Stated errors of the breakthrough are three to twenty times too large at a million points
-([evidence](evidence/mixed-lubrication.md)).
+20 cases are known to ten per cent. Stated errors of the breakthrough are six to twenty times too large at a million
+points ([evidence](evidence/mixed-lubrication.md)).
 
 | solver | cases | number | held | stated over error |
 |---|---|---|---|---|
