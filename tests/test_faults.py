@@ -147,3 +147,11 @@ def test_all_contents_are_on_the_disk_before_a_name_is_given_and_all_names_when_
     files.write_stages(str(tmp_path), [{"values/0": b"1", "values/1": b"2"}, {"ledger": b"3"}])
     named = [("named", "0"), ("named", "1"), ("named", "ledger")]
     assert acts == [("flushed", False)] * 3 + named + [("flushed", True)] * 2
+
+
+def test_the_root_of_a_store_with_series_says_where_to_look(toy, tmp_path):
+    url = str(tmp_path / "series.zarr")
+    run(two_series(small(toy)), url)
+    where = "results of series stand in groups: open_datatree, or open_zarr with group='far' or group='near'"
+    assert xr.open_zarr(url).attrs["comment"] == where
+    assert "comment" not in xr.open_zarr(url, group="far").attrs

@@ -133,4 +133,13 @@ def root_of(copies: list[Copy]) -> tuple[dict[str, Any], dict[str, Any]]:
     members: dict[str, Any] = {}
     for copy in copies:
         members |= copy.members
-    return members, {**latest.study, **root}
+    return members, {**latest.study, **root, **signpost(members)}
+
+
+def signpost(members: Mapping[str, Any]) -> dict[str, str]:
+    """Return what a root with series says of where their results are: opened as one dataset, it looks empty."""
+    series = sorted(name for name, member in members.items() if member["node_type"] == "group")
+    groups = " or ".join(f"group={name!r}" for name in series)
+    return (
+        {"comment": f"results of series stand in groups: open_datatree, or open_zarr with {groups}"} if series else {}
+    )

@@ -22,7 +22,7 @@ from mdr_dask.campaign import Campaign
 from mdr_dask.models.base import Status
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.plan import Template
-from mdr_dask.store.copies import Copy
+from mdr_dask.store.copies import Copy, signpost
 from mdr_dask.store.files import LAYOUT, clear, group_name, read_many, write_bytes, write_stages
 from mdr_dask.store.records import digest
 from mdr_dask.store.study import document, only_claimed
@@ -69,7 +69,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
     own = {copy.series: group_name(copy.series, "zarr.json") for copy in copies if copy.series}
     files = {name: content for copy in copies for name, content in copy.files.items()}
     groups = {name: files.pop(name) for name in own.values()}
-    root_document = {"zarr.json": group_document(members, study | root)}
+    root_document = {"zarr.json": group_document(members, study | root | signpost(members))}
     write_stages(url, [dict(copy.file() for copy in copies), files, groups, root_document])
 
 
