@@ -75,13 +75,20 @@ def test_a_file_that_its_holder_takes_away_at_that_moment_is_no_lock(url, monkey
         pass
 
 
-def test_a_refusal_takes_no_lock_of_others_away(url):
-    with pytest.raises(StoreError, match="no workers"), store.beside(url, Part(1, 3)):
-        with store.beside(url, Part(2, 3)):
-            with pytest.raises(StoreError, match="no workers"), store.beside(url, Part(3, 3)):
-                raise StoreError("no workers")
-            assert store.at_work(url)[1] == [Part(1, 3), Part(2, 3)]
+def refused(url, part, meanwhile=lambda: None):
+    with store.beside(url, part):
+        meanwhile()
         raise StoreError("no workers")
+
+
+def test_a_refusal_takes_no_lock_of_others_away(url):
+    def meanwhile():
+        with pytest.raises(StoreError, match="no workers"):
+            refused(url, Part(2, 2))
+        assert store.at_work(url)[1] == [Part(1, 2)]
+
+    with pytest.raises(StoreError, match="no workers"):
+        refused(url, Part(1, 2), meanwhile)
     assert not list(Path(url).parent.iterdir())
 
 
