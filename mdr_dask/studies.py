@@ -103,8 +103,8 @@ def run(
         As `read` takes it.
     store : str or Path, optional
         Path or URL of the store. Without it, a file's campaign goes where the command line puts it, a dictionary's
-        where its key ``store`` says, or else to a temporary place that lasts as long as this process: the same
-        dictionary finds its results there.
+        where its key ``store`` says. Otherwise it is a temporary place that lasts as long as this process; there
+        the same dictionary finds its results.
     progress : bool
         Show a bar in a notebook or on a terminal, or a line now and then.
     resources : Resources, optional
