@@ -66,6 +66,7 @@ class MixedLubrication(Parameters):
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
     ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("surface_1", "surface_2")),)
+    settings: ClassVar[frozenset[str]] = frozenset({"points", "trace_points"})
     normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
     temperature: float = quantity("K", "temperature of rollers and oil", usual="60 degC", gt=0)
