@@ -166,8 +166,9 @@ class Table(NamedTuple):
 
     def _errors(self, used: Any) -> FloatArray:
         known = ~np.isnan(self.error[used])
-        total: FloatArray = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
-        return total / np.maximum(known.sum(axis=1), 1)
+        total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
+        mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
+        return mean
 
     @staticmethod
     def _moved(stack: FloatArray, error: FloatArray) -> FloatArray:
@@ -269,7 +270,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
-    if velocity.size < 3:
+    if velocity.size < 3 or not table.mean()[known].max() > 0:
         raise FitError("expected three velocities or more with friction, for a maximum over them")
     order = np.argsort(velocity)
     x, count = np.log(velocity[order]), table.count(known)
