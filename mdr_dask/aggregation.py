@@ -100,7 +100,8 @@ def _mean_and_ends(
         return middle, *np.moveaxis(_interval(values, count), -1, 0)
     grid = _mean(errors)
     low, high = np.moveaxis(_interval(np.concatenate([values, grid[..., None]], axis=-1), count), -1, 0)
-    return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
+    with np.errstate(invalid="ignore"):  # an infinite mean of an infinite error, as of a resistance, has no ends
+        return middle, np.where(np.isnan(low), middle - grid, low), np.where(np.isnan(high), middle + grid, high)
 
 
 def _mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
