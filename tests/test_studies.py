@@ -81,6 +81,14 @@ def test_statistics_figures_and_master_curves_of_a_dataset_and_of_its_path(study
         assert factors.sizes["normal_force"] == 2
 
 
+def test_one_series_is_merged_with_its_realisations_whatever_it_varies():
+    """Not as the friction of many series, whose means alone are merged, over force and velocity."""
+    asked = {**SMALL, "parameters": {**SMALL["parameters"], "normal_force": 1, "hurst": [0.3, 0.7]}}
+    varied = mdr_dask.run(asked, progress=False)
+    factors = mdr_dask.master_curve(varied, over="velocity", of="friction_coefficient", by="hurst")
+    assert factors.sizes["hurst"] == 2
+
+
 def test_laws_are_fitted_to_a_dataset_and_to_its_path(tmp_path):
     loads = "  normal_force: {geometric: [2 mN, 25 mN, 8]}\n  velocity: {geometric: [0.1 mm/s, 10 m/s, 11]}\n"
     planted = make(tmp_path, SLIDING + loads)[""]
