@@ -273,7 +273,7 @@ def _of_table(path: str | Path, law: str) -> xr.Dataset:
 
 
 def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
-    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.save`` writes it, and its data beside it.
 
     Parameters
     ----------
@@ -297,10 +297,15 @@ def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> 
     DataError, FitError
         If the study has not what the figure needs.
     """
+    from mdr_dask.plots.table import Drawn, made_by, of_campaign
+
     groups = _groups(study)
     model = _model(groups)
     found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
     drawn: Figure = found.figure(selection.select_all(groups, select))
+    if isinstance(drawn, Drawn):
+        held = study.attrs if isinstance(study, xr.DataTree) else next(iter(groups.values())).attrs
+        drawn.origin = {**made_by(found.name), "study": of_campaign(held)}
     return drawn
 
 
