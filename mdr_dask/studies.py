@@ -422,10 +422,8 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
         return store.datasets(str(study))
     for data in found.values():
         if "status" not in data or "realisation" not in data["status"].dims:
-            raise DataError(
-                "expected a study as run or open returns it, with its status and realisations (isel(realisation=[0])"
-                " keeps one), got a Dataset without them"
-            )
+            kept = "with its status and realisations (isel(realisation=[0]) keeps one)"
+            raise DataError(f"expected a study as run or open returns it, {kept}, got a Dataset without them")
     return found
 
 
