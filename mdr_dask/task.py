@@ -119,7 +119,8 @@ def run_block(work: Work) -> Outcome:
         values = {name: array.reshape(shape + array.shape[2:]) for name, array in result.values.items()}
         status = result.status.reshape(shape)
     else:
-        values, status = store.read_block(work.place, work.block.outputs)
+        kept = not (work.wanted | work.spared).all()
+        values, status = store.read_block(work.place, work.block.outputs) if kept else _nothing(model, work)
         status[work.spared] = Status.NOT_NEEDED
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
     middle = time.perf_counter()
@@ -177,10 +178,21 @@ def _compute(model: Model[Any], block: Block[Any]) -> Result:
         return _join(block, parts)
 
 
-def _failed(model: Model[Any], block: Block[Any], message: str) -> Result:
+def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
+    """Return the outputs of cases of which nothing is known."""
     extra = model.coordinates(block.parameters)
-    shapes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
-    values = {name: np.full((1, 1, *shape), np.nan) for name, shape in shapes.items()}
+    sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
+    return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
+
+
+def _nothing(model: Model[Any], work: Work) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
+    """Return what stands in a block of which nothing is kept, without reading it."""
+    shape = work.wanted.shape
+    return _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
+
+
+def _failed(model: Model[Any], block: Block[Any], message: str) -> Result:
+    values = _unknown(model, block, (1, 1))
     return Result(values, np.array([[Status.FAILED]], dtype=np.int8), {(0, 0): message})
 
 

@@ -17,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
 from mdr_dask.errors import StoreBusyError, StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store import Hold, files, locks, runners
+from mdr_dask.store import Hold, Part, files, locks, runners
 from mdr_dask.task import run_block
 
 
@@ -60,6 +60,48 @@ def test_a_lock_that_fails_otherwise_is_said_to_fail(toy, url, monkeypatch):
     without_locks(monkeypatch, errno.EIO)
     with pytest.raises(StoreError, match=r"locking it failed: Input/output error"):
         run(small(toy), url)
+
+
+def test_a_file_that_its_holder_takes_away_at_that_moment_is_no_lock(url, monkeypatch):
+    file, left = locks.lock_file(url), []
+
+    def taken_away(descriptor):
+        if not left:
+            left.append(file.unlink())
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    monkeypatch.setattr(locks, "_flock", taken_away)
+    with store.lock(url), pytest.raises(StoreBusyError), store.lock(url):
+        pass
+
+
+def test_who_is_refused_keeps_no_file_open(url):
+    def count():
+        return len([*Path("/proc/self/fd").iterdir()])
+
+    with store.lock(url):
+        before = count()
+        for _ in range(5):
+            with pytest.raises(StoreBusyError), store.lock(url):
+                pass
+        assert count() == before
+
+
+def refused(url, part, meanwhile=lambda: None):
+    with store.beside(url, part):
+        meanwhile()
+        raise StoreError("no workers")
+
+
+def test_a_refusal_takes_no_lock_of_others_away(url):
+    def meanwhile():
+        with pytest.raises(StoreError, match="no workers"):
+            refused(url, Part(2, 2))
+        assert store.at_work(url)[1] == [Part(1, 2)]
+
+    with pytest.raises(StoreError, match="no workers"):
+        refused(url, Part(1, 2), meanwhile)
+    assert not list(Path(url).parent.iterdir())
 
 
 def test_at_a_url_the_second_runner_is_refused_and_the_claim_goes_with_the_first(toy, bucket, caplog):

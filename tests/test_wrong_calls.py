@@ -101,6 +101,38 @@ WRONG = [
     ("plot STORE velocity -o small.yaml/x.png", "small.yaml/x.png: Not a directory"),
     ("figures small.yaml --format bmp", "'bmp' is not one of 'png', 'pdf', 'svg'"),
     ("schema -o small.yaml/x.json", "small.yaml/x.json: Not a directory"),
+    ("run small.yaml --scheduler nowhere --store new/deep/x.zarr", "no Dask scheduler answers at 'nowhere'"),
+    ("run small.yaml --part 1/2 --scheduler nowhere --store new/x.zarr", "no Dask scheduler answers at 'nowhere'"),
+    ("run small.yaml --cluster broken.yaml --store new/x.zarr", "cannot start 'distributed.LocalCluster': "),
+    ("run large.yaml --store new/x.zarr", "large.yaml: one case needs about"),
+    ("figures large.yaml -o new/figures", "large.yaml: one case needs about"),
+    ("figures small.yaml nowhere.yaml -o new/figures", "File 'nowhere.yaml' does not exist"),
+    ("show STORE nothing -o new/x.csv", "no output 'nothing' in this study"),
+    ("show STORE --where velocity>1kg -o new/x.zarr", "expected quantities of one dimension"),
+    ("aggregate STORE --select hurst=0.1 -o new/x.nc", "no hurst 0.1"),
+    ("plot STORE nothing -o new/x.png", "no figure of sliding_friction is called 'nothing'"),
+    (
+        "plot STORE friction_coefficient --over velocity --where velocity<0 -o new/x.png",
+        "--where velocity<0: no result",
+    ),
+    ("plot STORE velocity --style nothing -o new/x.png", "expected a style file"),
+    ("fit STORE calibration -o new/x.csv", "expected a file that ends in .png, .pdf or .svg"),
+    ("fit STORE calibration -o new/x.png", "table"),
+    ("law STORE nothing -o new/x.nc", "no output 'nothing' in this study"),
+    ("law STORE friction_coefficient -o new/x.xls", "x.xls"),
+    ("sensitivity STORE friction_coefficient -o new/x.png", "indices need a sampled study"),
+    ("surface nowhere.csv -o new/x.csv --plot new/x.png", "nowhere.csv"),
+    ("init nobody -o new/x.yaml", "unknown model 'nobody'"),
+    ("init sliding_friction -o small.yaml", "small.yaml"),
+    ("report nowhere.zarr -o new/x.html", "nowhere.zarr: no store here"),
+    ("report STORE -o STORE", "STORE"),
+    ("publish nowhere.zarr -o new/x.zip", "nowhere.zarr: no store here"),
+    ("publish STORE -o STORE/x.zip", "expected a file outside of stores, got 'STORE/x.zip'"),
+    ("plot STORE velocity -o STORE/x.png", "expected a file outside of stores"),
+    ("run small.yaml --store STORE --log STORE/x.jsonl", "expected a file outside of stores"),
+    ("verify nowhere.zarr --repair", "nowhere.zarr: no store here"),
+    ("verify FOREIGN --repair --campaign other.yaml", "FOREIGN"),
+    ("master-curve small.yaml -o new/x.json", "small.yaml"),
     ("master-curve nowhere.csv", "nowhere.csv: no such table or store"),
     ("master-curve STORE --bootstrap -1", "-1 is not in the range x>=0"),
     ("master-curve STORE --over velocity --plot x.bmp", "expected a file that ends in .png, .pdf or .svg, got 'x.bmp'"),
@@ -117,6 +149,7 @@ def folder(tmp_path_factory):
         "large.yaml": CAMPAIGN.replace("points: 500", "points: 1000000\n  oversampling: 256"),
         "class.yaml": "class: LocalCluster\n",
         "system.yaml": "class: os.system\narguments: {command: touch ran}\n",
+        "broken.yaml": "class: distributed.LocalCluster\narguments: {nobody: 1}\n",
         "number.yaml": "class: distributed.LocalCluster\narguments: 3\n",
         "list.yaml": "[class]\n",
     }.items():
@@ -130,8 +163,9 @@ def folder(tmp_path_factory):
     return folder
 
 
-def contents(folder: Path) -> dict[Path, bytes]:
-    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+def contents(folder: Path) -> dict[Path, bytes | None]:
+    """Return what files hold, and None for folders."""
+    return {path: path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
 
 
 @pytest.mark.parametrize(("line", "told"), WRONG, ids=[line for line, _ in WRONG])

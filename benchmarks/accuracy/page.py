@@ -174,7 +174,7 @@ PICKED = """## What asking for an accuracy costs
 For each accuracy asked for: time over that of the cheapest setting tried whose error is not larger, whatever the
 method; 1 if it is the cheapest itself. A user does not know that setting beforehand. Then the largest error over the
 accuracy. {within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times. Large ratios
-stand where a rough grid is far better than it can know: films of the first grids are extrapolated, and some of them are
+stand where a rough grid is far better than it can know. Films of the first grids are extrapolated, and some of them are
 right to 5e-6 by chance. The fast rule of wear is left out: its error is that of its equation, and no setting lowers it.
 
 | solver | case | accuracy: times the cheapest | error over accuracy, most |
@@ -183,10 +183,10 @@ right to 5e-6 by chance. The fast rule of wear is left out: its error is that of
 """
 HONESTY = """## Whether stated errors hold
 
-Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms: the share whose error is
-below the stated one, and the median of stated over error. The judgements are [a table](evidence/honesty.csv). Shares of
-20 cases are known to ten per cent. Stated errors of the breakthrough are six to twenty times too large at a million
-points ([evidence](evidence/mixed-lubrication.md)).
+Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms. The columns: the share
+whose error is below the stated one, and the median of stated over error. The judgements are
+[a table](evidence/honesty.csv). Shares of 20 cases are known to ten per cent. Stated errors of the
+breakthrough are six to twenty times too large at a million points ([evidence](evidence/mixed-lubrication.md)).
 
 | solver | cases | number | held | stated over error |
 |---|---|---|---|---|
@@ -206,8 +206,8 @@ $ python -m benchmarks accuracy page
 The points are [a table](evidence/accuracy-and-speed.csv). Times were measured on two cores that other programs used
 too: compare them within one table, as ratios. The tables give the least time of a setting whose error is at most that
 of the column; `-` is beyond what was tried. Where the doubt of a reference is known, no error below it is told.
-*Stated over error* is how much larger the error that a method states is than its true error, from the least to the
-most over its settings; below 1 the statement was too small.
+*Stated over error* is the error that a method states over its true error, from the least to the most of its
+settings. Below 1 the statement was too small.
 """
 
 

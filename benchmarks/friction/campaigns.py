@@ -90,7 +90,7 @@ def chosen(folder, scene, truth):
     """Return [(accuracy, error estimates, error, lines, seconds)] of campaigns told nothing but their accuracy."""
     rows = []
     for accuracy in WANTED:
-        until = f"{{at_least: 8, at_most: 4096, until: {{friction_coefficient: {accuracy}}}}}"
+        until = f"{{at_least: 10, at_most: 4096, until: {{friction_coefficient: {accuracy}}}}}"
         result = measured(folder, scene, truth, until, MOST_SEEDS, "hermite", "auto", accuracy)
         rows.append((accuracy, picked(folder, scene, accuracy), *result))
     return rows

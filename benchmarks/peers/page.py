@@ -17,7 +17,7 @@ HEADING = "## Solvers\n"
 #: What is compared, under which licence, and in what it differs.
 ABOUT = {
     "steady sliding": (
-        "Friction of a Kelvin line by stepping in time, as the thesis did: all springs move on by a cell in each "
+        "Friction of a Kelvin line by stepping in time, as the thesis did. All springs move on by a cell in each "
         "step, and the depth is found that carries the load. Both rows of a goal have at most its error, against "
         "the reference of [accuracy and speed](accuracy-and-speed.md#steady-friction). Stepping ends at the "
         "numbers of the scheme `backward_euler` on the same grid.",
@@ -32,17 +32,18 @@ ABOUT = {
         "elements here is the radius, counted in whole points; their depth is much more exact.",
     ),
     "rough surface": (
-        "One circular punch with self-affine roughness (H = 0.8, 128 x 128 points) on a half-space, at five loads: "
-        "largest error of the stiffness between loads, against ContactMechanics at a tenth of its tolerance.",
-        "The last row does not solve the same equations. 200 lines take the place of surfaces, and the difference "
-        "is the error of that model for one sample ([where the method holds](validity.md)). Areas in contact are "
-        "not compared, since lines do not have them.",
+        "One circular punch with self-affine roughness (H = 0.8, 128 x 128 points) on a half-space, at five loads. "
+        "The largest error of the stiffness between loads, against ContactMechanics at a tenth of its tolerance.",
+        "The last row does not solve the same equations. There 200 lines take the place of surfaces, and the "
+        "difference is the error of that model for one sample ([where the method holds](validity.md)). Areas in "
+        "contact are not compared, since lines do not have them.",
     ),
     "master curves": (
-        "Four families a shape of ten curves with a scatter of 0.01 decades and known shift factors: median processor "
-        "time of a family, median error of a factor in decades, median half width of 95 % stated for it, and the "
-        "share of factors inside. mastercurves (GPL-3.0) merges neighbours by Gaussian processes, in its second "
-        "row with the scatter told. pyvisco (MIT) meets power laws of neighbours and states no error.",
+        "Four families a shape of ten curves with a scatter of 0.01 decades and known shift factors. The columns: "
+        "median processor time of a family, median error of a factor in decades, median half width of 95 % stated for "
+        "it, share of factors inside. The program mastercurves (GPL-3.0) merges neighbours by Gaussian processes, in "
+        "its second row with the scatter told. The program pyvisco (MIT) meets power laws of neighbours and states "
+        "no error.",
         "pyvisco is made for moduli that only rise. Where some of its fits end without a result, the row says so.",
     ),
     "Abel transform": (
@@ -52,9 +53,9 @@ ABOUT = {
         "needed. Ours is given the edge.",
     ),
     "statistics of surfaces": (
-        "A line of 65 536 points and a map of 512 x 512 points with known spectra, either without waves of less "
-        "than eight points or with all waves that the grid has: relative error, and time of height, slope and "
-        "spectrum together. SurfaceTopography (MIT) takes differences of neighbours.",
+        "A line of 65 536 points and a map of 512 x 512 points with known spectra. They have either no waves of less "
+        "than eight points or all waves of the grid. Relative error, and time of height, slope and spectrum "
+        "together. SurfaceTopography (MIT) takes differences of neighbours.",
         "Differences suit measured points with noise, which the derivative of a Fourier series makes larger. The "
         "series suits generated lines, whose waves are known. The maps' spectra also differ in what else is "
         "computed: ours has the anisotropy.",
@@ -74,8 +75,8 @@ call). They were measured on two cores that other programs used too: compare the
 are [a table](evidence/peers.csv). Each program has its own recommended settings; where these leave a choice, the row
 names it.
 
-No solver of lubricated line contacts was found that installs beside this package. slippy (MIT) solves point contacts,
-HANS (MIT) flows in gaps, and tribology (MIT), which has formulas, wants a NumPy of 2019.
+No solver of lubricated line contacts was found that installs beside this package. The program slippy (MIT) solves
+point contacts, HANS (MIT) flows in gaps. Formulas are in the program tribology (MIT), which wants a NumPy of 2019.
 """
 
 

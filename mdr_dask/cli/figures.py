@@ -94,7 +94,7 @@ def plot(
         _require_quantities(asked.units, groups)
         groups = selection.select_all(groups, selections, tell)
         if where:
-            groups = {key: selection.where(data, where) for key, data in groups.items()}
+            groups = selection.where_all(groups, where)
             figures = {name: _without(figure, where) for name, figure in figures.items()}
         for (name, figure), path in zip(figures.items(), places, strict=True):
             origin = table.provenance(name, urls, str(context.meta.get(COMMAND, "")))

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 
 from mdr_dask.cli.printing import printable
+from mdr_dask.cli.writing import require_outside
 from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
@@ -37,6 +38,7 @@ def telling(quiet: bool, log: Path | None, **about: Any) -> Iterator[Tell]:
     if log is None:
         yield _speaker(quiet)
         return
+    require_outside(log)
     say = _speaker(quiet)
     with log.open("a", encoding="utf-8") as stream:
         write = _writer(stream)

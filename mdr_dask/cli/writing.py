@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -18,8 +18,10 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a file to be written; if that fails, name the file, and leave none where there was none."""
+    """Make the folder of a file to be written; if that fails, name the file, and leave nothing where nothing was."""
+    require_outside(path)
     there = path.exists()
+    missing = [folder for folder in path.parents if not folder.exists()]
     try:
         if not path.parent.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -27,9 +29,25 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
+        with suppress(OSError):  # it was never made, or somebody else uses it
+            for folder in missing:
+                folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:
             error.filename = str(path)
         raise
+
+
+def require_outside(path: Path) -> None:
+    """Refuse a file in the folder of a store, where it would be taken for a damage."""
+    for folder in path.absolute().parents:
+        if (folder / "zarr.json").is_file() and _is_study(folder):
+            raise click.UsageError(f"expected a file outside of stores, got {str(path)!r} in the store {folder.name}")
+
+
+def _is_study(folder: Path) -> bool:
+    from mdr_dask.store import is_study
+
+    return is_study(str(folder))
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:

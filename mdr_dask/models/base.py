@@ -42,12 +42,16 @@ class Parameters(BaseModel):
     `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
     parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
     ones inside structures, that are given together. `replaced` has parameters, and the one whose place each takes.
+    `settings` names parameters of the solver or of what is stored, `only_with` those that have a say only where
+    another parameter has a value.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
     gone: ClassVar[Mapping[str, str]] = {}
     ways: ClassVar[tuple[Ways, ...]] = ()
     replaced: ClassVar[Mapping[str, str]] = {}
+    settings: ClassVar[frozenset[str]] = frozenset()
+    only_with: ClassVar[Mapping[str, tuple[str, str]]] = {}
 
     @model_validator(mode="before")
     @classmethod

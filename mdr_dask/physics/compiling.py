@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import gc
+import hashlib
+import re
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
@@ -14,6 +18,9 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.version import __version__
 
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+PACKAGE = Path(__file__).parents[1]
+IMPORTS = re.compile(r"^\s*(?:from|import) mdr_dask\.([\w.]+)(?: import ([\w, ]+))?", re.MULTILINE)
 
 
 class _CollectLater(Listener):
@@ -70,9 +77,24 @@ def _compiled(function: Kernel, **options: object) -> Kernel:
             [plain(each) for each in types], {name: plain(each) for name, each in named.items()}
         )
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    if kept is not None:  # numba reads all of an index of its own version, types that are no more included
-        kept._version = f"{numba.__version__}, mdr_dask {__version__}"
+    if kept is not None:  # numba looks at the kernel's own file only, and reads types that are no more
+        source = _sources(Path(function.__code__.co_filename))
+        kept._version = f"{numba.__version__}, mdr_dask {__version__}, {source}"
     return cast(Kernel, kernel)
+
+
+@cache
+def _sources(file: Path) -> str:
+    """Return a digest of a file and of all files of the package that it imports: what a kernel in it is made from."""
+    content = file.read_text(encoding="utf-8")
+    digest = hashlib.sha1(content.encode(), usedforsecurity=False)
+    for module, names in IMPORTS.findall(content):
+        place = PACKAGE.joinpath(*module.split("."))
+        within = [place / name.strip() for name in names.split(",")] if place.is_dir() else [place]
+        for imported in (path.with_suffix(".py") for path in within):
+            if imported.is_file():
+                digest.update(_sources(imported).encode())
+    return digest.hexdigest()
 
 
 @inlined

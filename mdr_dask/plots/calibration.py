@@ -89,7 +89,7 @@ def _curves(found: room.Calibration, main: str) -> list[_Curve]:
     rows = np.stack(list(others.values()), axis=1) if others else np.zeros((found.measured.values.size, 1))
     places, which = np.unique(np.round(rows, 12), axis=0, return_inverse=True)
     if not 1 < len(places) <= MOST_CURVES:
-        return [_Curve("", style.COLOURS[0], np.arange(len(rows)))]
+        return [_Curve("", style.colour(0), np.arange(len(rows)))]
     labels = [
         ", ".join(
             style.named(name, _axis(found, name, value)[0])
@@ -97,7 +97,7 @@ def _curves(found: room.Calibration, main: str) -> list[_Curve]:
         )
         for row in places
     ]
-    return [_Curve(label, style.COLOURS[k], np.flatnonzero(which.ravel() == k)) for k, label in enumerate(labels)]
+    return [_Curve(label, style.colour(k), np.flatnonzero(which.ravel() == k)) for k, label in enumerate(labels)]
 
 
 def _along(found: room.Calibration, main: str, points: NDArray[np.intp]) -> FloatArray:
@@ -175,7 +175,7 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     smooth = np.convolve(np.pad(density, 2, mode="edge"), [0.1, 0.2, 0.4, 0.2, 0.1], mode="valid")
     height = smooth / smooth.max()
     x = np.exp(centres) if geometric else centres
-    colour = "0.6" if is_free else style.FITTED
+    colour = "0.6" if is_free else style.colour(style.FITTED)
     drawing.law(axes, x, height, "-", color=colour, name=f"density of {name}")
     if not is_free:
         for level, alpha in ((0.95, 0.2), (0.6827, 0.35)):

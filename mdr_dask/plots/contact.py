@@ -136,9 +136,9 @@ def _draw_one(axes: Axes, case: xr.Dataset, contact: Contact, part: slice) -> No
     place, line, elastomer = contact.place[part] * MILLI, contact.line[part] * MICRO, contact.elastomer[part] * MICRO
     axes.fill_between(place, line, line.min() - 0.05 * np.ptp(line), color="0.85", linewidth=0, gid=style.GUIDE)
     drawing.plain(axes, place, line, label="rigid line", of=case, lw=0.6, color="0.4")
-    drawing.plain(axes, place, elastomer, label="elastomer", of=case, lw=1.0, color=style.COLOURS[0])
+    drawing.plain(axes, place, elastomer, label="elastomer", of=case, lw=1.0, color=style.colour(0))
     touching = np.where(contact.touching[part], line, np.nan)
-    drawing.plain(axes, place, touching, label="contact", of=case, lw=2.0, color=style.COLOURS[1])
+    drawing.plain(axes, place, touching, label="contact", of=case, lw=2.0, color=style.colour(1))
     shown = [elastomer.min(), elastomer.max(), *([line.min()] if part != slice(None) else [])]
     axes.set_ylim(min(shown) - 0.1 * np.ptp(shown) - 1e-9, max(shown) + 0.1 * np.ptp(shown) + 1e-9)
     axes.set(xlabel=style.with_unit("place $x$", "mm"), ylabel=style.with_unit("height", "µm"))
@@ -163,7 +163,7 @@ def draw_lines(groups: Mapping[str, xr.Dataset]) -> Figure:
         count = 2 * waves.points
         place = np.arange(count) / count * problems.length[0] * MILLI
         height = waves.heights(count) * problems.height[0] * MICRO
-        drawing.plain(axes, place, height, of=case, lw=0.6, color=style.COLOURS[0])
+        drawing.plain(axes, place, height, of=case, lw=0.6, color=style.colour(0))
         axes.set_title(style.named("hurst", case["hurst"]), fontsize="small")
         axes.set_ylabel(style.with_unit("height", "µm"))
     panels[-1].set_xlabel(style.with_unit("place $x$", "mm"))

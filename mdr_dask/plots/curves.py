@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from mdr_dask import aggregation
+from mdr_dask import aggregation, models
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.models.base import Status
 from mdr_dask.plots import style
@@ -208,7 +208,7 @@ def family(data: xr.Dataset, output: str, along: str, by: Sequence[str] = (), st
     others = [dim for dim in axes_of(data, output) if dim != over]
     sizes = {dim: data.sizes[dim] for dim in others}
     told: list[str] = []
-    if int(np.prod(list(sizes.values()), dtype=int)) > len(style.COLOURS):
+    if int(np.prod(list(sizes.values()), dtype=int)) > style.most_colours():
         kept = _most_shown(sizes, by, styled)
         data, told = hold(data, [dim for dim in others if dim not in kept])
         others = kept
@@ -241,20 +241,19 @@ def _split(
     """Return a curve for every point of some axes, the heading of their legend, and what a colour bar shows."""
     cells = list(np.ndindex(*(data.sizes[dim] for dim in others)))
     varied = [dim for dim in others if data.sizes[dim] > 1]
-    line = "-" if joined else ""
-    if len(cells) <= len(style.COLOURS):
-        colours = style.scale(len(cells))
-        curves = [
-            Curve(part, ", ".join(_names(part, varied)), colours[k], line, "o")
-            for k, part in enumerate(_needed(data.isel(dict(zip(others, cell, strict=True)))) for cell in cells)
-        ]
+    if len(cells) <= style.most_colours():
+        curves = []
+        for k, cell in enumerate(cells):
+            part = _needed(data.isel(dict(zip(others, cell, strict=True))))
+            line, marker = style.line_and_marker(k)
+            curves.append(Curve(part, ", ".join(_names(part, varied)), style.colour(k), line if joined else "", marker))
         return curves, "", None
     colour, second = others[0], others[1] if len(others) > 1 else None
     name = parameters_along(data, colour)[0]
     values = data[name] if name in data.coords else xr.DataArray(np.arange(data.sizes[colour]), dims=colour)
     if values.dtype.kind not in "fiu":
         values = xr.DataArray(np.arange(values.size), dims=colour)
-    many = values.size > len(style.COLOURS)
+    many = values.size > style.most_colours()
     how, norm = style.shades(style.shown(name, values))
     curves = []
     for cell in cells:
@@ -262,7 +261,7 @@ def _split(
         k = cell[1] if second else 0
         told = [second] if many else [colour, second]
         label = ", ".join(_names(part, [dim for dim in told if dim])) if cell[0] == 0 or not many else ""
-        shade = how(norm(float(style.shown(name, values)[cell[0]]))) if many else style.COLOURS[cell[0]]
+        shade = how(norm(float(style.shown(name, values)[cell[0]]))) if many else style.colour(cell[0])
         curves.append(Curve(part, label, shade, style.LINES[k] if joined else "", style.MARKERS[k]))
     return curves, "", (name, values) if many else None
 
@@ -289,8 +288,22 @@ def _along(part: xr.Dataset, dim: str | None) -> list[str]:
 
 
 def scalars(data: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Return the parameters that stand at one value."""
-    return {str(name): value for name, value in data.coords.items() if value.ndim == 0}
+    """Return the parameters that stand at one value, but for those that have no say there."""
+    silent = _silent(data)
+    return {str(name): value for name, value in data.coords.items() if value.ndim == 0 and name not in silent}
+
+
+def _silent(data: xr.Dataset) -> set[str]:
+    """Return the parameters that have no say: another one does not have the value that they are for."""
+    if "model" not in data.attrs:
+        return set()
+    conditions = models.load(data.attrs["model"]).parameters.only_with
+    return {name for name, (other, value) in conditions.items() if value not in _given(data, other)}
+
+
+def _given(data: xr.Dataset, name: str) -> list[Any]:
+    """Return the values that a parameter has in a series."""
+    return list(np.ravel(data[name].values)) if name in data.coords else [parameters_of(data).get(name)]
 
 
 def thin(data: xr.Dataset, dim: str, most: int) -> tuple[xr.Dataset, list[str]]:

@@ -107,7 +107,8 @@ def curve(axes: Axes, one: Curve, x: Any, y: Mean, bars: bool = False) -> None:
     order = np.argsort(across, kind="stable")
     across, value, low, high = across[order], value[order], low[order], high[order]
     marker = one.marker if value.size < MANY_POINTS or not one.line else ""
-    look: dict[str, Any] = {"ms": 3, "lw": 1.2, "color": one.colour, "label": one.label or None}
+    label = one.label if np.isfinite(value).any() else None  # a legend names what is seen
+    look: dict[str, Any] = {"ms": 3, "lw": 1.2, "color": one.colour, "label": label or None}
     (line,) = axes.plot(across, value, linestyle=one.line or "none", marker=marker, gid=style.DATA, **look)
     _record(line, DATA, one.label, _coordinates(y.value), {"x": flat(x), **_ends("y", y)})
     if not np.isfinite(low).any():
@@ -212,7 +213,8 @@ def edges(centres: FloatArray) -> FloatArray:
     if style.is_geometric(centres):
         geometric: FloatArray = np.exp(_edges_between(np.log(centres)))
         return geometric
-    return _edges_between(centres)
+    ends = _edges_between(centres)
+    return ends if centres.min() < 0 else np.clip(ends, 0.0, None)
 
 
 def _edges_between(centres: FloatArray) -> FloatArray:

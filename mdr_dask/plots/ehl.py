@@ -146,7 +146,7 @@ def draw_formula(groups: Mapping[str, xr.Dataset]) -> Figure:
             look: dict[str, Any] = {
                 "marker": marker,
                 "linestyle": "",
-                "color": style.COLOURS[index % 7],
+                "color": style.colour(index),
                 "ms": 4,
             }
             label = name or "film"

@@ -252,7 +252,7 @@ def _against_hurst(name: str, groups: Mapping[str, xr.Dataset], subject: str, ro
             held.append(one.held)
             for curve in one.curves:
                 text = ", ".join(part for part in ("" if alone else key, curve.label) if part)
-                colour = curve.colour if alone else style.COLOURS[number % len(style.COLOURS)]
+                colour = curve.colour if alone else style.colour(number)
                 drawn = curve._replace(label=text, colour=colour, line="", marker=style.MARKERS[number % 4])
                 drawing.curve(axes, drawn, curve.data["hurst"], constants(curve.data, row.constant), bars=True)
         drawing.law(axes, fine, row.law(fine), "k-", lw=1, label=row.law_label)

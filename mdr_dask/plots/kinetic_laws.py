@@ -115,7 +115,7 @@ def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
     hurst = np.atleast_1d(found["hurst"].values)
     how, norm = style.shades(hurst)
     for k, value in enumerate(np.unique(hurst)):
-        colour = how(norm(float(value))) if np.unique(hurst).size > len(style.COLOURS) else style.COLOURS[k]
+        colour = how(norm(float(value))) if np.unique(hurst).size > style.most_colours() else style.colour(k)
         where = found.isel({found["hurst"].dims[0]: np.flatnonzero(hurst == value)}) if found["hurst"].ndim else found
         yield _Cases(float(value), colour, where)
 
@@ -123,13 +123,13 @@ def by_hurst(found: xr.Dataset) -> Iterator[_Cases]:
 def _name_hursts(figure: Figure, axes: Axes, found: xr.Dataset) -> None:
     """Draw the colour bar of many Hurst exponents, and the legend of the rest."""
     values = np.unique(np.atleast_1d(found["hurst"].values))
-    many = values.size > len(style.COLOURS)
+    many = values.size > style.most_colours()
     bar = ("hurst", xr.DataArray(values)) if many else None
     curves.finish(figure, axes, curves.NO_FAMILY._replace(bar=bar))
 
 
 def _hurst_label(found: xr.Dataset, cases: _Cases) -> str | None:
-    few = np.unique(np.atleast_1d(found["hurst"].values)).size <= len(style.COLOURS)
+    few = np.unique(np.atleast_1d(found["hurst"].values)).size <= style.most_colours()
     return f"H = {cases.hurst:.3g}" if few else None
 
 
@@ -151,8 +151,10 @@ def draw_jump_law(groups: Mapping[str, xr.Dataset]) -> Figure:
     fine = np.geomspace(known[known > 0].min(), np.nanmax(known), 200)
     drawing.law(axes, fine, jump_law(fine, LAW), "k-", lw=1, label=f"eq. 4.11, {LAW}")
     label = f"fitted {fitted:.3f} ({low:.3f}, {high:.3f})"
-    drawing.law(axes, fine, jump_law(fine, fitted), "--", color=style.FITTED, lw=1.2, label=label)
-    drawing.band(axes, fine, jump_law(fine, low), jump_law(fine, high), "fitted, 95 %", color=style.FITTED)
+    drawing.law(axes, fine, jump_law(fine, fitted), "--", color=style.colour(style.FITTED), lw=1.2, label=label)
+    drawing.band(
+        axes, fine, jump_law(fine, low), jump_law(fine, high), "fitted, 95 %", color=style.colour(style.FITTED)
+    )
     drawing.law(axes, fine, fine, "k:", lw=0.8, label="eq. 4.9")
     axes.set(xlabel=BEFORE, ylabel=JUMP)
     jumps = np.ravel(found[y].values)
@@ -242,8 +244,8 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
         for cases in by_hurst(found.sel(regime=regime)):
             value = cases.constant(power)
             across = np.full(value.value.size, cases.hurst)
-            drawing.points(axes, across, value, style.COLOURS[number], style.MARKERS[number], None)
-        axes.plot([], [], style.MARKERS[number], color=style.COLOURS[number], ms=4, label=label)
+            drawing.points(axes, across, value, style.colour(number), style.MARKERS[number], None)
+        axes.plot([], [], style.MARKERS[number], color=style.colour(number), ms=4, label=label)
     line = np.array([0.0, 1.0])
     drawing.law(axes, line, 1 - line, "k-", lw=1, label="1 - H")
     drawing.law(axes, line, [1, 1], "k:", lw=1, label="1")

@@ -91,7 +91,7 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     cases, more = _extreme_jumps(data)
     figure, panels = drawing.panels(len(cases), size=(5.2, 4.2))
     for axes, case in zip(panels, cases, strict=True):
-        curve = drawing.Curve(case, "mean", style.COLOURS[0], "-", "")
+        curve = drawing.Curve(case, "mean", style.colour(0), "-", "")
         time, course = trace(_early(case))
         drawing.curve(axes, curve, time, course)
         slope, label = over_slope(case)
@@ -201,25 +201,29 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
     def curve(name: str) -> Any:
         return found[name].values[order]
 
-    drawing.band(axes, inside, curve("one_low"), curve("one_high"), "one exponential, 95 %", color=style.FITTED)
+    drawing.band(
+        axes, inside, curve("one_low"), curve("one_high"), "one exponential, 95 %", color=style.colour(style.FITTED)
+    )
     label = f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance"
-    drawing.law(axes, inside, curve("one"), color=style.FITTED, label=label)
+    drawing.law(axes, inside, curve("one"), color=style.colour(style.FITTED), label=label)
     alike = f"$b$ = {float(found['rate_unweighted']):.2f} ({ends('rate_unweighted')}), all times alike"
-    drawing.law(axes, inside, curve("alike"), "-.", color=style.COLOURS[4], lw=1, label=alike)
+    drawing.law(axes, inside, curve("alike"), "-.", color=style.colour(4), lw=1, label=alike)
     law = float(found["law_rate"])
     start = float(found["one"][0])
     label = f"$b$ = {law:.2f} of eq. 4.12"
-    drawing.law(axes, inside, start * np.exp(-law * inside), "--", color=style.COLOURS[0], lw=1, label=label)
+    drawing.law(axes, inside, start * np.exp(-law * inside), "--", color=style.colour(0), lw=1, label=label)
     if "two" in found:
-        drawing.law(axes, inside, curve("two"), ":", color=style.COLOURS[2], lw=1.5, label="two exponentials")
+        drawing.law(axes, inside, curve("two"), ":", color=style.colour(2), lw=1.5, label="two exponentials")
 
 
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
+    from mdr_dask.fits.base import require
     from mdr_dask.fits.kinetic_cases import law_rate
     from mdr_dask.fits.kinetic_courses import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
+    require(data, "hurst", "relaxation_time", "length", "points")
     over = curves.along_dim(data, "velocity", BEFORE_JUMP)
     held_dims = [dim for dim in curves.axes_of(data, BEFORE_JUMP) if dim != over]
     data, more = curves.hold(data, held_dims, relaxing(data))
@@ -231,7 +235,7 @@ def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     for axes, case in zip(panels, cases, strict=True):
         slope, label = over_slope(case)
         time, value = trace(_early(case))
-        drawing.curve(axes, drawing.Curve(case, "simulated", style.COLOURS[0], "-", ""), time, value)
+        drawing.curve(axes, drawing.Curve(case, "simulated", style.colour(0), "-", ""), time, value)
         before, after = (float(aggregation.mean(case[part] / slope)) for part in (BEFORE_JUMP, AFTER))
         passing = float(case["velocity"] * case["relaxation_time"] * np.pi * case["points"] / case["length"])
         rate = float(law_rate(np.array(passing), np.array(float(case["hurst"]))))

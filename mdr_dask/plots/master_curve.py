@@ -78,7 +78,7 @@ def _label(name: str, values: xr.DataArray) -> str:
 def _colours(curve: xr.Dataset) -> list[Any]:
     """Return a colour for every group: named in a legend, or read off a colour bar."""
     groups = curve[str(curve.attrs["group"])].to_numpy()
-    if groups.size <= len(style.COLOURS):
+    if groups.size <= style.most_colours():
         return list(style.scale(groups.size))
     how, norm = style.shades(groups)
     return [how(norm(float(value))) for value in groups]
@@ -116,7 +116,7 @@ def _measured(figure: Figure, axes: Axes, curve: xr.Dataset) -> None:
     axes.set_ylabel(_label(curve.attrs["ordinate"], curve["curve_ordinate"]))
     heading = _label(curve.attrs["group"], curve[curve.attrs["group"]])
     style.logarithmic(axes, "xy")
-    if len(groups) <= len(style.COLOURS):
+    if len(groups) <= style.most_colours():
         style.legend(axes, heading)
     else:
         from matplotlib.cm import ScalarMappable
@@ -154,7 +154,7 @@ def _factors(axes: Axes, curve: xr.Dataset, by: str, factor: str, reference: flo
         exponent = float(curve["power_exponent"])
         if across:
             slope = exponent * np.log10(groups / reference)
-            drawing.law(axes, groups, slope, color=style.FITTED, label=f"slope {exponent:.3g}")
+            drawing.law(axes, groups, slope, color=style.colour(style.FITTED), label=f"slope {exponent:.3g}")
         style.logarithmic(axes, "x")
     axes.set_xlabel(_label(by, curve[by]))
     moved = str(curve.attrs["abscissa" if across else "ordinate"]).replace("_", " ")

@@ -83,7 +83,7 @@ def draw_trace(groups: Mapping[str, xr.Dataset]) -> Figure:
     for panel, (_, case) in zip(panels, cases, strict=True):
         trace = case["contact_length_trace"].isel(realisation=0)
         time = case["angle"].values / float(case["rotation_speed"]) * 1e3
-        drawing.plain(panel, time, trace.values * 1e6, of=case, lw=0.5, color=style.COLOURS[0])
+        drawing.plain(panel, time, trace.values * 1e6, of=case, lw=0.5, color=style.colour(0))
         share = float((trace > 0).where(trace.notnull()).mean())
         panel.set_title(f"layer broken during {share:.1%} of this turn")
         panel.set_ylabel("contact\nlength [µm]")

@@ -31,13 +31,15 @@ LEAST, MOST = 0.02, 1.0
 class Page:
     """What a user asks of the look of a figure: width and height in inches, and units by the name of a quantity.
 
-    `used` names the quantities that were shown in a unit asked for.
+    `used` names the quantities that were shown in a unit asked for, `cycle` has what a style says of one curve after
+    the other.
     """
 
     width: float | None = None
     height: float | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     used: set[str] = field(default_factory=set)
+    cycle: tuple[Mapping[str, str], ...] = ()
 
     def unit(self, name: str) -> str | None:
         """Return the unit that a quantity is to be shown in, None for its usual one."""
@@ -66,14 +68,15 @@ def drawing_for(asked: Page, file: str | None = None) -> Iterator[None]:
     DataError
         If there is no such style.
     """
-    from matplotlib import rc_context
+    from matplotlib import rc_context, rc_params_from_file
     from matplotlib.style import context, library
 
     if file is not None and not (Path(file).is_file() or file in library):
         hint = did_you_mean(file, [*library])
         near = hint if "mean" in hint else " (such as 'grayscale' or 'seaborn-v0_8-paper')"
         raise DataError(f"expected a style file, or the name of a style of matplotlib{near}, got {file!r}")
-    token = _PAGE.set(asked)
+    said = {} if file is None else library.get(file) or rc_params_from_file(file, use_default_template=False)
+    token = _PAGE.set(replace(asked, cycle=tuple(said.get("axes.prop_cycle", ()))))
     try:
         with rc_context(LETTERS if asked.width else {}), context([file] if file else []):
             yield

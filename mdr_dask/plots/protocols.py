@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,24 +14,19 @@ from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.velocity_jump import VelocityJump
 from mdr_dask.plots import curves, drawing, style
 from mdr_dask.plots.base import Plot
-from mdr_dask.plots.kinetics import AFTER, CASE, OUTPUTS, TIME, over_slope, trace
+from mdr_dask.plots.kinetics import AFTER, CASE, OUTPUTS, TIME, TRACE, over_slope, trace
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BEFORE = 0.08  # of the time shown
 #: What a loading history prescribes.
 DRIVEN = ("velocity", "normal_force")
+HELD = [name for name in CASE if name != "velocity_change"]
+STEADY = "steady state at the end"
 #: Width of a column alone, and beside others, in inches.
 ALONE, BESIDE = 6.4, 3.4
-
-
-def first_case(data: xr.Dataset) -> tuple[xr.Dataset, VelocityJump, list[str]]:
-    """Return the data at the first value of every axis, the parameters there, and what is left out."""
-    held = curves.axes_of(data, AFTER)
-    told = [f"{data.sizes[dim] - 1} of {data.sizes[dim]} values of {dim} (drawn: the first)" for dim in held]
-    case = data.isel(dict.fromkeys(held, 0))
-    return case, VelocityJump.model_validate(curves.parameters_at(case)), told
 
 
 def loading_history(case: VelocityJump, last: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -57,34 +52,43 @@ def draw_protocols(groups: Mapping[str, xr.Dataset]) -> Figure:
     families = []
     for k, (name, data) in enumerate(found.items()):
         top, *below = panels[k :: len(found)]
-        values, case, held = first_case(data)
-        told += [f"{name}: {each}" if name else each for each in held]
-        families.append(curves.scalars(values))
-        last = float(values["relaxation_times"].values[-1])
-        slope, label = over_slope(values)
-        time, friction = trace(values, BEFORE)
-        drawing.curve(top, drawing.Curve(values, "mean", style.COLOURS[0], "-", ""), time, friction)
-        after = float(aggregation.mean(values[AFTER] / slope))
-        if np.isfinite(after):
-            steady = "steady state at the end"
-            drawing.law(top, [0, last], [after, after], of=values, color="0.5", ls=":", lw=1, label=steady)
-        top.set_title(name or case.protocol.shape, fontsize="small")
-        top.set_ylabel(label)
-        time, speed, force = loading_history(case, last)
-        for axes, row, name, colour in zip(below, (speed, force), DRIVEN, style.COLOURS[1:], strict=False):
-            like = values.get(name)  # absent where the history has it in its own numbers
-            row = style.quantity(name, like).of(row)
-            drawing.plain(axes, time, row, of=values, color=colour, lw=1.2)
-            axes.set_ylim(min(0.0, 1.15 * float(row.min())), 1.15 * max(float(row.max()), 1e-300))
-            axes.set_ylabel(style.label(name, like))
+        one = curves.family(data, TRACE, "relaxation_times")
+        told += [f"{name}: {each}" if name else each for each in one.left_out]
+        families.append(one.held)
+        last = float(data["relaxation_times"].values[-1])
+        for curve in one.curves:
+            _draw_case(top, below, curve, last)
+        top.set_title(name or curves.parameters_of(data)["protocol"]["shape"], fontsize="small")
+        top.set_ylabel(over_slope(data)[1])
+        for axes, driven in zip(below, DRIVEN, strict=True):
+            axes.set_ylabel(style.label(driven, data.get(driven)))
+            axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         below[1].set_xlabel(TIME)
         below[1].set_xlim(-BEFORE * last, last)
-    style.legend(panels[0])
-    held_by_all = curves.fixed_text(curves.fixed_by_all(families), CASE)
+        top.plot([], [], ":", lw=1, color="0.5", label=STEADY)
+        curves.finish(figure, top, one)
+    held_by_all = curves.fixed_text(curves.fixed_by_all(families), HELD)
     bars = curves.meaning_of_bars(*found.values(), outputs=["friction_coefficient"])
     style.title(figure, "friction along histories of velocity and load", held_by_all, bars)
     style.leave_out(figure, told)
     return figure
+
+
+def _draw_case(top: Axes, below: Sequence[Axes], curve: drawing.Curve, last: float) -> None:
+    """Draw friction of a case, and the velocity and the load that it is driven by, up to a time."""
+    case = VelocityJump.model_validate(curves.parameters_at(curve.data))
+    time, friction = trace(curve.data, BEFORE)
+    drawing.curve(top, curve._replace(line=curve.line or "-", marker=""), time, friction)
+    slope, _ = over_slope(curve.data)
+    after = float(aggregation.mean(curve.data[AFTER] / slope))
+    if np.isfinite(after):
+        drawing.law(top, [0, last], [after, after], name=STEADY, of=curve.data, color=curve.colour, ls=":", lw=1)
+    time, *driven = loading_history(case, last)
+    for axes, values, name in zip(below, driven, DRIVEN, strict=True):
+        like = curve.data.get(name)  # absent where the history has it in its own numbers
+        shown = style.quantity(name, like).of(values)
+        drawing.plain(axes, time, shown, of=curve.data, color=curve.colour, ls=curve.line or "-", lw=1.2)
+        axes.set_ylim(top=max(axes.get_ylim()[1], 1.15 * float(shown.max())))
 
 
 PLOTS: tuple[Plot, ...] = (

@@ -26,7 +26,7 @@ def sensitivity(indices: xr.Dataset) -> Figure:
     for k, kind in enumerate(kinds):
         place = xr.zeros_like(indices[kind]) + np.arange(len(inputs)) + APART * (k - (len(kinds) - 1) / 2)
         unknown = xr.full_like(place, np.nan)
-        axes.barh(place, indices[kind], THICK, color=style.COLOURS[k], label=LABELS[kind], alpha=0.85)
+        axes.barh(place, indices[kind], THICK, color=style.colour(k), label=LABELS[kind], alpha=0.85)
         along = Mean(indices[kind], indices[f"{kind}_low"], indices[f"{kind}_high"])
         drawing.points(axes, indices[kind], Mean(place, unknown, unknown), "black", "|", kind, along)
     axes.set_yticks(np.arange(len(inputs)), inputs)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 #: Okabe and Ito's colours, told apart by colour-blind readers; more curves than these have a colour bar.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-#: Of fitted laws and the bands that they are known within.
-FITTED = COLOURS[1]
+#: Which of them fitted laws have, and the bands that they are known within.
+FITTED = 1
 LINES = ("-", "--", ":", "-.")
 MARKERS = ("o", "s", "^", "D")
 #: Panels of one figure that can still be read.
@@ -227,20 +227,46 @@ def beside(figure: Figure, axes: Axes, label: str) -> str:
     return broken(label, max(16, int(0.9 * _letters() * figure.get_figheight() / rows)))
 
 
+def _cycle(key: str) -> tuple[str, ...]:
+    """Return what the style asked for says of one curve after the other: its ``color``, ``linestyle`` or ``marker``."""
+    return tuple(each[key] for each in page.asked().cycle if key in each)
+
+
+def most_colours() -> int:
+    """Return how many curves colours tell apart."""
+    return len(_cycle("color") or COLOURS)
+
+
+def colour(number: int) -> str:
+    """Return the colour of a curve: of the style asked for, else of those that all readers tell apart."""
+    colours = _cycle("color") or COLOURS
+    return colours[number % len(colours)]
+
+
 def scale(count: int) -> list[str]:
     """Return so many colours for curves that a legend names."""
-    return [COLOURS[k % len(COLOURS)] for k in range(count)]
+    return [colour(k) for k in range(count)]
+
+
+def line_and_marker(number: int) -> tuple[str, str]:
+    """Return line and marker of a curve that its colour tells apart, but for a style in greys, or with others."""
+    from matplotlib.colors import to_rgb
+
+    greys = all(len(set(to_rgb(each))) == 1 for each in _cycle("color") or COLOURS)
+    lines = _cycle("linestyle") or (LINES if greys else LINES[:1])
+    markers = _cycle("marker") or (MARKERS if greys else MARKERS[:1])
+    return lines[number % len(lines)], markers[(number + number // len(lines)) % len(markers)]
 
 
 def shades(values: Any, logarithmic: bool = True) -> tuple[Colormap, Normalize]:
     """Return colour map and norm of a colour bar: logarithmic, unless forbidden, where the values are geometric."""
-    from matplotlib import colormaps
+    from matplotlib import colormaps, rcParams
     from matplotlib.colors import LogNorm, Normalize
 
     values = np.asarray(values, dtype=np.float64)
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     norm = (LogNorm if logarithmic and is_geometric(values) else Normalize)(low, high if high > low else low + 1)
-    return colormaps["viridis"].resampled(256), norm
+    return colormaps[rcParams["image.cmap"]].resampled(256), norm
 
 
 def is_geometric(values: Any) -> bool:

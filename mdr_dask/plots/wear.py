@@ -237,7 +237,7 @@ def draw_fast_error(groups: Mapping[str, xr.Dataset]) -> Figure:
         panel.set(xlabel="cycles $N/N_0$", ylabel=style.label("stick_radius"))
         if style.is_geometric(error.cycles):
             style.logarithmic(panel, "x")
-    drawing.plain(panels[3], error.xi, overall, "o-", color=style.COLOURS[0])
+    drawing.plain(panels[3], error.xi, overall, "o-", color=style.colour(0))
     least = float(error.xi[int(np.nanargmin(overall.values))])
     panels[3].axvline(least, color="0.6", linewidth=1)
     panels[3].set(xlabel=style.label("xi"), ylabel="rms error of $f/d_0$ over the map")

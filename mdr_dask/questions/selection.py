@@ -78,6 +78,14 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
     return dataset.assign(masked | {"status": status.transpose(*dataset["status"].dims)})
 
 
+def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
+    """Keep the cases of all groups for which a condition holds; refuse one that holds nowhere."""
+    kept = {name: where(dataset, condition) for name, dataset in groups.items()}
+    if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
+        raise DataError(f"--where {condition}: no result fulfils it")
+    return kept
+
+
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
     """Return the group of a series; the only one if none is named."""
     names = ", ".join(datasets)

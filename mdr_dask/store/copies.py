@@ -61,6 +61,10 @@ class Copy:
         """Say whether a file is as it was made, now or before."""
         return content is not None and (content == self.files[name] or digest(content) == self.before.get(name))
 
+    def stands(self, name: str) -> bool:
+        """Say whether a file was there already, as it is now."""
+        return digest(self.files[name]) == self.before.get(name)
+
     def file(self) -> tuple[str, bytes]:
         """Return the name and the content of the file that holds the copy."""
         held = {

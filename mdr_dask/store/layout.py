@@ -6,10 +6,10 @@ import json
 import platform
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from functools import cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import zarr
@@ -67,8 +67,8 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
         members |= copy.members
         root = root if copy.series else dict(copy.own)
     own = {copy.series: group_name(copy.series, "zarr.json") for copy in copies if copy.series}
-    files = {name: content for copy in copies for name, content in copy.files.items()}
-    groups = {name: files.pop(name) for name in own.values()}
+    files = {name: content for copy in copies for name, content in copy.files.items() if not copy.stands(name)}
+    groups = {name: files.pop(name) for name in own.values() if name in files}
     root_document = {"zarr.json": group_document(members, study | root | signpost(members))}
     write_stages(url, [dict(copy.file() for copy in copies), files, groups, root_document])
 
@@ -101,11 +101,10 @@ def _is_laid_out(url: str, template: Template) -> bool:
 
 def laid_out_files(template: Template) -> dict[str, bytes]:
     """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
+    coordinates = _coordinates(template)
+    held = [_coordinate_files(name, _Numbers.of(*coordinate)) for name, coordinate in coordinates.items()]
     files: dict[str, Any] = {}
     group = zarr.create_group(zarr.storage.MemoryStore(files))
-    coordinates = _coordinates(template)
-    for name, coordinate in coordinates.items():
-        _create_coordinate(group, name, *coordinate)
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
     for output in template.outputs:
         dims = (*template.dims, *output.dims)
@@ -123,6 +122,11 @@ def laid_out_files(template: Template) -> dict[str, bytes]:
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
     _create_array(group, "status", template, template.dims, (), "int8", flags)
+    return {name: content for each in (*held, _contents(files)) for name, content in each.items()}
+
+
+def _contents(files: dict[str, Any]) -> dict[str, bytes]:
+    """Return the files of a group in memory, without its own."""
     del files["zarr.json"]
     return {name: content.to_bytes() for name, content in files.items()}
 
@@ -148,19 +152,44 @@ def _create_array(
     )
 
 
-def _create_coordinate(
-    group: zarr.Group, name: str, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]
-) -> None:
+class _Numbers(NamedTuple):
+    """A coordinate, such that equal ones are known for equal."""
+
+    dims: tuple[str, ...]
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+    values: bytes | tuple[str, ...]
+    attrs: str
+
+    @classmethod
+    def of(cls, dims: tuple[str, ...], values: NDArray[Any], attrs: dict[str, Any]) -> _Numbers:
+        """Take dimensions, values and attributes."""
+        held = tuple(values.tolist()) if values.dtype == object else values.tobytes()
+        return cls(dims, values.dtype, values.shape, held, json.dumps(attrs))
+
+    def array(self) -> NDArray[Any]:
+        """Return the values."""
+        if isinstance(self.values, tuple):
+            return np.array(self.values, dtype=object)
+        return np.frombuffer(self.values, self.dtype).reshape(self.shape)
+
+
+@lru_cache(maxsize=64)
+def _coordinate_files(name: str, numbers: _Numbers) -> dict[str, bytes]:
+    """Return the files of a coordinate; of all of them a round changes one."""
+    files: dict[str, Any] = {}
+    group = zarr.create_group(zarr.storage.MemoryStore(files))
     array = group.create_array(
         name,
-        shape=values.shape,
-        chunks=(_COORDINATE_CHUNK,) * values.ndim,
-        dtype="str" if values.dtype == object else values.dtype,
+        shape=numbers.shape,
+        chunks=(_COORDINATE_CHUNK,) * len(numbers.shape),
+        dtype="str" if numbers.dtype == object else numbers.dtype,
         compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        dimension_names=dims,
-        attributes=attrs,
+        dimension_names=numbers.dims,
+        attributes=json.loads(numbers.attrs),
     )
-    array[...] = values
+    array[...] = numbers.array()
+    return _contents(files)
 
 
 def _coordinates(template: Template) -> dict[str, _Coordinate]:

@@ -94,13 +94,8 @@ def lock(url: str, name: str = "") -> Iterator[Hold]:
         return
     file = lock_file(url, name)
     with ExitStack() as held:
-        with guarded(url, "making it"):
-            if not file.parent.exists():
-                file.parent.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
-        held.callback(os.close, descriptor)
         try:
-            _flock(descriptor)
+            held.callback(os.close, _locked(url, file))
         except BlockingIOError:
             raise _busy(url, holder(url, name)) from None
         except OSError as error:
@@ -184,6 +179,23 @@ def holder(url: str, name: str = "") -> str:
         with suppress(OSError):
             told.append(runner.read_text())
     return next(filter(None, told), "another process")
+
+
+def _locked(url: str, file: Path) -> int:
+    """Return the descriptor of a file that is now locked, and that nobody has taken away meanwhile."""
+    while True:
+        with guarded(url, "making it"):
+            if not file.parent.exists():
+                file.parent.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _flock(descriptor)
+            if os.fstat(descriptor).st_nlink:
+                return descriptor
+        except OSError:
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
 
 
 def _flock(descriptor: int) -> None:

@@ -10,12 +10,12 @@ import logging
 import re
 import time
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 
-from mdr_dask.errors import StoreBusyError
-from mdr_dask.store.files import sweep
-from mdr_dask.store.locks import Hold, forget, holder, is_known, lock, lock_names
+from mdr_dask.errors import MdrDaskError, StoreBusyError
+from mdr_dask.store.files import local, sweep
+from mdr_dask.store.locks import Hold, forget, holder, is_known, lock, lock_file, lock_names
 
 _ENTRANCE = "entrance"
 _PART = "part-"
@@ -70,7 +70,7 @@ def alone(url: str) -> Iterator[Hold]:
     StoreError
         If nothing can be written there.
     """
-    with ExitStack() as held:
+    with _leaving_nothing(url), ExitStack() as held:
         with entrance(url):
             parts = _parts(url)
             if parts:
@@ -93,7 +93,7 @@ def beside(url: str, part: Part) -> Iterator[Hold]:
     StoreError
         If nothing can be written there.
     """
-    with ExitStack() as held:
+    with _leaving_nothing(url), ExitStack() as held:
         with entrance(url):
             with lock(url):
                 others = _parts(url)
@@ -104,6 +104,33 @@ def beside(url: str, part: Part) -> Iterator[Hold]:
             if not others:
                 sweep(url)
         yield hold
+
+
+@contextmanager
+def _leaving_nothing(url: str) -> Iterator[None]:
+    """After an error where nobody was at work before, take away the files of locks and the folders made for them."""
+    if local(url) is None:
+        yield
+        return
+    door = lock_file(url, _ENTRANCE)
+    if door.exists():
+        yield
+        return
+    missing = [folder for folder in door.parents if not folder.exists()]
+    try:
+        yield
+    except MdrDaskError:
+        if door.exists():
+            with suppress(StoreBusyError), entrance(url, GLANCE):
+                names = {"", *lock_names(url)} - {_ENTRANCE}
+                if all(_is_free(url, name) for name in names):
+                    for name in names:
+                        forget(url, name)
+                    door.unlink()
+        with suppress(OSError):  # somebody else has come, or there is a store
+            for folder in missing:
+                folder.rmdir()
+        raise
 
 
 @contextmanager

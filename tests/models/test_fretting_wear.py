@@ -282,22 +282,3 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
             assert all("1.0e-08 was asked for" in text for text in result.messages.values())
         alone = MODEL.compute(Block(parameters, {"cycles": columns["cycles"][1:]}, 1, (0,), 1, names, accuracy))
         assert alone.values["wear_volume"][0, 0] == result.values["wear_volume"][1, 0]
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "new"),
-    [
-        ("shape", "cone", "indenter: {shape: ...}"),
-        ("method", "fast", "wear_rule"),
-        ("tolerance", 1e-3, "accuracy"),
-        ("load", 50.0, "normal_force"),
-        ("modulus", 1e11, "contact_modulus"),
-        ("curvature_radius", 0.01, "radius"),
-        ("shear_modulus", 90e9, "effective_shear_modulus"),
-        ("angle", 0.1, "angle"),
-    ],
-)
-def test_old_names_are_refused_with_the_new_one(name, value, new):
-    with pytest.raises(ValidationError, match=name):
-        FrettingWear.model_validate({"stick_radius": 0.5, name: value})
-    assert new in FrettingWear.gone[name]

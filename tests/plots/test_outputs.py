@@ -8,6 +8,7 @@ from drawn import check_picture, mismatches, rows, stored
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from mdr_dask import units
 from mdr_dask.errors import DataError
 from mdr_dask.plots import curves, page, style
 from mdr_dask.plots.outputs import View, of_output
@@ -177,6 +178,49 @@ def test_units_size_and_style_of_the_page(stores, tmp_path):
     assert axes.get_legend_handles_labels()[1][0] == "$F_N$ = 200 N, temperature = 313.1 K"
 
 
+STYLES = {
+    "grayscale": (("0.00", "0.40", "0.60"), 3, "gray"),
+    "ggplot": (("#E24A33", "#348ABD", "#988ED5"), 1, "viridis"),
+    "dashes.mplstyle": (("r", "g", "b"), 2, "viridis"),
+    None: (style.COLOURS[:3], 1, "viridis"),
+}
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_curves_are_told_apart_as_the_style_says(name, stores, tmp_path, monkeypatch):
+    """In greys by lines and markers, too."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dashes.mplstyle").write_text(
+        "axes.prop_cycle: cycler('color', ['r', 'g', 'b']) + cycler('linestyle', ['-', '--', '-'])\n"
+    )
+    colours, looks, shades = STYLES[name]
+    data = stores["grid"].isel(normal_force=slice(3), hurst=0)
+    with page.drawing_for(page.Page(), name):
+        figure = drawn({"": data}, MU, "velocity", by="normal_force")
+        assert style.shades([1.0, 2.0])[0].name == shades
+    lines = [line for line in figure.axes[0].lines if str(line.get_label()).startswith("$F_N$")]
+    assert tuple(line.get_color() for line in lines) == colours
+    assert len({(line.get_linestyle(), line.get_marker()) for line in lines}) == looks
+
+
+def test_a_title_names_what_has_a_say(stores):
+    data = stores["wear"].isel(stick_radius=0)
+    for rule, named in (("exact", False), ("fast", True)):
+        figure = drawn({"": data.sel({planted.RULE: rule})}, "wear_volume", "cycles")
+        assert (r"$\xi$" in figure.get_suptitle()) == named
+        assert "points" not in figure.get_suptitle()
+
+
+def test_a_legend_names_what_is_seen(stores):
+    data = stores["grid"].isel(normal_force=slice(2), hurst=0)
+    none = data.where(data["normal_force"] < data["normal_force"][1])
+    spared = none.assign(status=xr.where(none["status"].notnull(), data["status"], 4).astype(np.int8))
+    failed = none.assign(status=xr.where(none["status"].notnull(), data["status"], 3).astype(np.int8))
+    for study, count in ((data, 2), (spared, 1), (failed, 2)):
+        labels = drawn({"": study}, MU, "velocity", by="normal_force").axes[0].get_legend_handles_labels()[1]
+        assert sum(label.startswith("$F_N$") for label in labels) == count
+
+
 @pytest.mark.parametrize(
     ("study", "output", "over", "view", "sentence"),
     [
@@ -242,3 +286,12 @@ def test_a_long_title_is_small_print_that_leaves_room_for_the_curves():
     style.title(figure, "friction against velocity", ", ".join(f"parameter {k} = {k} mm" for k in range(12)), "bars")
     figure.draw_without_rendering()
     assert axes.get_window_extent().height > 0.5 * figure.bbox.height
+
+
+@pytest.mark.parametrize("name", style.QUANTITIES)
+def test_numbers_are_shown_in_the_unit_that_stands_behind_them(name):
+    """Back in SI they are what they were: factors of figures against the units of campaigns."""
+    quantity = style.QUANTITIES[name]
+    unit = quantity.unit or "1"
+    factor, zero = units.conversion(unit, units.dimension_of(unit)[1])
+    assert quantity.of(293.7) * factor + zero == pytest.approx(293.7, rel=1e-12)

@@ -60,13 +60,16 @@ def test_one_column_a_series_with_friction_velocity_and_load() -> None:
     assert velocity[:, 1].max() == pytest.approx(0.07, rel=1e-4)  # 400 points a curve
 
 
-def test_an_axis_stands_at_its_first_value() -> None:
+def test_every_value_of_an_axis_has_its_curves_in_one_colour() -> None:
     axis = {"path": "protocol.velocity", "name": "v", "dim": "v", "values": [0.2, 0.3], "labels": None}
     ramp = {"shape": "ramp", "duration": 4e-3, "velocity": None}
-    data = xr.concat([dataset(ramp, (axis,)), dataset(ramp, (axis,))], xr.Variable("v", [0.2, 0.3]))
-    assert "1 of 2 values of v" in left_out(draw_protocols({"": data}))
-    _, velocity, _ = curves(draw_protocols({"": data}), 0, 1)
-    assert velocity[-1, 1] == pytest.approx(0.2)
+    data = xr.concat([dataset(ramp, (axis,)), 2 * dataset(ramp, (axis,))], xr.Variable("v", [0.2, 0.3]))
+    figure = draw_protocols({"": data.assign(rms_slope=data["rms_slope"][0])})
+    assert left_out(figure) == ""
+    friction, velocity, _ = ([line for line in axes.lines if line.get_linestyle() == "-"] for axes in figure.axes)
+    assert [line.get_ydata()[-1] for line in velocity] == pytest.approx([0.2, 0.3])
+    assert friction[1].get_ydata()[-1] == pytest.approx(2 * friction[0].get_ydata()[-1])
+    assert [line.get_color() for line in friction] == [line.get_color() for line in velocity]
 
 
 def test_missing_outputs_are_named() -> None:

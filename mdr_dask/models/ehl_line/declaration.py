@@ -35,6 +35,7 @@ class EhlLineParameters(Parameters):
     ways: ClassVar[tuple[Ways, ...]] = tuple(
         ((dimensional, *companions), (number,)) for number, dimensional, companions in _PAIRS
     )
+    settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
     load_parameter: float | None = quantity(
         "1", "load parameter W = w/(E' R), E' = 2 E*", usual="2e-5", gt=0, default=None
     )

@@ -127,6 +127,8 @@ class FrettingWear(Parameters):
         ),
     )
     replaced: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
+    settings: ClassVar[frozenset[str]] = frozenset({"accuracy", "cells", "extent", "points"})
+    only_with: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",

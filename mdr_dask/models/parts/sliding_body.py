@@ -37,7 +37,10 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
-    gone: ClassVar[Mapping[str, str]] = {"profile": "write surface: {profile: ...}"}
+    gone: ClassVar[Mapping[str, str]] = {
+        "profile": "write surface: {profile: ...}",
+        "discretisation_error": "every output comes with its own error, such as friction_coefficient_error",
+    }
     ways: ClassVar[tuple[Ways, ...]] = (
         (("length", "rms_roughness"), ("length", "surface"), ("surface",)),
         (("shear_modulus", "relaxation_time"), ("material",)),

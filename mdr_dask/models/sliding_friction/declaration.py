@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -14,6 +14,7 @@ from mdr_dask.models.parts.surface import NO_AREA, NO_GAP
 class SlidingFriction(SlidingBody):
     """A viscoelastic body under a load, sliding at constant speed over a rough line."""
 
+    settings: ClassVar[frozenset[str]] = frozenset({"oversampling"})
     oversampling: Annotated[int, Field(ge=1, le=256)] | Literal["auto"] = quantity(
         "1", "grid points for every Nyquist point, 1 for the papers' grid; auto meets the accuracy", default="auto"
     )

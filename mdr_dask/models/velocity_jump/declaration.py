@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -22,6 +22,7 @@ TIMES = tuple(float(f"{time:.4g}") for time in np.geomspace(1e-4, 20, 54))
 class VelocityJump(SlidingBody):
     """A viscoelastic body under a load on a rough line, whose velocity jumps from v_1 to v_1 + dv."""
 
+    settings: ClassVar[frozenset[str]] = frozenset({"oversampling", "steps_per_decade"})
     rms_roughness: float | None = quantity("m", "rms height h of the roughness", usual="2 um", default=None, gt=0)
     velocity: float = quantity("m/s", "sliding velocity v_1 before the jump", usual="50 mm/s", gt=0)
     oversampling: int = quantity(
@@ -87,7 +88,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=8,
+    version=9,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

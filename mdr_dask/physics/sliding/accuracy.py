@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import steady as sliding
 from mdr_dask.physics.sliding import vectorised
-from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
+from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import Shape
 
@@ -80,6 +80,8 @@ class Errors(NamedTuple):
 
 
 COLUMNS = Errors._fields
+DEPTH, FRACTION = 1, 2
+RELATIVE = [0, 2, 3]  # columns whose changes are over their size
 
 
 def relative(steady: Steady, errors: Errors, columns: Collection[str] = COLUMNS) -> FloatArray:
@@ -169,29 +171,35 @@ class Ladder:
 
     def _sampled(self, accuracy: float) -> tuple[Steady, Errors]:
         """Solve cases from node to node; the errors are infinite where that gives nothing."""
-        settings = SETTINGS
-        steady, errors = unsolved(self.loads.size), Errors.unknown(self.loads.size)
-        left = np.flatnonzero(valid(self.deborah, self.loads))
+        settings, points = SETTINGS, self.line.points
+        values, errors = np.full((2, len(COLUMNS), self.loads.size), np.nan)
+        good = valid(self.deborah, self.loads)
+        left = np.flatnonzero(good)
         height, slope = self._nodes(settings.sampled)
-        cases = self.deborah[left], self.loads[left]
+        cases = Cases(self.deborah[left], self.loads[left])
         line, coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
-        before = np.zeros((len(COLUMNS), left.size))
-        for refinement in (1, *settings.refinements):
-            if refinement > 1:
-                cases = self.deborah[left], self.loads[left]
+        before, refinement = np.zeros((len(COLUMNS), left.size)), 1
+        wanted = [COLUMNS.index(name) for name in self.columns]
+        by_chance = bool(set(wanted) & set(RELATIVE))
+        with np.errstate(all="ignore"):
+            for finer in (*settings.refinements, None):
+                grid = settings.sampled * refinement
+                change = _changes(coarse.columns, fine.columns)
+                seen = Seen(fine.contact_fraction * points, cases.deborah * points * grid)
+                known = np.full_like(change, np.inf)
+                if grid > settings.sampled or not by_chance or _may_be_met(seen, grid, accuracy):
+                    known = _sampled_errors(fine.columns, seen, grid, change, before)
+                    known += np.where(np.isnan(fine.doubts), 0.0, fine.doubts)
+                values[:, left], errors[:, left] = fine.columns, known
+                met = (known[wanted] <= accuracy * np.abs(fine.columns[wanted])).all(axis=0)
+                still = ~met & (np.isfinite(fine.drag) | (refinement <= settings.hope))
+                if finer is None or not np.any(still):
+                    break
+                left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
+                cases, refinement = Cases(cases.deborah[still], cases.loads[still]), finer
                 grids, trusted = (coarse, fine), settings.trusted * accuracy
                 coarse, fine = fine, vectorised.settle(line, refinement, *cases, grids, trusted)
-            found, change = fine.steady(), _changes(coarse, fine)
-            cells = self.line.points * settings.sampled * refinement
-            seen = Seen(fine.contact_fraction * self.line.points, cases[0] * cells)
-            errors_now = _sampled_errors(found, seen, settings.sampled * refinement, change, before)
-            known = Errors(*(errors_now + np.where(np.isnan(fine.doubts), 0.0, fine.doubts)))
-            steady, errors = steady.replaced(left, found), errors.replaced(left, known)
-            still = ~self._met(found, known, accuracy) & (np.isfinite(fine.drag) | (refinement <= settings.hope))
-            if not np.any(still):
-                break
-            left, before, coarse, fine = left[still], change[:, still], coarse.only(still), fine.only(still)
-        return steady, errors
+        return _found(values, good), Errors(*np.where(np.isnan(errors), np.inf, errors))
 
     def _swept(self, accuracy: float, oversampling: int) -> tuple[Steady, Errors]:
         """Solve every case by sweeps on the coarsest of finer and finer grids that meets the accuracy."""
@@ -225,8 +233,8 @@ class Ladder:
         # where a coarse grid has no solution nothing is known
         lost = np.isnan(drag) & (other.status == Outcome.CONVERGED)
         drag = np.where(lost, np.inf, np.maximum(drag, SETTINGS.rounding))
-        errors = SETTINGS.safety * _changes(steady, other)
         with np.errstate(all="ignore"):
+            errors = SETTINGS.safety * _changes(_columns(steady), _columns(other))
             errors[COLUMNS.index("drag")] = np.maximum(SETTINGS.safety * drag, least) * steady.drag
         return Errors(*errors)
 
@@ -236,11 +244,24 @@ def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:
     return body is None and accuracy >= SETTINGS.quickest
 
 
-def _changes(coarse: Any, fine: Any) -> FloatArray:
+def _columns(steady: Steady) -> FloatArray:
+    """Return the columns of steady states, a row for each."""
+    return np.array([getattr(steady, name) for name in COLUMNS])
+
+
+def _changes(coarse: FloatArray, fine: FloatArray) -> FloatArray:
     """Return the changes of the columns between two grids, infinite where either has no solution."""
-    with np.errstate(all="ignore"):
-        changes = np.array([np.abs(getattr(fine, name) - getattr(coarse, name)) for name in COLUMNS])
+    changes = np.abs(fine - coarse)
     return np.where(np.isfinite(changes), changes, np.inf)
+
+
+def _found(values: FloatArray, good: NDArray[np.bool_]) -> Steady:
+    """Return steady states of good cases from their columns, NaN where there is no drag."""
+    found = np.isfinite(values[0]) & (values[0] > 0)
+    status = np.where(good, np.int8(Outcome.DEPTH_NOT_FOUND), np.int8(Outcome.INVALID))
+    status[found] = Outcome.CONVERGED
+    drag, depth, fraction, slope = np.where(found, values, np.nan)
+    return Steady(drag, depth, fraction, slope, status)
 
 
 @lru_cache
@@ -256,8 +277,13 @@ class Seen(NamedTuple):
     deborah: FloatArray
 
 
+def _may_be_met(seen: Seen, oversampling: int, accuracy: float) -> bool:
+    """Return whether the first two grids can have agreed otherwise than by chance, in any of the cases."""
+    return bool(np.any(seen.touched * oversampling >= SETTINGS.by_chance / accuracy))
+
+
 def _sampled_errors(
-    steady: Steady, seen: Seen, oversampling: int, change: FloatArray, before: FloatArray
+    columns: FloatArray, seen: Seen, oversampling: int, change: FloatArray, before: FloatArray
 ) -> FloatArray:
     """Return the errors of the finer of two grids from the changes of the columns, infinite if too few nodes touch.
 
@@ -267,19 +293,20 @@ def _sampled_errors(
     """
     settings, is_first = SETTINGS, oversampling == SETTINGS.sampled
     of_change, of_any, profile = map(_column, (settings.of_change, settings.of_any_change, settings.profile))
-    touched, slow = seen.touched, 1 / np.sqrt(1 + seen.deborah)
-    of_first = _column(settings.of_any_first) * np.array([slow, slow, np.ones(slow.size), slow])
-    sizes = np.array([steady.drag, np.ones(steady.drag.size), steady.contact_fraction, steady.contact_slope])
+    sizes, touched, fraction = columns.copy(), seen.touched, columns[FRACTION]
+    sizes[DEPTH] = 1.0
     touching = touched * oversampling
-    with np.errstate(all="ignore"):
-        apart = np.clip(touching * (1 / steady.contact_fraction - 1), settings.few, touching)
-        nodes = np.array([touching, touching, apart, apart])
-        any_change, any_before = (np.max((each / sizes)[[0, 2, 3]], axis=0) for each in (change, before))
-        errors = np.maximum(of_change * change, of_change * settings.of_change_before * before)
-        errors = np.maximum(errors, of_any * any_change * sizes) * (1 + np.sqrt(settings.averaged / nodes))
-        other = of_first * any_change if is_first else _column(settings.of_any_before) * any_before
-        errors = np.maximum(errors, other * sizes)
-        if is_first:
-            errors[[0, 2, 3]] = np.maximum(errors, settings.by_chance / nodes * sizes)[[0, 2, 3]]
-        errors += profile * (1 + settings.lightest / touched) * sizes
+    apart = np.clip(touching * (1 / fraction - 1), settings.few, touching)
+    nodes = np.array([touching, touching, apart, apart])
+    any_change, any_before = ((each / sizes)[RELATIVE].max(axis=0) for each in (change, before))
+    errors = np.maximum(of_change * change, of_change * settings.of_change_before * before)
+    errors = np.maximum(errors, of_any * any_change * sizes) * (1 + np.sqrt(settings.averaged / nodes))
+    if is_first:
+        slow = 1 / np.sqrt(1 + seen.deborah)
+        of_first = _column(settings.of_any_first) * np.array([slow, slow, np.ones(slow.size), slow])
+        errors = np.maximum(errors, of_first * any_change * sizes)
+        errors[RELATIVE] = np.maximum(errors, settings.by_chance / nodes * sizes)[RELATIVE]
+    else:
+        errors = np.maximum(errors, _column(settings.of_any_before) * any_before * sizes)
+    errors += profile * (1 + settings.lightest / touched) * sizes
     return np.where((touching > settings.few) & np.isfinite(errors), errors, np.inf)

@@ -41,6 +41,8 @@ class Nodes(NamedTuple):
         Bounds and sums over the cells of a block.
     top : float
         The height of the first node.
+    rise : float
+        How high over it the line reaches in the cell before: that of a coarse grid is not told.
     """
 
     height: FloatArray
@@ -48,6 +50,7 @@ class Nodes(NamedTuple):
     ends: FloatArray
     blocks: FloatArray
     top: float
+    rise: float
 
 
 @compiled
@@ -100,7 +103,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     n = height.size // stride
     h, s = np.empty((2, BEFORE + n + AFTER))
     terms = np.empty((2, ends.shape[1] and h.size))
-    line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]))
+    line = Nodes(h, s, terms, np.empty((n // BLOCK, KNOWN)), float(height[first]), 0.0)
     _take_line(height, slope if resolved else slope[:0], ends, first, stride, line, np.empty((3, BLOCK + 1)))
     return line
 
@@ -268,9 +271,9 @@ def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: Flo
         height[place + 1], slope[place + 1] = value, rate / refinement
 
 
-def summit_rise(line: Nodes) -> float:
-    """Return how high over the first node the line reaches in the cell before it."""
+def with_summit(line: Nodes) -> Nodes:
+    """Return a line whose highest point is in the cell before its first node, with how high it reaches there."""
     table = weights(SUMMIT)
     height, slope = np.empty((2, SUMMIT + 3))
     refine(line, BEFORE - 1, 1, table, height, slope)
-    return max(float(np.max(height[1:-1])), 0.0)
+    return line._replace(rise=max(float(np.max(height[1:-1])), 0.0))

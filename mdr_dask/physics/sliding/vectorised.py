@@ -7,7 +7,6 @@ searched for on finer and finer grids, each from the answer of the one before.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +14,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled
-from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.cases import Cases, Steady
+from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -26,8 +24,8 @@ from mdr_dask.physics.sliding.nodes import (
     Nodes,
     ends_of,
     nodes,
-    summit_rise,
     weights,
+    with_summit,
 )
 from mdr_dask.physics.sliding.walk import (
     BEGAN,
@@ -70,39 +68,50 @@ DRAG, FRACTION, SLOPE, DOUBTS, DOUBT_OF_DEPTH = 0, 1, 2, 3, 6
 SECANTS, RESULTS = 3, 7
 
 
-@dataclass(frozen=True)
-class Sampled:
+class Sampled(NamedTuple):
     """Steady states on a grid, one entry for every case; all but the depth are NaN where no depth was found.
 
     Parameters
     ----------
     rates : array, shape (cases, 3)
         Relative changes of drag, contact fraction and contact slope with the depth.
-    drag, depth, contact_fraction, contact_slope : array, shape (cases,)
-        As in :class:`mdr_dask.physics.sliding.cases.Steady`.
+    columns : array, shape (4, cases)
+        Drag, depth, contact fraction and contact slope, as in :class:`mdr_dask.physics.sliding.cases.Steady`.
     doubts : array, shape (4, cases)
         What the search for the depth may have left in them.
     """
 
     rates: FloatArray
-    drag: FloatArray
-    depth: FloatArray
-    contact_fraction: FloatArray
-    contact_slope: FloatArray
+    columns: FloatArray
     doubts: FloatArray
+
+    @property
+    def drag(self) -> FloatArray:
+        """The drag."""
+        drag: FloatArray = self.columns[0]
+        return drag
+
+    @property
+    def depth(self) -> FloatArray:
+        """Penetration of the mean line."""
+        depth: FloatArray = self.columns[1]
+        return depth
+
+    @property
+    def contact_fraction(self) -> FloatArray:
+        """Length in contact over that of the line."""
+        contact_fraction: FloatArray = self.columns[2]
+        return contact_fraction
+
+    @property
+    def contact_slope(self) -> FloatArray:
+        """The rms slope over the contact."""
+        contact_slope: FloatArray = self.columns[3]
+        return contact_slope
 
     def only(self, cases: NDArray[np.bool_]) -> Sampled:
         """Return some of the cases."""
-        columns = {name: column[cases] for name, column in vars(self).items() if name != "doubts"}
-        return Sampled(**columns, doubts=self.doubts[:, cases])
-
-    def steady(self) -> Steady:
-        """Return the states."""
-        found = np.isfinite(self.drag) & (self.drag > 0)
-        status = np.where(found, np.int8(Outcome.CONVERGED), np.int8(Outcome.DEPTH_NOT_FOUND))
-        columns = np.array([self.drag, self.depth, self.contact_fraction, self.contact_slope])
-        drag, depth, fraction, slope = np.where(found, columns, np.nan)
-        return Steady(drag, depth, fraction, slope, status)
+        return Sampled(self.rates[cases], self.columns[:, cases], self.doubts[:, cases])
 
 
 class Search(NamedTuple):
@@ -147,7 +156,6 @@ class _Workspace(NamedTuple):
 def _solve(
     line: Nodes,
     weights: FloatArray,
-    rise: float,
     cases: Cases,
     bounds: tuple[float, float],
     search: Search,
@@ -161,8 +169,6 @@ def _solve(
         The line on a grid.
     weights : array, shape (2, refinement, 12)
         From `weights`.
-    rise : float
-        Height of the summit over the highest node.
     cases : Cases
         v tau / L, and F_N / (4 G L) in the unit of height.
     bounds : tuple of float
@@ -172,7 +178,7 @@ def _solve(
     place : _Workspace
         On this grid.
     """
-    deborah, loads = cases
+    (deborah, loads), rise = cases, line.rise
     near_step, trusted = bounds
     depths, rates, results = search
     refinement = weights.shape[1]
@@ -248,11 +254,11 @@ def begin(
     for stride in reversed(strides):
         search.results.fill(np.nan)
         line = nodes(height, slope, highest, stride, stride == strides[0], NO_ENDS)
-        _solve(line, weights(1), 0.0, cases, SETTINGS.start, search, _Workspace.on(1))
+        _solve(line, weights(1), cases, SETTINGS.start, search, _Workspace.on(1))
     coarse = _sampled(line.top, search._replace(rates=search.rates.copy()))
     cell, _, _ = highest_point(height, slope)
-    line = nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope))
-    return line, coarse, _settled(line, summit_rise(line), 1, cases, coarse.depth, search.rates, trusted)
+    line = with_summit(nodes(height, slope, (cell + 1) % height.size, 1, True, ends_of(height, slope)))
+    return line, coarse, _settled(line, 1, cases, coarse.depth, search.rates, trusted)
 
 
 def settle(
@@ -280,15 +286,13 @@ def settle(
     """
     coarse, fine = grids
     ahead = SETTINGS.ahead * (fine.depth - coarse.depth)
-    rise = summit_rise(line)
-    top = line.top + rise
+    top = line.top + line.rise
     depths = fine.depth + np.where(np.abs(ahead) < SETTINGS.near * (fine.depth + top), ahead, 0.0)
-    return _settled(line, rise, refinement, Cases(deborah, loads), depths, fine.rates.copy(), trusted)
+    return _settled(line, refinement, Cases(deborah, loads), depths, fine.rates.copy(), trusted)
 
 
 def _settled(
     line: Nodes,
-    rise: float,
     refinement: int,
     cases: Cases,
     depths: FloatArray,
@@ -296,10 +300,10 @@ def _settled(
     trusted: float,
 ) -> Sampled:
     """Return the steady states on a grid, searched for from some depths of the mean line on."""
-    top = line.top + rise
+    top = line.top + line.rise
     penetration = np.where(depths + top > 0, depths + top, _shallow(cases.loads))
     search = Search(penetration, rates, np.full((depths.size, RESULTS), np.nan))
-    _solve(line, weights(refinement), rise, cases, (SETTINGS.answer_step, trusted), search, _Workspace.on(refinement))
+    _solve(line, weights(refinement), cases, (SETTINGS.answer_step, trusted), search, _Workspace.on(refinement))
     return _sampled(top, search)
 
 
@@ -309,6 +313,8 @@ def _shallow(loads: FloatArray) -> FloatArray:
 
 
 def _sampled(top: float, search: Search) -> Sampled:
-    drag, fraction, slope, of_drag, of_fraction, of_slope, of_depth = search.results.T.copy()
+    results, depth = search.results.T, search.depths - top
+    drag, fraction, slope = results[:SECANTS]
+    of_drag, of_fraction, of_slope, of_depth = results[DOUBTS:]
     doubts = np.array([of_drag * drag, of_depth, of_fraction * fraction, of_slope * slope])
-    return Sampled(search.rates, drag, search.depths - top, fraction, slope, doubts)
+    return Sampled(search.rates, np.array([drag, depth, fraction, slope]), doubts)

@@ -67,7 +67,7 @@ class ViscoelasticSteady:
 def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float) -> ViscoelasticSteady:
     """Return the steady state of a foundation of independent elements that slides along a line.
 
-    An element that has travelled s along the line is pressed by ``w(s) = d + h(s)``; in contact u = w, free f = 0, with
+    An element that has travelled s along the line is pressed by ``w(s) = d + h(s)``. In contact u = w, free f = 0, with
     f = 4 dx [G_inf u + sum G_m (u - a_m) + eta v u'] (thesis 3.3.3 for any linear rheology).
 
     Parameters

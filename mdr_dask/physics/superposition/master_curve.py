@@ -109,9 +109,9 @@ def superpose(
 ) -> Superposition:
     """Find the shifts that make curves parts of one smooth curve, with their covariance.
 
-    All shifts and the curve are fitted together by least squares: the curve is a cubic spline whose curvature is
-    weighted by
-    restricted maximum likelihood, so that curves are joined by their overlaps, and by smoothness where those are short.
+    All shifts and the curve are fitted together by least squares. The curve is a cubic spline whose curvature is
+    weighted by restricted maximum likelihood. So curves are joined by their overlaps, and by smoothness where those are
+    short.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ def spectral_slope(amplitude: FloatArray) -> float:
 def phases(seed: int, realisation: int, modes: int) -> FloatArray:
     """Return the phases of a realisation in [0, 2 pi), shape (modes,).
 
-    They depend on the seed and the index of the realisation only; a longer spectrum begins with the same phases, so
+    They depend on the seed and the index of the realisation only. A longer spectrum begins with the same phases, so
     that lines of any Hurst exponent, rms height or cut-off are common random numbers (thesis Fig. 2.6).
     """
     phase: FloatArray = 2 * np.pi * _generator(seed, realisation).random(modes)

@@ -50,7 +50,7 @@ class Settings(NamedTuple):
     of_others: float = 0.5
     of_contact: float = 0.1
     of_ends: float = 0.1
-    of_transient: float = 2.0
+    of_transient: float = 4.0
     few: float = 20.0
     of_few: float = 0.3
     of_a_peak: float = 1.0
@@ -168,7 +168,7 @@ def solve_jumps(problem: JumpProblem, aim: JumpAim) -> Jumps:
         jumps.trace[k] = levels.after[k] + (jump.trace - jump.after)
         jumps.depth[k] = levels.depth[k] + (jump.depth - fine.depth[k, 1])
     if aim.with_errors and near is not None:
-        paths = retraced(half, problem.loads, problem.deborah, near, marched)
+        paths = retraced(half, problem.loads, problem.deborah, near, marched, aim.course)
         for k, (jump, path) in enumerate(zip(marched, paths, strict=True)):
             change, sinking = SETTINGS.of_transient * _changes(jump, path, (fine, near), k, aim.course.times)
             jumps.trace_error[k], jumps.depth_error[k] = change + errors.after[k], sinking + errors.depth[k]

@@ -14,6 +14,7 @@ from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.patches import DRAG, DRAG_STIFFNESS, LOAD, STIFFNESS, History, Patches, Track
 
 TRIALS = 80
+ORDER = 3  # of the backward differentiation
 EXACT = 1e-11  # of the load
 MANY, CAREFUL = 100, 0.1  # with fewer patches than many the load bends more with the depth: smaller steps are trusted
 SETTLED = 2.5  # times the time since when a march has been near its end: where it ends
@@ -54,7 +55,10 @@ class Finish(NamedTuple):
 
 
 class Marching(NamedTuple):
-    """What stays the same during a march: the line, the state before the jump, Deborah number, load, and limits."""
+    """What stays the same during a march: the line, the state before the jump, Deborah number, load, limits, onset.
+
+    From `onset` on steps grow in a constant ratio, so that all of them are alike in log(1 + t / onset).
+    """
 
     track: Track
     first: Patches
@@ -63,31 +67,17 @@ class Marching(NamedTuple):
     load: float  # over 4 G dx
     low: float
     high: float
+    onset: float
 
 
 class Trajectory(NamedTuple):
-    """Time, depth, its rate and drag at every moment of a march; the first entry is the state right after the jump."""
+    """Time, log(1 + t / onset), depth, its rate and drag at every moment, from right after the jump on."""
 
     time: FloatArray
+    place: FloatArray
     depth: FloatArray
     rate: FloatArray
     drag: FloatArray
-
-
-@compiled
-def _rate_weights(time: FloatArray, depth: FloatArray, now: int, order: int) -> tuple[float, float]:
-    """Return a and b of d_dot = a d + b at moment `now`, from the polynomial through the last depths (BDF)."""
-    t = time[now]
-    a, b = 0.0, 0.0
-    for j in range(1, order + 1):
-        a += 1 / (t - time[now - j])
-    for j in range(1, order + 1):
-        weight = 1 / (time[now - j] - t)
-        for m in range(1, order + 1):
-            if m != j:
-                weight *= (t - time[now - m]) / (time[now - j] - time[now - m])
-        b += weight * depth[now - j]
-    return a, b
 
 
 @compiled
@@ -133,33 +123,46 @@ def _balance(
 
 
 @compiled
-def _weights(found: Trajectory, now: int) -> tuple[float, float]:
-    """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate."""
-    if now > 1:
-        return _rate_weights(found.time, found.depth, now, min(now, 3))
-    taken = found.time[1] - found.time[0]
-    return 2 / taken, -2 * found.depth[0] / taken - found.rate[0]
+def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
+    """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
+
+    They are those of the polynomial through the last depths, over the places (BDF): what relaxes is smooth there, and
+    steps are alike.
+    """
+    time, place, depth = found.time, found.place, found.depth
+    if now == 1:
+        taken = time[1] - time[0]
+        return 2 / taken, -2 * depth[0] / taken - found.rate[0]
+    here, order, a, b = place[now], min(now, ORDER), 0.0, 0.0
+    for j in range(now - order, now):
+        a += 1 / (here - place[j])
+        weight = 1 / (place[j] - here)
+        for m in range(now - order, now):
+            if m != j:
+                weight *= (here - place[m]) / (place[j] - place[m])
+        b += weight * depth[j]
+    pace = 1 / (onset + time[now])
+    return a * pace, b * pace
 
 
 @compiled
 def _foretold(found: Trajectory, now: int) -> float:
-    """Extrapolate the depth to moment `now`: by a parabola, over the logarithm of time as soon as there are moments."""
-    time, depth, rate, _ = found
+    """Extrapolate the depth to moment `now`: by a parabola over the places, as soon as there are three of them."""
+    time, place, depth, rate, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
         return float(depth[0] + taken * rate[0])
-    if now <= 3:
-        bend = (rate[now - 1] - rate[now - 2]) / (time[now - 1] - time[now - 2])
-        return float(depth[now - 1] + taken * (rate[now - 1] + 0.5 * taken * bend))
-    ahead = np.log(time[now] / time[now - 1])
-    one, two = np.log(time[now - 2] / time[now - 1]), np.log(time[now - 3] / time[now - 1])
+    if now == 2:
+        bend = (rate[1] - rate[0]) / (time[1] - time[0])
+        return float(depth[1] + taken * (rate[1] + 0.5 * taken * bend))
+    ahead, one, two = place[now] - place[now - 1], place[now - 2] - place[now - 1], place[now - 3] - place[now - 1]
     to_one, to_two = (depth[now - 2] - depth[now - 1]) / one, (depth[now - 3] - depth[now - 1]) / two
     return float(depth[now - 1] + ahead * (to_one + (ahead - one) * (to_two - to_one) / (two - one)))
 
 
 @kernel
 def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
-    """March the depth at constant load by backward differentiation of order three.
+    """March the depth at constant load by backward differentiation of order three over log(1 + t / onset).
 
     Parameters
     ----------
@@ -177,7 +180,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
     outcome : int
         An `Outcome`, or `LEFT_LIMITS`.
     """
-    time, depth, rate, drag = found
+    time, place, depth, rate, drag = found
     near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - aim.drag)
     while time[now - 1] < pace.until:
         if now == time.size:
@@ -185,8 +188,8 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
         time[now] = min(time[now - 1] + step, pace.until)
         if pace.until - time[now] < 0.1 * step:
             time[now] = pace.until
-        taken = time[now] - time[now - 1]
-        weights, foretold = _weights(found, now), _foretold(found, now)
+        place[now], taken = np.log1p(time[now] / marching.onset), time[now] - time[now - 1]
+        weights, foretold = _weights(found, now, marching.onset), _foretold(found, now)
         depth[now] = min(max(foretold, marching.low), marching.high)
         history = History(time, depth, rate, now + 1, weights[0])
         outcome, drag[now] = _balance(marching, history, weights, pace.close, work)
@@ -217,19 +220,19 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     depths : array, shape (moments,)
         Depths on another grid, from whose course those found depart slowly.
     found : Trajectory
-        Its times are given; written from the second entry on.
+        Its times and places are given; written from the second entry on.
 
     Returns
     -------
     outcome : int
         An `Outcome`, or `LEFT_LIMITS`.
     """
-    time, depth, rate, drag = found
+    time, _, depth, rate, drag = found
     for now in range(1, time.size):
         depth[now] = depths[now] + (depth[now - 1] - depths[now - 1])
         if not marching.low <= depth[now] <= marching.high:
             return LEFT_LIMITS
-        weights = _weights(found, now)
+        weights = _weights(found, now, marching.onset)
         history = History(time, depth, rate, now + 1, weights[0])
         outcome, drag[now] = _balance(marching, history, weights, np.inf, work)
         if outcome != Outcome.CONVERGED:

@@ -144,8 +144,8 @@ def pace_after(course: Course, deborah: float, change: float, load: float) -> St
 def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], course: Course) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
 
-    The start is steady sliding at v_1; then the depth is marched by backward differentiation of order three over graded
-    steps, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
+    The start is steady sliding at v_1; then the depth is marched by backward differentiation of order three over the
+    logarithm of time, with every contact edge solved at every moment (thesis 4.2 with the indentation rate kept).
 
     Parameters
     ----------
@@ -189,13 +189,13 @@ def velocity_jumps(
 
 
 def retraced(
-    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump]
+    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump], course: Course
 ) -> list[FloatArray]:
     """Return the paths of jumps on another grid at every second of their moments, with NaN where none is found.
 
     Parameters
     ----------
-    line, loads, deborah, ends
+    line, loads, deborah, ends, course
         As in :func:`velocity_jumps`, on the other grid.
     jumps : list of Jump
         The same cases, whose paths are followed.
@@ -205,7 +205,6 @@ def retraced(
         path = jump.path[:, ::EVERY].copy()
         path[1:] = np.nan
         if jump.outcome == Outcome.CONVERGED == ends.outcome[k] and jump.moments:
-            course = Course(path[0], 1.0)
             path = _Relaxation.of(line, loads[k], deborah[k], ends, k, course).retrace(jump.path[:, ::EVERY])
         paths.append(path)
     return paths
@@ -311,7 +310,7 @@ class _Relaxation(NamedTuple):
         )
         if outcome == LEFT_LIMITS:
             return None
-        time, depth, _, drag = (column[:count] for column in found)
+        time, _, depth, _, drag = (column[:count] for column in found)
         near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
@@ -324,12 +323,13 @@ class _Relaxation(NamedTuple):
 
     def begun(self, limits: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
         """Return a march between two depths at its first moment, with room for all of them."""
-        found = Trajectory(*np.empty((4, moments)))
-        for column, value in zip(found, (0.0, self.depth[0], self.rate, self.at), strict=True):
+        found = Trajectory(*np.empty((5, moments)))
+        for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at), strict=True):
             column[0] = value
         slowest = self.line.patches(limits[0], float(self.deborah.min()), np.empty(SWEEP_SUMS))
         reachable = _reachable(self.line.track, slowest, limits[1])
-        marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits)
+        onset = self.pace.first / (self.pace.growth - 1)
+        marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
         return marching, found, workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
 
     def retrace(self, path: FloatArray) -> FloatArray:
@@ -338,7 +338,7 @@ class _Relaxation(NamedTuple):
         depths = path[2] + top
         for limits in self.limits(np.append(depths + (self.depth[0] - depths[0]), self.depth)):
             marching, trajectory, work = self.begun(limits, path.shape[1])
-            trajectory.time[:] = path[0]
+            trajectory.time[:], trajectory.place[:] = path[0], np.log1p(path[0] / marching.onset)
             outcome = retrace(marching, depths, trajectory, work)
             if outcome == Outcome.CONVERGED:
                 found[1], found[2] = trajectory.drag, trajectory.depth - top

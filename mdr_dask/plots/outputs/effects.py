@@ -45,7 +45,7 @@ def draw_effects(found: Mapping[str, xr.Dataset], view: View) -> tuple[Drawn, li
             drawing.plain(axes, x, cases, ".", label="a case", ms=3, color="0.7", zorder=1)
         across, mean = _bins(data, view.output, name, dim) if is_sampled(data, dim) else _means(data, view, name)
         shown = drawing.Mean(*map(how.of, mean))
-        joined = drawing.Curve(data, "mean, 95 % interval", style.COLOURS[0], "-", "o")
+        joined = drawing.Curve(data, "mean, 95 % interval", style.colour(0), "-", "o")
         drawing.curve(axes, joined, across, shown, bars=True)
         scale(axes, "x", name, data[name], view)
         if view.is_log("y", cases):

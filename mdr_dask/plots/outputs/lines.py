@@ -88,7 +88,7 @@ def _panels(found: Mapping[str, xr.Dataset], view: View) -> tuple[list[Panel], l
     if view.panels:
         return by_value(found, view)
     count = sum(len(_family(data, view).curves) for data in found.values())
-    if len(found) > 1 and count > len(style.COLOURS):
+    if len(found) > 1 and count > style.most_colours():
         return by_series(found)
     return [Panel("", dict(found))], []
 
@@ -114,7 +114,10 @@ def _draw_panel(figure: Figure, axes: Axes, families: Mapping[str, curves.Family
             one = one._replace(varying=tuple(name for name in one.varying if name != view.by))
         else:
             drawing.curve(axes, curve, x, y, bars=curve.line != "" and y.value.size < drawing.MANY_POINTS)
-        marked |= _mark(axes, curve, x, view)
+        marks = _mark(axes, curve, x, view)
+        if marks and not np.isfinite(y.value).any():
+            axes.plot([], [], color=curve.colour, label=curve.label or None)
+        marked |= marks
         if one.joined and (law := laws.law_of(curve.data, view.output)):
             _draw_law(axes, curve, law, view)
             known[law.name] = None
@@ -130,16 +133,17 @@ def _draw_panel(figure: Figure, axes: Axes, families: Mapping[str, curves.Family
 def _coloured(families: Mapping[str, curves.Family]) -> Iterator[tuple[drawing.Curve, curves.Family]]:
     """Yield the curves of a panel with their family; those of several series have the name of theirs in the legend."""
     every = [(name, curve, one) for name, one in families.items() for curve in one.curves]
-    if len(families) > 1 and len(every) > len(style.COLOURS):
+    if len(families) > 1 and len(every) > style.most_colours():
         raise DataError(
-            f"expected at most {len(style.COLOURS)} curves of several series in a panel, got {len(every)}: "
+            f"expected at most {style.most_colours()} curves of several series in a panel, got {len(every)}: "
             "--select fewer, or leave --panels out"
         )
     markers = dict(zip(families, style.MARKERS * len(families), strict=False))
     for k, (name, curve, one) in enumerate(every):
         if len(families) > 1:
             label = ", ".join(part for part in (name, curve.label) if part)
-            curve = curve._replace(label=label, colour=style.COLOURS[k], marker=markers[name])
+            line = style.line_and_marker(k)[0] if curve.line else ""
+            curve = drawing.Curve(curve.data, label, style.colour(k), line, markers[name])
         yield curve, one
 
 

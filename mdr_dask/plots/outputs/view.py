@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Settings of solvers, which no title names; the table beside the figure does.
-SETTINGS = {"oversampling", "steps_per_decade", "cells", "extent", "profile_start", "profile_end", "profile_points"}
-
 #: Most letters in a line of a name at a tick; lists and structures are longer.
 LONGEST_NAME = 20
 
@@ -188,16 +185,17 @@ def title(
 ) -> None:
     """Write over a figure what it shows, what all of it holds fixed, and what bars mean.
 
-    What is at its default, and the entries of structures, are left to the table beside the figure, except those that
-    figures have symbols for.
+    Settings, defaults, and entries of structures are left to the table beside the figure, except those
+    that figures have symbols for.
     """
     alike = curves.fixed_by_all(held)
-    model = models.load(next(iter(found.values())).attrs["model"])
-    plain = {name: field.default for name, field in model.parameters.model_fields.items() if name not in SETTINGS}
+    parameters = models.load(next(iter(found.values())).attrs["model"]).parameters
+    plain = {name: field.default for name, field in parameters.model_fields.items()}
     told = [
         name
         for name, value in alike.items()
-        if name in style.QUANTITIES or (name in plain and value.item() != plain[name])
+        if name not in parameters.settings
+        and (name in style.QUANTITIES or (name in plain and value.item() != plain[name]))
     ]
     style.title(figure, subject, curves.fixed_text(alike, told), bars)
 
