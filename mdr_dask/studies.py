@@ -299,17 +299,12 @@ def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
     DataError, FitError
         If the study has not what the figure needs.
     """
-    from mdr_dask.plots.table import Drawn, made_by, of_campaign
-
     groups = _groups(study)
     model = _model(groups)
     if not view and any(figure in data.data_vars for data in groups.values()):
         raise DataError(f"{figure} is an output: name the axis to draw it over, as in over='velocity'")
     found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
     drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
-    if isinstance(drawn, Drawn):
-        held = study.attrs if isinstance(study, xr.DataTree) else next(iter(groups.values())).attrs
-        drawn.origin = {**made_by(found.name), "study": of_campaign(held)}
     return drawn
 
 

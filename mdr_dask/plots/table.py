@@ -138,19 +138,17 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
 
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
     """Return what the table of a figure says of its origin."""
-    return {
-        **made_by(name),
-        "command": command,
-        **{f"store {url}": of_campaign(stores.attributes(url)) for url in urls},
-    }
+    told = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
+    return told | {f"store {url}": _campaign_of(stores.attributes(url)) for url in urls}
 
 
-def made_by(name: str) -> dict[str, str]:
-    """Return what made a figure; the tables of all begin with it."""
-    return {"mdr_dask": f"{__version__}, figure {name}"}
+def of_groups(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return what the table of a figure says of its origin where no command drew it."""
+    campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
+    return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
 
 
-def of_campaign(held: Mapping[Any, Any]) -> str:
+def _campaign_of(held: Mapping[Any, Any]) -> str:
     """Return which campaign a study is of, by its attributes."""
     title, text, model, version = (str(held.get(key)) for key in ("title", "campaign", "model", "model_version"))
     digest, computed = hashlib.sha256(text.encode()).hexdigest(), held.get("versions", {}).get("mdr_dask")
