@@ -51,7 +51,10 @@ PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
         ("mdr_dask.physics.lubrication.film_formulas", ("hertz_line", "dimensionless_groups", "moes_parameters")),
     ),
     "Oils": (
-        ("mdr_dask.physics.lubrication.oil", ("Oil", "walther_constants", "pressure_viscosity", "barus", "roelands")),
+        (
+            "mdr_dask.physics.lubrication.oil",
+            ("Oil", "walther_constants", "walther_fit", "pressure_viscosity", "barus", "roelands"),
+        ),
     ),
     "Superposition": (("mdr_dask.physics.superposition.master_curve", ("superpose", "Superposition", "rereference")),),
 }

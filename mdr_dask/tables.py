@@ -17,6 +17,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.headings import folded, meanings
 from mdr_dask.units import example_unit, is_unit, to_si
 
 COMMENT = "#%"
@@ -30,7 +31,6 @@ MOST_TOLD = 10
 _WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))\s*\Z")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?\Z")
 _CELSIUS = ("C", "c", "°c", "ºC")
-_PRIMES = str.maketrans({"’": "'", "′": "'", "″": "''", '"': "''"})
 _COMMAS = " (put semicolons between the values if they have decimal commas)"
 NO_ROWS = "expected a line of names and at least one line of values"
 _MISSING = frozenset({"", "-", "nan", "na", "n/a"})
@@ -92,8 +92,8 @@ class Column:
     given_unit: str = ""
 
     def holds(self, heading: str) -> bool:
-        """Return whether a heading is a name of this column."""
-        return _folded(heading) in {_folded(name) for name in (self.name, *self.other_names)}
+        """Return whether a heading is a name of this column, in English or German."""
+        return not meanings(heading).isdisjoint(map(folded, (self.name, *self.other_names)))
 
 
 @dataclass(frozen=True)
@@ -423,8 +423,3 @@ def _in_si(number: str, unit: str, wanted: str) -> float:
         return to_si(f"{number} {unit}", wanted)
     except ValueError:
         return (2 * math.pi if "hz" in unit.lower() else 1.0) * to_si(f"{number} {unit}", wanted.replace("rad", "1"))
-
-
-def _folded(name: str) -> str:
-    """Return a name without what does not matter: blanks, underscores, hyphens, dots, capitals, kinds of primes."""
-    return re.sub(r"[\s_.-]+", " ", name.strip().casefold()).translate(_PRIMES)

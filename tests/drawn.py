@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import pytest
 import xarray as xr
 from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
@@ -136,6 +137,7 @@ def check_laws(name: str, figure) -> None:
         np.testing.assert_allclose(drawn["y"], law(drawn["x"]), rtol=2e-4, atol=1e-9, err_msg=curve)
     if name == "jump_fit":
         _check_exponentials(table)
+        _check_window(*figure.axes[:2])
     table = table.reindex(columns=[*FIRST, *LAST])
     bands = table[table["y_low"].notna() & table["y"].isna()]
     assert (bands["y_low"] <= bands["y_high"]).all()
@@ -150,6 +152,14 @@ def _check_exponentials(table: pd.DataFrame) -> None:
     for (panel, curve), rows in table[told.notna()].groupby(["panel", "curve"]):
         rate = -np.polyfit(rows["x"], np.log(np.abs(rows["y"])), 1)[0]
         assert abs(rate / told[rows.index[0]] - 1) < 0.01, (panel, curve, rate)
+
+
+def _check_window(linear, logarithmic) -> None:
+    """The window of the fit fills five sixths of one panel, and the other goes from the first moment to the last."""
+    (window,) = (line.get_xdata()[0] for line in linear.lines if line.get_label() == "end of the window")
+    assert linear.get_xlim() == pytest.approx((0, 1.2 * window))
+    moments = np.concatenate([line.get_xdata() for line in logarithmic.lines if line.get_gid() == style.DATA])
+    assert logarithmic.get_xlim() == pytest.approx((moments[moments > 0].min(), moments.max()))
 
 
 def _is(artist, kind: str) -> bool:

@@ -166,7 +166,16 @@ def test_sizes_are_for_people(size, told):
 
 
 @pytest.mark.parametrize(
-    ("values", "told"), [((1, 2, 3), ", linear"), ((1, 10, 100), ", geometric"), ((1, 2, 5), ""), ((-1, 0, 5), "")]
+    ("values", "told"),
+    [
+        ((1, 2, 3), ", linear"),
+        ((1, 2, 3 + 1e-7), ", linear"),
+        ((1, 2, 3 + 1e-4), ""),
+        ((1, 10, 100), ", geometric"),
+        ((1, 10, 100.1), ""),
+        ((1, 2, 5), ""),
+        ((-1, 0, 5), ""),
+    ],
 )
 def test_even_spacing_is_named(values, told):
     assert spacing(values) == told

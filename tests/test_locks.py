@@ -75,6 +75,18 @@ def test_a_file_that_its_holder_takes_away_at_that_moment_is_no_lock(url, monkey
         pass
 
 
+def test_who_is_refused_keeps_no_file_open(url):
+    def count():
+        return len([*Path("/proc/self/fd").iterdir()])
+
+    with store.lock(url):
+        before = count()
+        for _ in range(5):
+            with pytest.raises(StoreBusyError), store.lock(url):
+                pass
+        assert count() == before
+
+
 def refused(url, part, meanwhile=lambda: None):
     with store.beside(url, part):
         meanwhile()

@@ -19,6 +19,7 @@ from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.cli import main
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.models.base import Status
 
 CAMPAIGN = """
 name: toy
@@ -105,6 +106,22 @@ def test_a_part_whose_round_needs_others_that_are_not_at_work_ends_and_says_so(t
         "the round of 5 realisations needs results of parts that are not at work: 1/3, 3/3; "
         "start them, then this one again"
     )
+
+
+def test_parts_do_not_wait_for_each_other_s_failed_results(toy, url):
+    replication = Replication(4, 16, {"height": Tolerance(relative=0.02)})
+    axes = (toy.axis("position", [1.0, 2.0, 3.0, 4.0]), toy.axis("noise", [0.1]))
+    campaign = toy.campaign(*axes, realisations=replication, fail_above=2.5)
+    campaign = replace(campaign, blocks={"position": 1, "realisation": 2})
+    told, rounds = ["round unfinished"], 0
+    while "round unfinished" in told and rounds < 6:
+        events, rounds = [], rounds + 1
+        for number in (1, 2):
+            run_part(campaign, url, number, 2, tell=events.append)
+        told = [event.name for event in events]
+    assert 1 < rounds < 6
+    counted = store.datasets(url)[""]["status"].load()
+    assert set(counted.sel(position=[3.0, 4.0]).to_numpy().ravel()[:4]) == {Status.FAILED}
 
 
 BUSY = {

@@ -160,7 +160,7 @@ REFUSED = [
     (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key (did"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
     (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
-    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study, got a Dataset without"),
+    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study as run or open returns it"),
 ]
 
 
@@ -177,6 +177,42 @@ def test_unknown_laws_and_figures_are_one_sentence(study):
         mdr_dask.fit(study, "zone_on")
     with pytest.raises(DataError, match="no figure of sliding_friction is called 'stribeck'"):
         mdr_dask.plot(study, "stribeck")
+
+
+UNFIT = [
+    (
+        lambda study: mdr_dask.aggregate(study, "medan"),
+        "no statistic is called 'medan' (did you mean 'mean'?); known: ",
+    ),
+    (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as run or open returns it"),
+    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
+    (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
+    (lambda study: mdr_dask.plot(study, "friction_coefficient"), "is an output: name the axis to draw it over"),
+]
+
+
+@pytest.mark.parametrize(("call", "told"), UNFIT)
+def test_what_is_no_study_or_no_statistic_is_one_sentence(call, told, study):
+    with pytest.raises(DataError) as refused:
+        call(study)
+    assert told in str(refused.value)
+
+
+def test_one_word_may_stand_for_a_sequence(study):
+    parts = {"select": "velocity=1 mm/s", "group_by": "normal_force", "columns": "load_number"}
+    one = mdr_dask.aggregate(study, "mean", **parts)
+    xr.testing.assert_identical(
+        one, mdr_dask.aggregate(study, ["mean"], **{key: [word] for key, word in parts.items()})
+    )
+    assert "friction_coefficient_mean" in one
+    assert "friction_coefficient_standard_error" not in one
+    assert len(mdr_dask.table(study, "rms_slope", sort="normal_force", select="velocity=1")) == 2
+
+
+@pytest.mark.parametrize("made", [range(1, 3), xr.DataArray([1, 2]), pd.Series([1, 2]), (1, 2)])
+def test_values_may_be_any_sequence_of_numbers(made):
+    parameters = {**SMALL["parameters"], "velocity": made}
+    assert studies.read({**SMALL, "parameters": parameters}).series[0].axes[-1].values == (1.0, 2.0)
 
 
 def test_failed_results_are_a_warning(toy, tmp_path):

@@ -44,6 +44,7 @@ DIALECTS = {
     "semicolons and decimal commas": table(NAMES.replace(",", ";"), comma=",", separator=";"),
     "tabs": table(NAMES.replace(",", "\t"), separator="\t"),
     "blanks": table(["f E_stor E_loss T", "Hz MPa MPa C"], separator=" "),
+    "German": table("Frequenz [Hz];Speichermodul [MPa];Verlustmodul [MPa];Temperatur [°C]", comma=",", separator=";"),
     "a row of units": table(["Frequency, Storage Modulus, Loss modulus, Temperature", "Hz,MPa,MPa,°C"]),
     "remarks and a byte-order mark": "\ufeff# machine 3\n\n" + table(NAMES).replace("\n0.1,", "\n% cold\n0.1,"),
     "line ends of another system": table(NAMES, ends="\r\n"),

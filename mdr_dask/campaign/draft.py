@@ -122,7 +122,8 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
     """Return a structure on one line, once for each way to give it."""
     needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "ways", ())
-    alternatives: list[set[str]] = [set(way) for way in next(iter(ways), ())] or [needed]
+    required = {name for name, info in kind.model_fields.items() if info.is_required()}
+    alternatives: list[set[str]] = [required.union(way) for way in next(iter(ways), ())] or [needed]
     texts = []
     for way in alternatives:
         keys = [key for key in kind.model_fields if key in fixed or key in way or key in inner]

@@ -28,9 +28,13 @@ LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
-    """Return the spectral rms slope: from the store, or from the parameters of a line without roll-off."""
+    """Return the spectral rms slope: from the store, or from the parameters of a line without roll-off.
+
+    It is NaN for a smooth line, whose friction has no slope to be compared with.
+    """
     if "rms_slope" in data:
-        return data["rms_slope"].mean("realisation")
+        stored = data["rms_slope"].mean("realisation")
+        return stored.where(stored > 0)
     if "hurst" not in data:
         raise FitError("expected the output rms_slope in the store of a measured surface, got none")
     require(data, "hurst", "points", "rms_roughness", "length")
@@ -41,7 +45,7 @@ def spectral_slope(data: xr.Dataset) -> xr.DataArray:
         vectorize=True,
     )
     slope: xr.DataArray = unit * data["rms_roughness"] / data["length"]
-    return slope
+    return slope.where(slope > 0)
 
 
 KELVIN = ("shear_modulus", "relaxation_time", "rms_roughness", "length")
@@ -152,12 +156,24 @@ class Table(NamedTuple):
 
     def stack(self, used: Any = slice(None)) -> FloatArray:
         """Return the stack of the means of some cases, with their errors."""
+        return self._moved(bootstrap.means(self.friction[used].T), self._errors(used))
+
+    def logarithms(self, used: Any = slice(None)) -> FloatArray:
+        """Return the stack of the logarithms of the means, which relative errors move: a mean may err by its size."""
         means = bootstrap.means(self.friction[used].T)
-        if not np.any(self.error[used] > 0):
-            return means
+        relative = self._errors(used) / means[0]
+        return self._moved(np.log(means), np.where(np.isinf(relative), 1.0, relative))
+
+    def _errors(self, used: Any) -> FloatArray:
         known = ~np.isnan(self.error[used])
-        error = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-        return np.concatenate([means, bootstrap.moved(means[0], error)])
+        total = np.where(known, np.abs(self.error[used]), 0.0).sum(axis=1)
+        mean: FloatArray = total / np.maximum(known.sum(axis=1), 1)
+        return mean
+
+    @staticmethod
+    def _moved(stack: FloatArray, error: FloatArray) -> FloatArray:
+        moved: FloatArray = np.concatenate([stack, bootstrap.moved(stack[0], error)]) if np.any(error > 0) else stack
+        return moved
 
     def count(self, used: Any = slice(None)) -> int:
         """Return the least number of realisations that any of some cases has."""
@@ -223,7 +239,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
     found = fitted(
         lambda logs: logs @ np.linalg.pinv(design),
         lambda logs, constants: logs - constants @ design,
-        np.log(table.stack(used) / (np.sqrt(2) * velocity[used])),
+        table.logarithms(used) - np.log(np.sqrt(2) * velocity[used]),
         count,
     )
     alpha, offset = found.constants.T
@@ -254,7 +270,7 @@ def _plateau(data: xr.Dataset) -> Variables:
     table = table_of(data, spectral_slope(data), velocities)
     known = np.flatnonzero(np.isfinite(table.mean()))
     velocity = table.columns[0][known]
-    if velocity.size < 3:
+    if velocity.size < 3 or not table.mean()[known].max() > 0:
         raise FitError("expected three velocities or more with friction, for a maximum over them")
     order = np.argsort(velocity)
     x, count = np.log(velocity[order]), table.count(known)

@@ -98,7 +98,7 @@ def _indenter(data: xr.Dataset) -> Variables:
         )
         return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason)
     xi, count = xi[used], table.count(used)
-    logs = np.log(table.stack(used))
+    logs = table.logarithms(used)
 
     def model(constants: FloatArray) -> FloatArray:
         law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))

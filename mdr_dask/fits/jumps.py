@@ -75,7 +75,7 @@ def _rising(cases: Cases, numbers: Mapping[str, FloatArray]) -> NDArray[np.bool_
 
 def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
     """Return d_mu_0 v_1 / (dv rms_slope) over mu_1 / rms_slope (eq. 4.11)."""
-    law: FloatArray = (before**-2.0 + np.asarray(constant) ** -2.0) ** -0.5
+    law: FloatArray = before / np.hypot(1.0, before / np.asarray(constant))
     return law
 
 
@@ -103,7 +103,7 @@ def _jump_limits(series: Series) -> xr.Dataset:
     before = numbers["before_over_slope"][0]
     law = jump_law(before, LAW)
     limits = {
-        "region I": (before < REGION_ONE, numbers["zeta"], 1.0, law / before),
+        "region I": (before < REGION_ONE, numbers["zeta"], 1.0, 1 / np.hypot(1.0, before / LAW)),
         "plateau": ((before > PLATEAU) & _rising(cases, numbers), numbers["jump_over_slope"], LAW, law),
     }
     if not any(np.any(inside) for inside, *_ in limits.values()):

@@ -93,9 +93,9 @@ class Cases:
 
     @property
     def slope(self) -> FloatArray:
-        """Return the rms slope of every case, which all its lines have."""
+        """Return the rms slope of every case, which all its lines have; NaN for smooth ones."""
         good = self.output("rms_slope")
-        known = np.isfinite(good)
+        known = np.isfinite(good) & (good > 0)
         total: FloatArray = np.where(known, good, 0.0).sum(axis=1) / np.where(
             known.any(axis=1), known.sum(axis=1), np.nan
         )
@@ -172,14 +172,15 @@ def law_rate(number: FloatArray, hurst: FloatArray) -> FloatArray:
 
 
 def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
-    """Return samples of what follows from mu_1, d_mu_0 and mu_2."""
+    """Return samples of what follows from mu_1, d_mu_0 and mu_2; zeta and xi are infinite or NaN where mu_1 is 0."""
     before, jump, after = cases.levels()
     change, slope = cases.column("velocity_change"), cases.slope
+    with np.errstate(divide="ignore", invalid="ignore"):
+        of_before = {"zeta": jump / before / change, "xi": (after / before - 1) / change}
     return {
         "before_over_slope": before / slope,
         "jump_over_slope": jump / change / slope,
-        "zeta": jump / before / change,
-        "xi": (after / before - 1) / change,
+        **of_before,
         "relaxing_over_slope": (before + jump - after) / slope,
     }
 

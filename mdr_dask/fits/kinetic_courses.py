@@ -13,7 +13,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
 from mdr_dask.fits.jumps import LAW, jump_law
-from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, law_rate
+from mdr_dask.fits.kinetic_cases import LEAST, LEVELS, Cases, jump_numbers, law_rate
 
 Series = Mapping[str, xr.Dataset]
 _MODELS = ("velocity_jump",)
@@ -53,7 +53,7 @@ def relaxation_law(
 
 
 def _courses(cases: Cases) -> list[Course | None]:
-    """Return the departures of the closed law from the course of every case; None where too few lines succeeded."""
+    """Return how far the closed law is from the course of every case; None of too few lines, or without a jump."""
     time = np.concatenate([[0.0], cases.data["relaxation_times"].values])
     rate, slope, change = law_rate(cases.passing, cases.column("hurst")), cases.slope, cases.column("velocity_change")
     outputs = [*LEVELS, "friction_coefficient"]
@@ -61,10 +61,10 @@ def _courses(cases: Cases) -> list[Course | None]:
     errors = np.concatenate([cases.error(name).reshape(len(values), -1) for name in outputs], axis=1)
     found: list[Course | None] = []
     for k, (case, error) in enumerate(zip(values, errors, strict=True)):
-        if np.all(np.isfinite(case), axis=1).sum() < LEAST:
+        means = bootstrap.means(bootstrap.complete(case))
+        if np.all(np.isfinite(case), axis=1).sum() < LEAST or means[0, 1] == 0:
             found.append(None)
             continue
-        means = bootstrap.means(bootstrap.complete(case))
         stack = np.concatenate([means, bootstrap.moved(means[0], error)])
         before, jump, after = stack[:, :3].T
         course = np.column_stack([before + jump, stack[:, 3:]])
@@ -84,7 +84,7 @@ def _relaxation_course(series: Series) -> xr.Dataset:
     verdicts = []
     for k, course in enumerate(courses):
         if course is None:
-            verdicts.append("not tested: fewer than two lines succeeded")
+            verdicts.append("not tested: fewer than two lines succeeded, or their friction does not jump")
             continue
         whole, of_rate = course
         numbers = np.sqrt(np.mean(whole**2, axis=1)), whole[:, 0], whole[:, -1], np.sqrt(np.mean(of_rate**2, axis=1))
@@ -114,10 +114,10 @@ def _jump_linearity(series: Series) -> xr.Dataset:
     """Fit zeta and xi as straight lines over dv / v_1; the law is that they are constant."""
     cases = Cases.of(series, *LEVELS, "rms_slope")
     rows = [dim for dim in cases.template.dims if dim not in cases.data["velocity_change"].dims]
-    before, jump, after = cases.levels()
     change, place = cases.column("velocity_change"), cases.places(rows)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        numbers = np.stack([jump / before / change, (after / before - 1) / change], axis=1)
+    found_numbers = jump_numbers(cases)
+    numbers = np.stack([found_numbers["zeta"], found_numbers["xi"]], axis=1)
+    numbers[~np.isfinite(numbers)] = np.nan
     found: dict[str, list[float]] = {}
     verdicts = []
     for i in range(int(place.max()) + 1):
@@ -149,12 +149,9 @@ def _lines(numbers: FloatArray, change: FloatArray, count: int) -> tuple[dict[st
     scale = numbers[0, 0].mean()
     design = np.vstack([np.ones(change.size), change])
     line = numbers @ np.linalg.pinv(design)
-    constants = {
-        "zeta": line[:, 0, 0],
-        "zeta_trend": line[:, 0, 1] / line[:, 0, 0],
-        "xi": line[:, 1, 0],
-        "xi_trend": line[:, 1, 1] / line[:, 0, 0],
-    }
+    with np.errstate(divide="ignore", invalid="ignore"):  # an error as large as zeta leaves none to compare with
+        of_zeta = line[:, :, 1] / line[:, :1, 0]
+    constants = {"zeta": line[:, 0, 0], "zeta_trend": of_zeta[:, 0], "xi": line[:, 1, 0], "xi_trend": of_zeta[:, 1]}
     flat = fitted(
         lambda rows: rows.mean(axis=2),
         lambda rows, level: rows - level[..., None],

@@ -115,8 +115,9 @@ def _relaxations(cases: Cases, shaped: bool = False) -> Relaxations:
 
 
 def _lengths(cases: Cases, rate: FloatArray) -> dict[str, FloatArray]:
-    """Return samples of the characteristic time and length of rates b."""
-    duration = cases.column("relaxation_time") / rate
+    """Return samples of the characteristic time and length of rates b; infinite where nothing relaxes."""
+    with np.errstate(divide="ignore"):
+        duration = cases.column("relaxation_time") / rate
     length = cases.column("velocity") * (1 + cases.column("velocity_change")) * duration
     return {
         "relaxation_duration": duration,

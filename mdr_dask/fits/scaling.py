@@ -59,7 +59,7 @@ def _contact_growth(data: xr.Dataset) -> Variables:
     found = fitted(
         lambda logs: logs @ np.linalg.pinv(design),
         lambda logs, constants: logs - constants @ design,
-        np.log(table.stack(used)),
+        table.logarithms(used),
         count,
     )
     worst = f"F_N / (G h L) = {force[used][np.argmax(np.abs(found.departures))]:.2g}"
@@ -125,7 +125,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
     if used.size < 3:
         raise FitError(f"expected three cases whose contact is longer than the shortest wave, got {used.size}")
     count = min(slopes.count(used), fractions.count(used))
-    pairs = np.log(_pairs(slopes, fractions, used, lambda share: contact_slope_law(share, hurst, points)))
+    pairs = _pairs(slopes, fractions, used, lambda log: np.log(contact_slope_law(np.exp(log), hurst, points)))
     found = fitted(
         lambda rows: (rows[:, 0] - rows[:, 1]).mean(axis=1, keepdims=True),
         lambda rows, level: np.stack([rows[:, 0] - rows[:, 1] - level, 0 * rows[:, 1]], axis=1),
@@ -147,9 +147,9 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 def _pairs(
     slopes: Table, fractions: Table, used: NDArray[np.int64], law: Callable[[FloatArray], FloatArray]
 ) -> FloatArray:
-    """Return the stack of slopes and of what the law says of the contact, shape (rows, 2, cases)."""
+    """Return the stack of logarithms of slopes and of what the law says of the contact, shape (rows, 2, cases)."""
     plain = 1 + bootstrap.RESAMPLES
-    one, other = slopes.stack(used), fractions.stack(used)
+    one, other = slopes.logarithms(used), fractions.logarithms(used)
     rows = [np.stack([one[:plain], law(other[:plain])], axis=1)]
     rows.append(np.stack([one[plain:], np.broadcast_to(law(other[0]), one[plain:].shape)], axis=1))
     rows.append(np.stack([np.broadcast_to(one[0], other[plain:].shape), law(other[plain:])], axis=1))
@@ -174,10 +174,18 @@ class Collapse(NamedTuple):
         Stack of the shifts along ln velocity and ln friction, the reference's 0.
     residuals : array, shape (rows, points)
         Stack of the distances of the points from the common curve.
+    constants : int
+        How many heights of the common curve and shifts were fitted.
     """
 
     shifts: FloatArray
     residuals: FloatArray
+    constants: int
+
+    @property
+    def tested(self) -> bool:
+        """Whether there are more points than constants."""
+        return bool(self.residuals.shape[1] > self.constants)
 
 
 def collapse(x: FloatArray, rows: FloatArray, curve: FloatArray, start: FloatArray, reference: int) -> Collapse:
@@ -196,40 +204,52 @@ def collapse(x: FloatArray, rows: FloatArray, curve: FloatArray, start: FloatArr
     reference : int
         The curve that stays.
     """
-    free = np.delete(np.arange(start.size), reference)
-    member = (curve[:, None] == free).astype(float)
-    shift = np.zeros((2, free.size))
-    shift[0] = (start - start[reference])[free]
-    ends = (x + (start - start[reference])[curve]).min() - 0.5, (x + (start - start[reference])[curve]).max() + 0.5
-    knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
-    bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
-    basis, _ = _basis(x + member @ shift[0], knots)
-    height = np.linalg.lstsq(np.vstack([basis, bends]), _padded(rows[0], bends))[0]
-    best = np.inf
-    for _ in range(40):
-        place = x + member @ shift[0]
-        basis, slopes = _basis(place, knots)
-        left = rows[0] - basis @ height + member @ shift[1]
-        jacobian = np.hstack([basis, (slopes @ height)[:, None] * member, -member])
-        ridge = np.hstack([bends, np.zeros((len(bends), 2 * free.size))])
-        target = np.concatenate([left, -bends @ height])
-        inverse = np.linalg.pinv(np.vstack([jacobian, ridge]), rcond=1e-8)
-        step = inverse @ target
-        step *= min(1.0, 0.7 / max(np.abs(step[knots.size : knots.size + free.size]).max(initial=0.0), 1e-12))
-        height = height + step[: knots.size]
-        shift = shift + step[knots.size :].reshape(2, -1)
-        if abs(best - left @ left) < 1e-10 * best:
-            break
-        best = float(left @ left)
+    tries = (_collapsed_from(x, rows[0], curve, shift, reference) for shift in (start - start[reference], 0 * start))
+    jacobian, residuals, shift, _ = min(tries, key=lambda found: found.cost)
+    inverse = np.linalg.pinv(jacobian, rcond=1e-8)
     change = rows - rows[0]
     steps = change @ inverse[:, : x.size].T
+    free = np.delete(np.arange(start.size), reference)
     shifts = np.zeros((len(rows), 2, start.size))
-    shifts[:, :, free] = shift + steps[:, knots.size :].reshape(len(rows), 2, -1)
-    return Collapse(shifts, left + change - steps @ jacobian.T)
+    shifts[:, :, free] = shift + steps[:, -shift.size :].reshape(len(rows), *shift.shape)
+    return Collapse(shifts, residuals[: x.size] + change - steps @ jacobian[: x.size].T, jacobian.shape[1])
 
 
-def _padded(row: FloatArray, bends: FloatArray) -> FloatArray:
-    return np.concatenate([row, np.zeros(len(bends))])
+class _Minimum(NamedTuple):
+    """A least-squares solution: how the common curve moves with what is unknown, its residuals, the shifts, the sum."""
+
+    jacobian: FloatArray
+    residuals: FloatArray
+    shift: FloatArray
+    cost: float
+
+
+def _collapsed_from(x: FloatArray, row: FloatArray, curve: FloatArray, start: FloatArray, reference: int) -> _Minimum:
+    """Fit a common curve, of natural splines that are held against bending where no point is, and the shifts to it."""
+    from scipy.optimize import least_squares
+
+    free = np.delete(np.arange(start.size), reference)
+    member = (curve[:, None] == free).astype(float)
+    ends = (x + start[curve]).min() - 0.5, (x + start[curve]).max() + 0.5
+    knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
+    bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
+    stiff = np.hstack([bends, np.zeros((len(bends), 2 * free.size))])
+
+    def residuals(unknown: FloatArray) -> FloatArray:
+        height, along, up = np.split(unknown, [knots.size, knots.size + free.size])
+        common = _basis(x + member @ along, knots)[0] @ height
+        return np.concatenate([row + member @ up - common, -bends @ height])
+
+    def jacobian(unknown: FloatArray) -> FloatArray:
+        height, along, _ = np.split(unknown, [knots.size, knots.size + free.size])
+        basis, slopes = _basis(x + member @ along, knots)
+        return np.vstack([np.hstack([-basis, -(slopes @ height)[:, None] * member, member]), -stiff])
+
+    basis, _ = _basis(x + start[curve], knots)
+    height = np.linalg.lstsq(np.vstack([basis, bends]), np.concatenate([row, np.zeros(len(bends))]))[0]
+    found = least_squares(residuals, np.concatenate([height, start[free], 0 * start[free]]), jacobian, method="lm")
+    shift = found.x[knots.size :].reshape(2, -1)
+    return _Minimum(-jacobian(found.x), found.fun, shift, float(found.cost))
 
 
 def _basis(place: FloatArray, knots: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -261,7 +281,7 @@ def _collapse(data: xr.Dataset) -> Variables:
     if len(loads) < 2:
         raise FitError(f"expected two loads with three velocities or more up to the largest friction, got {len(loads)}")
     x, which, count = np.log(velocity[used]), np.array(curve), table.count(used)
-    stack = np.log(table.stack(used))
+    stack = table.logarithms(used)
     reference = len(loads) // 2
     start = -np.log(laws.crossover(np.array(loads), laws.alpha(one_value(data, "hurst")), laws.BETA))
     found = collapse(x, stack, which, start, reference)
@@ -269,9 +289,8 @@ def _collapse(data: xr.Dataset) -> Variables:
         missed = np.concatenate([stack[:1], bootstrap.moved(stack[0], found.residuals[0])])
         further = collapse(x, missed, which, start, reference).shifts[1:]
         found = found._replace(shifts=np.concatenate([found.shifts, further]))
-    return _collapsed(found, _spread(x, stack[0]), np.array(loads), start - start[reference], count) | _where(
-        found, x, stack[0], which, count
-    )
+    result = _collapsed(found, _spread(x, stack[0]), np.array(loads), start - start[reference], count)
+    return _for_all(np.unique(force), np.array(loads), result | _where(found, x, stack[0], which, count))
 
 
 def _spread(x: FloatArray, row: FloatArray) -> float:
@@ -299,19 +318,32 @@ def _collapsed(found: Collapse, spread: float, loads: FloatArray, stated: FloatA
             name: xr.Variable("curve", value, {"units": "1", "long_name": text})
             for name, (value, text) in names.items()
         },
-        **holds(law_holds(found.residuals[0], chance)),
+        **holds(law_holds(found.residuals[0], chance, found.constants)),
     }
 
 
+def _for_all(forces: FloatArray, loads: FloatArray, result: Variables) -> Variables:
+    """Return variables of curves as those of all loads of a study, NaN where friction falls too soon for a curve."""
+    wide: Variables = {}
+    for name, variable in result.items():
+        wide[name] = variable
+        if variable.dims == ("curve",):
+            values = np.full(forces.size, np.nan)
+            values[np.searchsorted(forces, loads)] = variable.values
+            wide[name] = xr.Variable("curve", forces if name == "force_number" else values, variable.attrs)
+    return wide
+
+
 def _where(found: Collapse, x: FloatArray, row: FloatArray, curve: FloatArray, count: int) -> Variables:
-    """Return the shifts in decades with their intervals; NaN ends where a curve is too straight to tell them apart."""
-    straight = np.array([_bend(x[curve == k], row[curve == k]) < BEND for k in range(found.shifts.shape[2])])
+    """Return the shifts in decades with their intervals; NaN ends where the points cannot tell them apart."""
+    straight = [_bend(x[curve == k], row[curve == k]) < BEND for k in range(found.shifts.shape[2])]
+    vague = np.array(straight) | (not found.tested)
     result = {}
     for k, name in enumerate(("horizontal", "vertical")):
         low, high = bootstrap.interval(found.shifts[:, k] / np.log(10), count)
         ends = {"": found.shifts[0, k] / np.log(10), "_low": low, "_high": high}
         for end, value in ends.items():
-            known = value if not end else np.where(straight, np.nan, value)
+            known = value if not end else np.where(vague, np.nan, value)
             meaning = f"shift along the {'velocity' if k == 0 else 'friction'} in decades"
             result[name + end] = xr.Variable("curve", known, {"units": "1", "long_name": meaning})
     return result

@@ -88,9 +88,10 @@ def _parabola(x: FloatArray, rows: FloatArray) -> tuple[FloatArray, FloatArray, 
     level, tilt, bend = constants.T
     with np.errstate(divide="ignore", invalid="ignore"):
         inside = np.where(bend < 0, -tilt / (2 * bend), np.copysign(np.inf, tilt))
-    at = np.clip(inside, u.min(), u.max())
-    top = level + tilt * at + bend * at**2
-    return top, centre + half * at, (tilt + 2 * bend * at) / (half * top), rows - constants @ design
+        at = np.clip(inside, u.min(), u.max())
+        top = level + tilt * at + bend * at**2
+        slope = (tilt + 2 * bend * at) / (half * top)
+    return top, centre + half * at, slope, rows - constants @ design
 
 
 def place(x: FloatArray, stack: FloatArray) -> FloatArray:

@@ -218,10 +218,12 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
 
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
+    from mdr_dask.fits.base import require
     from mdr_dask.fits.kinetic_cases import law_rate
     from mdr_dask.fits.kinetic_courses import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
+    require(data, "hurst", "relaxation_time", "length", "points")
     over = curves.along_dim(data, "velocity", BEFORE_JUMP)
     held_dims = [dim for dim in curves.axes_of(data, BEFORE_JUMP) if dim != over]
     data, more = curves.hold(data, held_dims, relaxing(data))

@@ -7,15 +7,17 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from scipy.optimize import minimize
 
 import mdr_dask
 from mdr_dask.campaign.measured import Measured
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import available
-from mdr_dask.fits.calibration import calibrate, calibration, summary
+from mdr_dask.fits.calibration import LEAST, calibrate, calibration, summary
 from mdr_dask.fits.posterior import Likelihood, Noise
 from mdr_dask.fits.prediction import prediction
+from mdr_dask.plots.calibration import PARTS, _of_whole_cells
 
 AXES = {
     "normal_force": (np.geomspace(0.1, 10, 5), "N"),
@@ -107,6 +109,33 @@ def test_an_unknown_may_be_bounded_from_one_side_only():
     assert 1e-4 < float(found["relaxation_time_low"]) < 8e-3
     assert np.isinf(found["relaxation_time_high"])
     assert "bounded from below" in found["determined"].item()
+
+
+@pytest.mark.parametrize("lines", [1, 5])
+def test_an_axis_of_one_value_is_no_unknown_and_changes_nothing(lines):
+    """Neither a condition held by the study nor an unknown of one value; lines are lines, however few."""
+    rng = np.random.default_rng(4)
+    data, measured = study(lines, 0.1), table(rng, velocities=(0.1, 0.1))
+    with_axes = data.isel(rms_roughness=[3]).sel(velocity=[AXES["velocity"][0][5]])
+    measured.conditions["velocity"][:] = with_axes["velocity"].item()
+    found = [summary(calibrate(one, measured)) for one in (with_axes, with_axes.squeeze(["velocity", "rms_roughness"]))]
+    xr.testing.assert_identical(*(one.drop_vars(["velocity", "rms_roughness"], errors="ignore") for one in found))
+    assert found[0]["relaxation_time_low"] < found[0]["relaxation_time_high"]
+
+
+def test_errors_that_are_not_given_are_as_large_as_the_best_curve_leaves():
+    """Sizes of the errors begin at the least that any curve leaves, found apart by a search over all of them."""
+    measured = table(np.random.default_rng(6), noise=0.2, given=False)
+    found = calibrate(study(), measured)
+    force, velocity = measured.conditions.values()
+
+    def left(logarithms, shares):
+        mean = friction(force, velocity, *np.exp(logarithms))
+        return np.sqrt(np.mean(((measured.values - mean) / (mean if shares else 1)) ** 2))
+
+    for noise, shares in zip(found.noises, (False, True), strict=True):
+        best = minimize(left, np.log([*TRUE.values()]), (shares,), method="Nelder-Mead").fun
+        assert noise.sizes[0] == pytest.approx(LEAST * best, rel=0.01)
 
 
 def test_data_that_the_model_cannot_have_are_told_and_widen_the_interval():
@@ -234,3 +263,18 @@ def test_every_model_has_calibration_from_python_and_in_a_shell(toy, tmp_path, c
     assert row["slope_low"] < 2 < row["slope_high"]
     again = mdr_dask.fit(url, "calibration", measured=pd.read_csv(tmp_path / "rig.csv"))
     assert float(again["slope"]) == row["slope"]
+
+
+def test_parts_of_a_marginal_hold_as_many_cells_each():
+    """Cells that are all as likely look level, wherever the range drawn begins and ends."""
+    place = np.linspace(0.0, 1.0, 241)
+    across = np.log(2e-4) + 3 * place
+    for ends in ([across[0], across[-1]], [across[31], across[150]], [across[100], across[101]]):
+        edges = _of_whole_cells(np.array(ends), across, place, place[1])
+        inside = (across > ends[0]) & (across < ends[1])
+        assert edges[0] < across[inside].min(initial=ends[1])
+        assert edges[-1] > across[inside].max(initial=ends[0])
+        counts = np.histogram(across, edges)[0]
+        whole = (edges[:-1] > across[0] - place[1]) & (edges[1:] < across[-1] + 2 * place[1])
+        assert np.ptp(counts[whole]) == 0
+        assert len(counts) <= PARTS + 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 
 import numpy as np
@@ -135,6 +136,35 @@ def test_every_fit_finds_constants_or_says_why_not(study, tmp_path):
     assert found == holds
     assert all(sentence.__cause__ is None for sentence in refused), "a fault of a fit, not a sentence about the store"
     assert all(re.fullmatch(r"[^\n]{20,400}", str(sentence)) for sentence in refused)
+
+
+ODD = {
+    "errors larger than values": lambda value, error: (value, 1.5 * abs(value)),
+    "errors unknown": lambda value, error: (value, np.inf * error),
+    "no errors": lambda value, error: (value, np.nan * error),
+    "nothing": lambda value, error: (0 * value, error),
+    "nothing in the first case": lambda value, error: (
+        value.where(np.arange(value.size).reshape(value.shape) >= value.sizes["realisation"], 0.0),
+        error,
+    ),
+}
+
+
+@pytest.mark.parametrize("odd", ODD)
+@pytest.mark.parametrize("study", ["jumps", "jumps of three sizes on a scan", "lengths and points"])
+def test_fits_take_odd_numbers_without_a_warning(study, odd, tmp_path):
+    """No numpy warning, no traceback: constants with wide intervals or none, or one sentence."""
+    text, special, _ = STUDIES[study]
+    make_tables(tmp_path)
+    groups = {
+        name: data.load() for name, data in planted.make(tmp_path, text, **{"realisations": 3, **special}).items()
+    }
+    for data in groups.values():
+        for name in [str(name) for name in data if f"{name}_error" in data]:
+            data[name].values, data[f"{name}_error"].values = ODD[odd](data[name], data[f"{name}_error"])
+    for law in fits.available(re.findall(r"model: (\w+)", text)[0]).values():
+        with contextlib.suppress(DataError, FitError):
+            assert all("law_holds" in result for result in law.results(groups).values())
 
 
 def test_the_plateau_of_a_measured_surface_is_the_one_of_its_numbers(tmp_path):

@@ -151,3 +151,33 @@ def test_what_cannot_be_fitted_says_why():
     curves = planted(CURVES, 5, 1, friction_coefficient=scaled)
     with pytest.raises(FitError, match="expected two loads"):
         FIT["collapse"].compute({"": curves.isel(normal_force=[0])})
+
+
+def test_few_points_of_a_curve_are_no_test():
+    """More constants than points always fit; and where one part of a study has a curve less, it says so by NaN."""
+    axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(1e-2, 10, 4), "velocity": np.geomspace(1e-6, 1, 5)}
+    data = planted(axes, 3, 1, hurst=[0.3, 0.7], friction_coefficient=scaled).isel(study=0)
+    falling = (data.hurst == 0.7) & (data.normal_force > 5) & (data.velocity > 1e-5)
+    data["friction_coefficient"] = data.friction_coefficient.where(~falling, 1e-9)
+    found = FIT["collapse"].compute({"": data})
+    assert found["horizontal"].isnull().sum("curve").values.tolist() == [0, 1]
+    assert found["force_number"].notnull().all()
+    assert found["law_holds"].str.startswith("not tested: ").all()
+    assert found["horizontal_low"].isnull().all()
+
+
+def test_a_collapse_is_no_worse_than_none():
+    """Steep curves of few points: Newton's steps alone leave three times the distances that there were before."""
+    axes = {"normal_force": np.geomspace(1e-3, 1e2, 5), "velocity": np.geomspace(1e-8, 1e2, 12)}
+    data = planted(axes, 3, 10, friction_coefficient=lambda force, v: (v / force) ** 2 / (1e-9 + (v / force) ** 3))
+    assert (FIT["collapse"].compute({"": data})["collapsed"] >= 0).all()
+
+
+def test_a_mean_may_err_by_its_own_size():
+    """Its logarithm errs by one then, up and down; an error that is unknown counts as the whole."""
+    data = planted(LOADS, 5, 1, contact_fraction=lambda force, _: 0.3 * force**0.6).isel(study=0)
+    data["contact_fraction"].attrs["ancillary_variables"] = "contact_fraction_error"
+    for error in (3 * data.contact_fraction, xr.full_like(data.contact_fraction, np.inf)):
+        found = FIT["contact_growth"].compute({"": data.assign(contact_fraction_error=error)})
+        assert found["exponent_high"] - found["exponent_low"] > 0.1
+        assert np.isfinite(found["factor_low"])

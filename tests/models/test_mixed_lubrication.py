@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import re
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from pydantic import ValidationError
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
+from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.physics.lubrication import oil
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
+from mdr_dask.units import to_si
 
 MODEL = load("mixed_lubrication")
 RPM = 2 * np.pi / 60
@@ -320,6 +323,53 @@ def test_a_given_film_is_kept_and_too_thin_a_one_is_warned_of():
 def test_a_film_thicker_than_a_tenth_of_the_radius_is_warned_of():
     result = MODEL.compute(block(["film"], film_thickness=1e-4))
     assert "the film is 0.2 of the radius, more than 0.1" in result.messages[0, 0]
+
+
+TEMPERATURES = np.array([20.0, 40.0, 60.0, 80.0, 100.0])
+
+
+def own_oil(tmp_path, text, **changes):
+    (tmp_path / "oil.csv").write_text(text)
+    data = SMALL | {"oil": {"viscosities": "oil.csv", "density": 870.0, "density_temperature": 300.0} | changes}
+    return MODEL.parameters.model_validate(data, context={"directory": str(tmp_path), "to_si": to_si})
+
+
+@pytest.mark.parametrize("kind", ["kinematic", "dynamic"])
+def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
+    """Both kinds; then with a row that is off, which `check` names."""
+    given = OilData(
+        temperature_1=313.15, viscosity_1=220e-6, temperature_2=373.15, viscosity_2=19e-6, density=870.0,
+        density_temperature=300.0,
+    ).oil  # fmt: skip
+    values = getattr(given, kind)(TEMPERATURES + 273.15) * {"kinematic": 1e6, "dynamic": 1e3}[kind]
+    unit = {"kinematic": "cSt", "dynamic": "mPa s"}[kind]
+
+    def rows():
+        return "".join(f"{T};{value}\n" for T, value in zip(TEMPERATURES[::-1], values[::-1], strict=True))
+
+    read = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}").oil.oil
+    for T in (293.15, 333.0, 373.15):
+        assert read.kinematic(T) == pytest.approx(given.kinematic(T), rel=1e-9)
+    assert (read.lowest, read.highest) == (293.15, 373.15)
+    values[2] *= 1.05
+    told = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
+    assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", told[0])
+    assert told[1:] == ("oil: its viscosity is extrapolated above 100 degC, to 126.9 degC",)
+
+
+@pytest.mark.parametrize(
+    ("text", "changes", "told"),
+    [
+        ("T [degC];nu [cSt]\n40;220\n100;290\n", {}, "oil.csv: expected viscosities that fall with temperature"),
+        ("T [degC];nu [cSt]\n40;220\n40;219\n", {}, "oil.csv: expected viscosities at two temperatures or more"),
+        ("T [degC];nu [cSt]\n40;22\n100;1.5\n", {}, "oil.csv: expected kinematic viscosities of at least 2 mm"),
+        ("T [degC];viscosity\n40;22\n100;5\n", {}, "column kinematic viscosity: expected its unit"),
+        ("T [degC];nu [cSt]\n40;22\n100;5\n", {"viscosity_1": 1e-4}, "expected .*viscosities, got"),
+    ],
+)
+def test_a_table_of_no_oil_is_one_sentence(text, changes, told, tmp_path):
+    with pytest.raises(ValidationError, match=told):
+        own_oil(tmp_path, text, **changes)
 
 
 def test_an_oil_that_thickens_with_temperature_is_refused():

@@ -112,6 +112,13 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {"failed": True},
         JUMPS,
     ),
+    "jumps: Prony series": (
+        "model: velocity_jump\nparameters:\n  length: 20 mm\n  points: 500\n  rms_roughness: 0.5 um\n"
+        + "  material: {prony: {static_modulus: 1 MPa, moduli: [1 MPa], times: [1 ms]}}\n  normal_force: 1 N\n"
+        + FEW_V,
+        {},
+        {"jump_trace", "jump_velocities", "jump_height", "jump_law"},
+    ),
     "jumps: latin hypercube": (
         planted.JUMP
         + "  velocity: {geometric: [0.01 mm/s, 1 m/s]}\n  hurst: {linear: [0.2, 0.8]}\n  normal_force: 1 N\n"

@@ -8,6 +8,7 @@ from drawn import check_picture, mismatches, rows, stored
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
+from mdr_dask import units
 from mdr_dask.errors import DataError
 from mdr_dask.plots import curves, page, style
 from mdr_dask.plots.outputs import View, of_output
@@ -285,3 +286,12 @@ def test_a_long_title_is_small_print_that_leaves_room_for_the_curves():
     style.title(figure, "friction against velocity", ", ".join(f"parameter {k} = {k} mm" for k in range(12)), "bars")
     figure.draw_without_rendering()
     assert axes.get_window_extent().height > 0.5 * figure.bbox.height
+
+
+@pytest.mark.parametrize("name", style.QUANTITIES)
+def test_numbers_are_shown_in_the_unit_that_stands_behind_them(name):
+    """Back in SI they are what they were: factors of figures against the units of campaigns."""
+    quantity = style.QUANTITIES[name]
+    unit = quantity.unit or "1"
+    factor, zero = units.conversion(unit, units.dimension_of(unit)[1])
+    assert quantity.of(293.7) * factor + zero == pytest.approx(293.7, rel=1e-12)

@@ -21,36 +21,16 @@ from mdr_dask.models.base import (
     quantity,
 )
 from mdr_dask.models.mixed_lubrication.lines import Generated, Measured, OfSurfaces, Source
+from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.parts.surface import NO_AREA, Surface, without_exponent
 from mdr_dask.physics.lubrication.film_formulas import HertzLine, hertz_line
-from mdr_dask.physics.lubrication.oil import OILS, Oil, walther_constants
+from mdr_dask.physics.lubrication.oil import OILS, Oil
 
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Places of the profiles in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
-
-
-class OilData(Parameters):
-    """An oil by the numbers of its data sheet."""
-
-    temperature_1: float = quantity("K", "first temperature of the two viscosities", usual="40 degC", gt=0)
-    viscosity_1: float = quantity("m^2/s", "kinematic viscosity at temperature_1", usual="320 mm^2/s", gt=0)
-    temperature_2: float = quantity("K", "second temperature of the two viscosities", usual="100 degC", gt=0)
-    viscosity_2: float = quantity("m^2/s", "kinematic viscosity at temperature_2", usual="40 mm^2/s", gt=0)
-    density: float = quantity("kg/m^3", "density at density_temperature", usual="870 kg/m^3", gt=0)
-    density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
-    correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
-        default="gold_mineral", description="pressure-viscosity correlation"
-    )
-    lowest_temperature: float | None = quantity("K", "where the data begin; the lower of the two", default=None, gt=0)
-    highest_temperature: float | None = quantity("K", "where the data end; the higher of the two", default=None, gt=0)
-
-    @model_validator(mode="after")
-    def _falls(self) -> Self:
-        walther_constants(self.temperature_1, self.viscosity_1, self.temperature_2, self.viscosity_2)
-        return self
 
 
 class MixedLubrication(Parameters):
@@ -103,7 +83,7 @@ class MixedLubrication(Parameters):
         "Pa", "limiting shear stress tau0 of the boundary layer", usual="1 MPa", default=1e6, ge=0
     )
     oil: Literal["mobilgear_shc_xmp_320"] | OilData = Field(
-        default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet"
+        default="mobilgear_shc_xmp_320", description="a named oil, or the numbers of a data sheet or a table"
     )
     pressure_viscosity: (
         Positive | Literal["oil", "gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"]
@@ -207,22 +187,7 @@ class MixedLubrication(Parameters):
 
     def oil_data(self) -> Oil:
         """Return the oil, whether named or given."""
-        data = self.oil
-        if isinstance(data, str):
-            return OILS[data]
-        low, high = sorted((data.temperature_1, data.temperature_2))
-        return Oil(
-            data.temperature_1,
-            data.viscosity_1,
-            data.temperature_2,
-            data.viscosity_2,
-            data.density,
-            data.density_temperature,
-            data.correlation,
-            data.lowest_temperature or low,
-            data.highest_temperature or high,
-            "campaign file",
-        )
+        return OILS[self.oil] if isinstance(self.oil, str) else self.oil.oil
 
     def dry_contact(self, force: float) -> HertzLine:
         """Return the Hertzian contact of the smooth rollers under a normal force in N."""
@@ -296,7 +261,7 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=4,
+    version=5,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,

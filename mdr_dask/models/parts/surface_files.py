@@ -99,6 +99,7 @@ class MapFiles(Files):
         return tuple(mapped(self, file) for file in self.files)
 
 
+@lru_cache(maxsize=64)
 def _tabulated(file: DataFile) -> Spectrum:
     """Return the spectrum of a table."""
     import numpy as np

@@ -32,6 +32,44 @@ GOLD: dict[str, tuple[float, float]] = {
 CORRELATIONS: tuple[str, ...] = (*GOLD, "wooster")
 
 
+def walther_fit(temperature: FloatArray, viscosity: FloatArray) -> tuple[float, float]:
+    """Return A and B of ASTM D341 from measured viscosities, by least squares of ``log10 log10(nu + 0.7)``.
+
+    Parameters
+    ----------
+    temperature : array, shape (n,)
+        In K; at least two differ.
+    viscosity : array, shape (n,)
+        Kinematic viscosities there in m^2/s.
+
+    Raises
+    ------
+    ValueError
+        If there are not two temperatures, a viscosity is below 2 mm^2/s, or they do not fall with temperature.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> A, B = walther_fit(np.array([313.15, 333.15, 373.15]), np.array([335e-6, 136e-6, 38.3e-6]))
+    >>> print(f"{A:.2f} {B:.2f}")
+    6.97 2.63
+    """
+    if np.unique(temperature).size < 2:
+        raise ValueError("expected viscosities at two temperatures or more")
+    if viscosity.min() < 2 * _MM2:
+        raise ValueError(
+            f"expected kinematic viscosities of at least 2 mm^2/s (ASTM D341), got {viscosity.min()!r} m^2/s"
+        )
+    slope, intercept = (
+        np.polynomial.Polynomial.fit(np.log10(temperature), np.log10(np.log10(viscosity / _MM2 + 0.7)), 1)
+        .convert()
+        .coef[::-1]
+    )
+    if slope >= 0:
+        raise ValueError("expected viscosities that fall with temperature")
+    return float(intercept), float(-slope)
+
+
 def walther_constants(T1: float, nu1: float, T2: float, nu2: float) -> tuple[float, float]:
     """Return A and B of ASTM D341 from two kinematic viscosities.
 

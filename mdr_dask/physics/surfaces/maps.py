@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, ndimage, sparse
+from scipy import fft, sparse
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
@@ -19,6 +19,7 @@ Order = Literal["none", "mean", "plane", "parabola"]
 LEAST_POINTS = 16  # along each axis
 MOST_MISSING = 0.05  # share of the points that may be filled
 FAR = 12.0  # robust standard deviations, of the distance from the four neighbours, that no roughness reaches
+BAND = 128  # rows that stay in the cache
 TELLING = 1e-3  # of the largest ring
 MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
 FLAT = 1e-12  # of the largest height
@@ -49,7 +50,26 @@ class SurfaceMap(NamedTuple):
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     """Return which points stick out of their four neighbours, by `FAR` times what is usual."""
     height = surface.height
-    inner = height[1:-1, 1:-1]
+    away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
+    for first in range(0, away.shape[0], BAND):
+        away[first : first + BAND] = _off_neighbours(height[first : first + BAND + 2])
+    limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
+    found = np.zeros(height.shape, bool)
+    if not limit > 0:
+        return found
+    row, column = np.nonzero(away > limit)
+    largest = np.zeros(row.size)
+    for down, right in np.ndindex(3, 3):
+        beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
+        largest = np.fmax(largest, away[beside])
+    # a point beside an outlier is one itself only if it sticks out nearly as far
+    telling = away[row, column] > 0.5 * largest
+    found[row[telling] + 1, column[telling] + 1] = True
+    return found
+
+
+def _off_neighbours(height: FloatArray) -> FloatArray:
+    """Return how far inner points are from the mean of their neighbours without the highest and the lowest."""
     neighbours = height[2:, 1:-1], height[:-2, 1:-1], height[1:-1, 2:], height[1:-1, :-2]
     middle, most, least = (neighbours[0].copy() for _ in range(3))
     for neighbour in neighbours[1:]:
@@ -58,12 +78,7 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
         np.minimum(least, neighbour, out=least)
     middle -= most
     middle -= least
-    away = np.abs(inner - 0.5 * middle)
-    limit = FAR * 1.4826 * float(np.nanmedian(away[:: 1 + away.shape[0] // 1000, :: 1 + away.shape[1] // 1000]))
-    found = np.zeros(height.shape, bool)
-    # a point beside an outlier is one itself only if it sticks out nearly as far
-    found[1:-1, 1:-1] = (away > limit) & (limit > 0) & (away > 0.5 * ndimage.maximum_filter(away, 3))
-    return found
+    return np.asarray(np.abs(height[1:-1, 1:-1] - 0.5 * middle), dtype=np.float64)
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:

@@ -7,6 +7,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.transients.elements import follow
 from mdr_dask.physics.transients.elements.follow import (
     Response,
     follow_line,
@@ -235,3 +236,17 @@ def test_steps_resolve_what_changes(velocity, force, swing, time):
     longest = np.max(np.diff(piece.moments(5.0, 8.0, 1, STEPS_PER_DECADE)))
     assert longest <= max(SETTINGS.part * time, 0) + 1e-12
     assert np.isinf(time) or longest > 0.2 * SETTINGS.part * time
+
+
+def test_a_steady_start_that_does_not_bear_the_load_is_told(monkeypatch):
+    """The search ends beside the depth by as little as nobody would see: 1e-4 of the load is missed."""
+    line = periodic_line(*rough(2))
+    found = [steady_start(line, KELVIN, deborah, 0.2) for deborah in (0.0, 0.02)]
+    assert [status for _, _, status in found] == [Outcome.CONVERGED, Outcome.CONVERGED]
+    brentq = follow.brentq
+    monkeypatch.setattr(follow, "brentq", lambda *given, **options: brentq(*given, **options) + 2e-5)
+    for deborah in (0.0, 0.02):
+        state, _, status = steady_start(line, KELVIN, deborah, 0.2)
+        assert status == Outcome.DEPTH_NOT_FOUND
+        if deborah == 0:
+            assert 1e-6 < state.displacement.mean() / 0.2 - 1 < 1e-3

@@ -1,0 +1,146 @@
+"""An oil of one's own: two viscosities of a data sheet, or a table of measured ones."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import DataError
+from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.models.data_file import DataFile, NamedFile
+from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants, walther_fit
+from mdr_dask.tables import Column, read_sheet, read_table
+from mdr_dask.units import conversion, shown
+
+_TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
+
+
+class OilData(Parameters):
+    """An oil by the numbers of its data sheet, or by a table of viscosities."""
+
+    ways: ClassVar[tuple[Ways, ...]] = ((_TWO, ("viscosities",)),)
+    temperature_1: float | None = quantity(
+        "K", "first temperature of the two viscosities", usual="40 degC", gt=0, default=None
+    )
+    viscosity_1: float | None = quantity(
+        "m^2/s", "kinematic viscosity at temperature_1", usual="320 mm^2/s", gt=0, default=None
+    )
+    temperature_2: float | None = quantity(
+        "K", "second temperature of the two viscosities", usual="100 degC", gt=0, default=None
+    )
+    viscosity_2: float | None = quantity(
+        "m^2/s", "kinematic viscosity at temperature_2", usual="40 mm^2/s", gt=0, default=None
+    )
+    viscosities: NamedFile | None = Field(
+        default=None,
+        description="table with the columns temperature and kinematic viscosity, or dynamic viscosity, which the law "
+        "of the two is fitted to",
+    )
+    density: float = quantity("kg/m^3", "density at density_temperature", usual="870 kg/m^3", gt=0)
+    density_temperature: float = quantity("K", "temperature of the density", default=288.15, gt=0)
+    correlation: Literal["gold_mineral", "gold_polyalphaolefin", "gold_ester", "gold_polyglycol", "wooster"] = Field(
+        default="gold_mineral", description="pressure-viscosity correlation"
+    )
+    lowest_temperature: float | None = quantity(
+        "K", "where the data begin; else the lowest of them", default=None, gt=0
+    )
+    highest_temperature: float | None = quantity(
+        "K", "where the data end; else the highest of them", default=None, gt=0
+    )
+
+    @model_validator(mode="after")
+    def _is_an_oil(self, info: ValidationInfo) -> OilData:
+        self.require_one_way()
+        if self.viscosities is None or info.context is not None:  # a table is looked at where a campaign names it
+            try:
+                walther_constants(*self.two_viscosities)
+            except DataError as problem:
+                raise ValueError(str(problem)) from None
+        return self
+
+    @property
+    def two_viscosities(self) -> tuple[float, float, float, float]:
+        """Two temperatures in K, each with the kinematic viscosity there in m^2/s: given, or on the law fitted."""
+        if self.viscosities is not None:
+            found = _fitted(self.viscosities, self.density, self.density_temperature)
+            low, high = float(found.temperature[0]), float(found.temperature[-1])
+            return low, found.at(low), high, found.at(high)
+        given = (getattr(self, name) for name in _TWO)
+        first, viscosity_1, second, viscosity_2 = given
+        return first, viscosity_1, second, viscosity_2
+
+    @property
+    def oil(self) -> Oil:
+        """The oil."""
+        one, _, two, _ = data = self.two_viscosities
+        low, high = self.lowest_temperature or min(one, two), self.highest_temperature or max(one, two)
+        return Oil(*data, self.density, self.density_temperature, self.correlation, low, high, "campaign file")
+
+    def notes(self) -> tuple[str, ...]:
+        """Say how the law fits a table, and how far the oil is extrapolated."""
+        told = []
+        if self.viscosities is not None:
+            found = _fitted(self.viscosities, self.density, self.density_temperature)
+            temperature, off = found.temperature, 100 * found.departures
+            worst = int(np.argmax(abs(off)))
+            first, last = (found.at(float(temperature[end])) * 1e6 for end in (0, -1))
+            told.append(
+                f"table {self.viscosities.name}: ASTM D341 through {off.size} kinematic viscosities, {first:.4g} to "
+                f"{last:.4g} mm^2/s; {off[worst]:+.2g} % off at {shown(float(temperature[worst]), 'K')}, less elsewhere"
+            )
+        one, _, two, _ = self.two_viscosities
+        ends = ((self.lowest_temperature, min(one, two), "below"), (self.highest_temperature, max(one, two), "above"))
+        for wanted, end, side in ends:
+            if wanted is not None and (wanted < end if side == "below" else wanted > end):
+                told.append(f"oil: its viscosity is extrapolated {side} {shown(end, 'K')}, to {shown(wanted, 'K')}")
+        return tuple(told)
+
+
+class _Fit(NamedTuple):
+    """Temperatures of a table in K, ascending, the constants of the law, and how far the viscosities are from it."""
+
+    temperature: FloatArray
+    constants: tuple[float, float]
+    departures: FloatArray
+
+    def at(self, temperature: float) -> float:
+        """Return the kinematic viscosity of the law in m^2/s."""
+        return float(kinematic_viscosity(temperature, *self.constants))
+
+
+@lru_cache(maxsize=16)
+def _fitted(file: DataFile, density: float, density_temperature: float) -> _Fit:
+    """Return the law that a table of viscosities follows.
+
+    Raises
+    ------
+    DataError
+        If it has not the columns, or is of no oil.
+    """
+    text = file.read_text()
+    is_dynamic = any(_is_dynamic(unit) for unit in read_sheet(text, file.name).units)
+    viscous = Column("dynamic viscosity", "Pa s", ("eta", "η", "mu", "viscosity"), above=0)
+    if not is_dynamic:
+        viscous = Column("kinematic viscosity", "m^2/s", ("nu", "ν", "viscosity"), above=0)
+    table = read_table(text, file.name, (Column("temperature", "K", ("T", "temp"), above=0), viscous))
+    order = np.argsort(table["temperature"])
+    temperature, viscosity = table["temperature"][order], table[viscous.name][order]
+    if is_dynamic:
+        viscosity = viscosity / density_at(temperature, density, density_temperature)
+    try:
+        constants = walther_fit(temperature, viscosity)
+    except ValueError as problem:
+        raise DataError(f"{file.name}: {problem}") from None
+    return _Fit(temperature, constants, viscosity / kinematic_viscosity(temperature, *constants) - 1)
+
+
+def _is_dynamic(unit: str) -> bool:
+    try:
+        conversion(unit, "Pa s")
+    except ValueError:
+        return False
+    return True
