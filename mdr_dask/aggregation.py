@@ -14,6 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from mdr_dask import bootstrap
+from mdr_dask.errors import DataError, did_you_mean
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 #: Results that one step of the bootstrap holds in memory.
@@ -196,6 +197,9 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
         A variable ``<output>_<statistic>`` for every output and statistic, with units and meaning in attrs;
         ``<output>_grid_error`` where the output has a companion with errors.
     """
+    for name in statistics:
+        if name not in NAMES:
+            raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}; known: {', '.join(NAMES)}")
     wanted = [statistic for statistic in STATISTICS if statistic.name in statistics]
     reduced = {}
     errors = {name: companion(dataset, name) for name in map(str, dataset.data_vars)}

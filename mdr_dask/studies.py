@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 Source = Mapping[str, Any] | str | Path | Campaign
 #: What can be looked at: the result of `run` or `open_study`, or the path or URL of a store.
 Study = xr.Dataset | xr.DataTree | str | Path
+#: One name or condition, or several.
+Words = str | Sequence[str]
 
 
 def read(source: Source) -> Campaign:
@@ -165,13 +167,13 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
 
 def aggregate(
     study: Study,
-    statistics: Sequence[str] = aggregation.NAMES,
+    statistics: Words = aggregation.NAMES,
     *,
     series: str | None = None,
-    select: Sequence[str] = (),
+    select: Words = (),
     where: str = "",
-    group_by: Sequence[str] = (),
-    columns: Sequence[str] = (),
+    group_by: Words = (),
+    columns: Words = (),
     units: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
     """Reduce outputs over their realisations, as ``mdr-dask aggregate`` does.
@@ -190,21 +192,22 @@ def aggregate(
     Dataset
         A variable ``<output>_<statistic>`` for every output and statistic, and ``state_counts``.
     """
-    asked = Question((), tuple(select), where, tuple(group_by), (), tuple(columns), units or {}, tuple(statistics))
+    parts = (_several(select), where, _several(group_by), (), _several(columns), units or {})
+    asked = Question((), *parts, _several(statistics))
     return labelled(_group(study, series), asked)
 
 
 def table(
     study: Study,
-    outputs: Sequence[str] = (),
-    statistics: Sequence[str] | None = MEANS,
+    outputs: Words = (),
+    statistics: Words | None = MEANS,
     *,
     series: str | None = None,
-    select: Sequence[str] = (),
+    select: Words = (),
     where: str = "",
-    group_by: Sequence[str] = (),
-    sort: Sequence[str] = (),
-    columns: Sequence[str] = (),
+    group_by: Words = (),
+    sort: Words = (),
+    columns: Words = (),
     units: Mapping[str, str] | None = None,
     limit: int = 0,
 ) -> pd.DataFrame:
@@ -217,10 +220,9 @@ def table(
     """
     import pandas as pd
 
-    reduced = None if statistics is None else tuple(statistics)
-    asked = Question(
-        tuple(outputs), tuple(select), where, tuple(group_by), tuple(sort), tuple(columns), units or {}, reduced
-    )
+    reduced = None if statistics is None else _several(statistics)
+    parts = (_several(select), where, _several(group_by), _several(sort), _several(columns), units or {})
+    asked = Question(_several(outputs), *parts, reduced)
     answer = rows_of(_group(study, series), asked, limit)
     frames = list(answer.frames)
     found = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(answer.units))
@@ -272,8 +274,8 @@ def _of_table(path: str | Path, law: str) -> xr.Dataset:
     return constants
 
 
-def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
-    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
+    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.save`` writes it, and its data beside it.
 
     Parameters
     ----------
@@ -299,15 +301,17 @@ def plot(study: Study, figure: str, select: Sequence[str] = (), **view: Any) -> 
     """
     groups = _groups(study)
     model = _model(groups)
+    if not view and any(figure in data.data_vars for data in groups.values()):
+        raise DataError(f"{figure} is an output: name the axis to draw it over, as in over='velocity'")
     found = _of_output(figure, **view) if view else _named(plots.available(model), figure, f"figure of {model}")
-    drawn: Figure = found.figure(selection.select_all(groups, select))
+    drawn: Figure = found.figure(selection.select_all(groups, _several(select)))
     return drawn
 
 
 def _of_output(output: str, over: str | Sequence[str], **view: Any) -> Plot:
     from mdr_dask.plots.outputs import View, of_output
 
-    return of_output(View(output, (over,) if isinstance(over, str) else tuple(over), **view))
+    return of_output(View(output, _several(over), **view))
 
 
 def master_curve(
@@ -384,7 +388,7 @@ class StudyAccessor:
         """Fit a law: `mdr_dask.fit` of this study."""
         return fit(self._dataset, law, **asked)
 
-    def plot(self, figure: str, select: Sequence[str] = (), **view: Any) -> Figure:
+    def plot(self, figure: str, select: Words = (), **view: Any) -> Figure:
         """Draw a figure: `mdr_dask.plot` of this study."""
         return plot(self._dataset, figure, select, **view)
 
@@ -411,10 +415,21 @@ def _tree(groups: Mapping[str, xr.Dataset]) -> xr.DataTree:
 def _groups(study: Study) -> dict[str, xr.Dataset]:
     """Return the groups of a study by the names of their series."""
     if isinstance(study, xr.Dataset):
-        return {"": study}
-    if isinstance(study, xr.DataTree):
-        return {name: node.to_dataset() for name, node in study.children.items()} or {"": study.to_dataset()}
-    return store.datasets(str(study))
+        found = {"": study}
+    elif isinstance(study, xr.DataTree):
+        found = {name: node.to_dataset() for name, node in study.children.items()} or {"": study.to_dataset()}
+    else:
+        return store.datasets(str(study))
+    for data in found.values():
+        if "status" not in data or "realisation" not in data["status"].dims:
+            kept = "with its status and realisations (isel(realisation=[0]) keeps one)"
+            raise DataError(f"expected a study as run or open returns it, {kept}, got a Dataset without them")
+    return found
+
+
+def _several(words: Words) -> tuple[str, ...]:
+    """Return words that were given one alone or in a sequence."""
+    return (words,) if isinstance(words, str) else tuple(words)
 
 
 def _group(study: Study, series: str | None) -> xr.Dataset:

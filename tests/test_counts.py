@@ -27,6 +27,7 @@ COMMANDS = {
     "schema -o schema.json": (HEAVY, set()),
     "init sliding_friction -o mine.yaml": (HEAVY - {"pint", "dask", "scipy"}, set()),
     "check study.yaml": ({"distributed", "matplotlib", "pandas", "xarray", "zarr"}, set()),
+    "run more.yaml --threads 1": ({"distributed", "matplotlib", "pandas", "xarray"}, ...),
     "run done.yaml --dry-run": ({"distributed", "matplotlib"}, {"status"}),
     "status study.zarr": (STORE - {"pint", "dask", "scipy"}, ...),
     "show study.zarr friction_coefficient": (
@@ -61,6 +62,7 @@ def done(tmp_path_factory):
     (folder / "study.zarr").rename(folder / "results/study.zarr")
     (folder / "study.zarr").symlink_to("results/study.zarr")
     (folder / "done.yaml").write_text((folder / "study.yaml").read_text())
+    (folder / "more.yaml").write_text((folder / "study.yaml").read_text().replace("name: study", "name: more"))
     (folder / "line.csv").write_text("x [m],z [m]\n" + "".join(f"{i}e-6,{i * 7919 % 13}e-8\n" for i in range(256)))
     script = Path(__file__).parent / "commands_apart.py"
     commands = [command.split() for command in COMMANDS]

@@ -89,6 +89,21 @@ def test_one_series_is_merged_with_its_realisations_whatever_it_varies():
     assert factors.sizes["hurst"] == 2
 
 
+def test_a_figure_is_shown_in_a_notebook_and_saved_with_its_data(study, tmp_path):
+    figure = mdr_dask.plot(study, "velocity")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    figure.save(tmp_path / "mu.pdf")
+    assert (tmp_path / "mu.pdf").read_bytes().startswith(b"%PDF")
+    head = (tmp_path / "mu.csv").read_text().splitlines()
+    assert head[0].endswith("figure velocity")
+    assert head[1].startswith(f"# study: campaign {study.attrs['title']}, sha256 ")
+    assert len(pd.read_csv(tmp_path / "mu.csv", comment="#")) == len(figure.table())
+    (tmp_path / "rig.csv").write_text("v,mu\n1,2\n")
+    with pytest.raises(DataError, match="a table that is of no figure stands there"):
+        figure.save(tmp_path / "rig.png")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mu.csv", "mu.pdf", "rig.csv"]
+
+
 def test_laws_are_fitted_to_a_dataset_and_to_its_path(tmp_path):
     loads = "  normal_force: {geometric: [2 mN, 25 mN, 8]}\n  velocity: {geometric: [0.1 mm/s, 10 m/s, 11]}\n"
     planted = make(tmp_path, SLIDING + loads)[""]
@@ -168,7 +183,7 @@ REFUSED = [
     (lambda: mdr_dask.check({**SMALL, "realisation": 3}), CampaignError, "realisation: unknown key (did"),
     (lambda: mdr_dask.run({"model": "slidin_friction"}), CampaignError, "did you mean 'sliding_friction'"),
     (lambda: mdr_dask.open("nowhere.zarr"), StoreError, "nowhere.zarr: no store here"),
-    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study, got a Dataset without"),
+    (lambda: mdr_dask.plot(xr.Dataset(), "velocity"), DataError, "expected a study as run or open returns it"),
 ]
 
 
@@ -185,6 +200,42 @@ def test_unknown_laws_and_figures_are_one_sentence(study):
         mdr_dask.fit(study, "zone_on")
     with pytest.raises(DataError, match="no figure of sliding_friction is called 'stribeck'"):
         mdr_dask.plot(study, "stribeck")
+
+
+UNFIT = [
+    (
+        lambda study: mdr_dask.aggregate(study, "medan"),
+        "no statistic is called 'medan' (did you mean 'mean'?); known: ",
+    ),
+    (lambda study: mdr_dask.aggregate(xr.Dataset()), "expected a study as run or open returns it"),
+    (lambda study: mdr_dask.plot(study.isel(realisation=0), "velocity"), "isel(realisation=[0]) keeps one"),
+    (lambda study: mdr_dask.fit(study.mean("realisation"), "plateau"), "with its status and realisations"),
+    (lambda study: mdr_dask.plot(study, "friction_coefficient"), "is an output: name the axis to draw it over"),
+]
+
+
+@pytest.mark.parametrize(("call", "told"), UNFIT)
+def test_what_is_no_study_or_no_statistic_is_one_sentence(call, told, study):
+    with pytest.raises(DataError) as refused:
+        call(study)
+    assert told in str(refused.value)
+
+
+def test_one_word_may_stand_for_a_sequence(study):
+    parts = {"select": "velocity=1 mm/s", "group_by": "normal_force", "columns": "load_number"}
+    one = mdr_dask.aggregate(study, "mean", **parts)
+    xr.testing.assert_identical(
+        one, mdr_dask.aggregate(study, ["mean"], **{key: [word] for key, word in parts.items()})
+    )
+    assert "friction_coefficient_mean" in one
+    assert "friction_coefficient_standard_error" not in one
+    assert len(mdr_dask.table(study, "rms_slope", sort="normal_force", select="velocity=1")) == 2
+
+
+@pytest.mark.parametrize("made", [range(1, 3), xr.DataArray([1, 2]), pd.Series([1, 2]), (1, 2)])
+def test_values_may_be_any_sequence_of_numbers(made):
+    parameters = {**SMALL["parameters"], "velocity": made}
+    assert studies.read({**SMALL, "parameters": parameters}).series[0].axes[-1].values == (1.0, 2.0)
 
 
 def test_failed_results_are_a_warning(toy, tmp_path):

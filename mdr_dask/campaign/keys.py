@@ -34,5 +34,6 @@ def _without_lines(messages: Sequence[str]) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers of numpy and paths as JSON holds them."""
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+    """Return numbers of numpy, pandas and xarray, and ranges, as JSON holds them; the rest as text."""
+    numbers = list(value) if isinstance(value, range) else getattr(value, "values", value)
+    return numbers.tolist() if hasattr(numbers, "tolist") else numbers if isinstance(numbers, list) else str(value)

@@ -19,7 +19,8 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
-from mdr_dask.physics.lubrication.line_contact import Limit, LineContact, LineSolution, line_contact, solve_film
+from mdr_dask.physics.lubrication.limits import Limit
+from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve_film
 from mdr_dask.physics.outcome import Outcome
 
 #: Outputs whose errors count relative to the half width, in which they are given.

@@ -13,10 +13,13 @@ from mdr_dask.physics.lubrication.deformation import film as film_at
 _SPIKE = 0.01
 #: Positions between two cells at which the lowest film is looked for.
 _SUBDIVISION = 41
+#: Share of a cell by which the pressures of a grid end too early, where the film ends at a node.
+_TOO_EARLY = 0.1
 
 
 class GridSolution(NamedTuple):
-    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, and the steps taken.
+    """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the steps taken, and
+    the spacing of the nodes over that of the density which places them.
 
     Between two nodes the pressure is straight and the film sags; :meth:`film_between` goes through the nodes instead.
     """
@@ -26,6 +29,7 @@ class GridSolution(NamedTuple):
     film: FloatArray
     central: float
     steps: int
+    spacing: float = np.nan
 
     def film_between(self, positions: FloatArray) -> FloatArray:
         """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
@@ -72,21 +76,39 @@ class GridSolution(NamedTuple):
 
     @property
     def rupture(self) -> float:
-        """Where the film ends, from the pressure's last two positive values: it goes out like a square."""
+        """Where the film ends, from three values of the pressure, which goes out like a square.
+
+        The last value is not used: it depends on where in its cell the film ends.
+        """
         last = int(np.flatnonzero(self.pressure)[-1])
-        (x1, x2), (P1, P2) = self.nodes[last - 1 : last + 1], self.pressure[last - 1 : last + 1]
-        ratio = np.sqrt(P1 / P2)
-        end = (ratio * x2 - x1) / (ratio - 1) if ratio > 1 else np.inf
-        return float(min(end, self.nodes[min(last + 1, self.nodes.size - 1)]))
+        behind = self.nodes[min(last + 1, self.nodes.size - 1)]
+        x, root = self.nodes[max(last - 3, 0) : last], np.sqrt(self.pressure[max(last - 3, 0) : last])
+        if not (root.size == 3 and root[0] > root[1] > root[2] > 0):
+            return float(behind)
+        cell = behind - self.nodes[last]
+        end = _lagrange(root[None, :], x[None, :], np.zeros(1))[0] + _TOO_EARLY * cell
+        return float(np.clip(end, x[2], behind + cell))
+
+    @property
+    def cut(self) -> float:
+        """Distance of the film's end from the nearest node, in cells: a half at most."""
+        end = self.rupture
+        after = int(np.clip(np.searchsorted(self.nodes, end), 1, self.nodes.size - 1))
+        share = (end - self.nodes[after - 1]) / (self.nodes[after] - self.nodes[after - 1])
+        return float(min(abs(share), abs(1 - share)))
 
 
 def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the cubic through the two nodes before and the two behind each position (Lagrange)."""
+    """Return the cubic through the two nodes before and the two behind each position."""
     first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
-    x = nodes[first[:, None] + np.arange(4)]
+    around = first[:, None] + np.arange(4)
+    return _lagrange(nodes[around], values[around], positions)
+
+
+def _lagrange(x: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the polynomial through the values at x, shape (m, k), at each of m positions."""
     total = np.zeros(positions.size)
-    for k in range(4):
-        others = [m for m in range(4) if m != k]
-        weight = np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
-        total += weight * values[first + k]
+    for k in range(x.shape[1]):
+        others = [m for m in range(x.shape[1]) if m != k]
+        total += values[:, k] * np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
     return total

@@ -39,16 +39,57 @@ def sample(positions: FloatArray, density: FloatArray, count: int) -> FloatArray
     array, shape (count,)
         Ascending nodes.
     """
+    number = _cells(positions, density)
+    nodes = _placed(positions, density, number, np.linspace(0.0, number[-1], count))
+    nodes[-1] = positions[-1]
+    return nodes
+
+
+def _cells(positions: FloatArray, density: FloatArray) -> FloatArray:
+    """Return the number of cells before each position, shape (m,)."""
+    return np.concatenate([[0.0], np.cumsum(np.diff(positions) * (density[1:] + density[:-1]) / 2)])
+
+
+def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return where the numbers of cells wanted are reached; behind the last position the density goes on."""
     width = np.diff(positions)
-    number = np.concatenate([[0.0], np.cumsum(width * (density[1:] + density[:-1]) / 2)])
-    wanted = np.linspace(0.0, number[-1], count)
     cell = np.clip(np.searchsorted(number, wanted, side="right") - 1, 0, width.size - 1)
     rest = wanted - number[cell]
-    slope = (density[cell + 1] - density[cell]) / width[cell]
+    slope = np.where(wanted > number[-1], 0.0, (density[cell + 1] - density[cell]) / width[cell])
     root = np.sqrt(np.maximum(density[cell] ** 2 + 2 * slope * rest, 0.0))
     nodes = positions[cell] + 2 * rest / (density[cell] + root)
-    nodes[0], nodes[-1] = positions[0], positions[-1]
+    nodes[0] = positions[0]
     return np.asarray(nodes)
+
+
+def aligned(positions: FloatArray, density: FloatArray, count: int, rupture: float) -> tuple[FloatArray, float]:
+    """Return nodes of a density, one of them where the film ends.
+
+    The error of a film depends on where in its cell it ends, by as much as a tenth and least at a node, so that grids
+    compare only if it ends alike on all of them.
+
+    Parameters
+    ----------
+    positions, density : array, shape (m,)
+        Ascending positions and positive density there; only its shape matters.
+    count : int
+        Number of nodes, but for one or two.
+    rupture : float
+        Where the film ends, as a coarser grid found it.
+
+    Returns
+    -------
+    tuple of array and float
+        Ascending nodes, the last one behind the last position or there, and the spacing: cells of the density a cell.
+    """
+    number = _cells(positions, density)
+    before = int(np.clip(np.searchsorted(positions, rupture) - 1, 0, positions.size - 2))
+    rest = rupture - positions[before]
+    slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
+    reached = number[before] + rest * (density[before] + slope * rest / 2)
+    spacing = reached / round(reached / number[-1] * (count - 1))
+    last = int(np.ceil(number[-1] / spacing * (1 - 1e-12)))
+    return _placed(positions, density, number, spacing * np.arange(last + 1)), float(spacing)
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:

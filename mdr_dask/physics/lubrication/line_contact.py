@@ -2,12 +2,13 @@
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
 ``p0 = E' sqrt(W/(2 pi))``. Two numbers decide for Barus and an incompressible liquid: Moes' M and L. A case is
-solved on nested grids, each of half the spacing of the one before, until what the films tend to is known well enough.
+solved on ever finer grids of one density, whose cells end alike at the rupture, until what the films tend to is known
+well enough.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,7 +18,8 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution
-from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, newton
+from mdr_dask.physics.lubrication.limits import TRUST, Limit, extrapolate
+from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
 
@@ -59,16 +61,14 @@ class Settings(NamedTuple):
     adapted_nodes, adaptations : int
         Nodes of the grids that are placed by a solution before grids are compared, and their number.
     nodes : tuple of int
-        Nodes of the grids that are compared. The last is a cap: its dense equations take some 50 ms a step.
-    lowest_order, highest_order : float
-        Observed orders of convergence between which grids are extrapolated; the scheme is of second order.
-    change : float
-        The error of an extrapolated value over the change of the second-order limit from grid to grid.
-    floor : float
-        Least error over the change of the value itself from grid to grid: what the rupture's place between two nodes
-        makes the minimum film scatter.
-    slowest : float
-        Least ratio of successive changes by which the error of a value that is not extrapolated is bounded.
+        Nodes of the grids that are compared: three, then the next one or the one after it, whichever is expected to
+        meet the accuracy. The last is a cap: its dense equations take some 30 ms a step.
+    cut : float
+        Added to the least share of an error that is trusted, :class:`Trust`, for a film that ends a whole cell from the
+        nearest node: where in its cell it ends makes the minimum film scatter.
+    viscous, spiked : float
+        Added to that share for each logarithm of the viscosity at Hertz' pressure, and at most, as the spike grows
+        sharp; at most for readings other than films, which pass it.
     """
 
     attempts: tuple[Attempt, ...] = (
@@ -82,12 +82,10 @@ class Settings(NamedTuple):
     paces: tuple[Pace, ...] = (Pace(0.12, 30), Pace(0.05, 80), Pace(0.02, 250))
     adapted_nodes: int = 121
     adaptations: int = 2
-    nodes: tuple[int, ...] = (41, 81, 161, 321, 641, 1281)
-    lowest_order: float = 1.5
-    highest_order: float = 2.6
-    change: float = 0.5
-    floor: float = 0.06
-    slowest: float = 1.2
+    nodes: tuple[int, ...] = (41, 81, 161, 227, 321, 454, 641, 906, 1281)
+    cut: float = 0.3
+    viscous: float = 0.003
+    spiked: float = 0.1
 
 
 SETTINGS = Settings()
@@ -180,54 +178,6 @@ def line_contact(
     return LineContact(float(moes.M), float(moes.L), pole, exponent, rise, saturation, inlet)
 
 
-class Limit(NamedTuple):
-    """What values on nested grids tend to, its estimated absolute error, and the order of convergence observed.
-
-    Each is a number or an array; the order is NaN where the values do not approach anything steadily.
-    """
-
-    value: FloatArray
-    error: FloatArray
-    order: FloatArray
-
-    def scaled(self, factor: float) -> Limit:
-        """Return the estimate in another unit."""
-        return Limit(self.value * factor, self.error * factor, self.order)
-
-
-def extrapolate(values: FloatArray, settings: Settings = SETTINGS) -> Limit:
-    """Return what values on grids of halved spacing tend to.
-
-    Where the changes from grid to grid shrink at about second order, the limit is Richardson's, to third order, and the
-    error is a share of what the second-order limit still changed by. Elsewhere the limit is the finest value, and the
-    error its last change or, where changes shrink slowly, the sum of those to come.
-
-    Parameters
-    ----------
-    values : array, shape (k, ...)
-        From the coarsest grid to the finest, at least three.
-    settings : Settings
-        The orders that are trusted, and the shares.
-
-    Returns
-    -------
-    Limit
-        Elementwise; an error is infinite where a coarser grid has no value.
-    """
-    coarse, middle, fine = np.asarray(values[-3:], dtype=np.float64)
-    before, last = middle - coarse, fine - middle
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where((last == 0) & np.isfinite(before), 4.0, before / last)
-        order = np.where(ratio > 0, np.log2(np.abs(ratio)), np.nan)
-    limit, earlier = fine + last / 3, middle + before / 3
-    trusted = np.maximum(settings.change * np.abs(limit - earlier), settings.floor * np.abs(last))
-    slow = np.maximum(np.abs(ratio), settings.slowest)
-    is_trusted = (order >= settings.lowest_order) & (order <= settings.highest_order)
-    value = np.where(is_trusted, limit + (limit - earlier) / 7, fine)
-    error = np.where(is_trusted, trusted, np.abs(last) * np.maximum(1.0, 1 / (slow - 1)))
-    return Limit(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)
-
-
 @dataclass(frozen=True)
 class LineSolution:
     """The film of a line contact in Hertz units.
@@ -241,7 +191,7 @@ class LineSolution:
     reason : str
         One sentence if no film was found, else empty.
     grids : tuple of GridSolution
-        The last three grids, the finest last; empty if no film was found.
+        The last three or four grids, the finest last; empty if no film was found.
     central_film, minimum_film : Limit
         In ``a^2/R``; NaN if no film was found.
     steps : int
@@ -273,7 +223,16 @@ class LineSolution:
 
     def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Limit:
         """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
-        return extrapolate(np.array([reading(grid) for grid in self.grids]))
+        return _tends_to(self.grids, reading, SETTINGS.spiked)
+
+
+def _tends_to(
+    solved: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], scatter: float
+) -> Limit:
+    """Return what a reading of the last grids tends to; `scatter` is added to the least error."""
+    last = solved[-4:]
+    least = TRUST.floor + SETTINGS.cut * max(grid.cut for grid in last[-3:]) + scatter
+    return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least)
 
 
 def expected_film(M: float, L: float) -> float:
@@ -283,7 +242,12 @@ def expected_film(M: float, L: float) -> float:
 
 
 def _solve_on(
-    case: LineContact, nodes: FloatArray, pressure: FloatArray, central: float, paces: tuple[Pace, ...]
+    case: LineContact,
+    nodes: FloatArray,
+    pressure: FloatArray,
+    central: float,
+    paces: tuple[Pace, ...],
+    spacing: float = np.nan,
 ) -> tuple[Outcome, GridSolution]:
     """Solve on one grid from a guess of the pressure at its nodes, at the first pace that converges."""
     grid, total = Grid.of(nodes), 0
@@ -296,7 +260,7 @@ def _solve_on(
         total += found.steps
         if found.outcome == Outcome.CONVERGED:
             break
-    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total)
+    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total, spacing)
 
 
 def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
@@ -323,11 +287,12 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
 def _refined(
     case: LineContact, state: GridSolution, source: GridSolution, count: int, paces: tuple[Pace, ...]
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on `count` nodes placed as the solution `source` asks for, starting from `state`."""
+    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`."""
     density = grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
-    nodes = grids.sample(source.nodes, density, count)
+    finer = state if state.nodes.size > source.nodes.size else source
+    nodes, spacing = grids.aligned(source.nodes, density, count, finer.rupture)
     guess = np.interp(nodes, state.nodes, state.pressure)
-    return _solve_on(case, nodes, guess, state.central, paces)
+    return _solve_on(case, nodes, guess, state.central, paces, spacing)
 
 
 def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
@@ -370,18 +335,24 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     outcome, source, steps = _adapted_solution(case, settings)
     failure, state = (outcome, source), source
     solved: list[GridSolution] = []
-    for count in settings.nodes if outcome == Outcome.CONVERGED else ():
-        outcome, finer = _refined(case, state, source, count, settings.paces)
+    ladder = list(settings.nodes) if outcome == Outcome.CONVERGED else []
+    while ladder:
+        outcome, finer = _refined(case, state, source, ladder.pop(0), settings.paces)
         steps += finer.steps
-        if outcome == Outcome.CONVERGED:
-            state = finer
-            solved.append(finer)
-            if len(solved) > 2 and _solution(case, solved, steps).error <= accuracy:
-                break
-        else:
+        if outcome != Outcome.CONVERGED:
             failure = outcome, finer
             if solved:
                 break  # a grid before the first solution is too coarse for this film
+            continue
+        state = finer
+        solved.append(finer)
+        if len(solved) < 3:
+            continue
+        found = _solution(case, solved, steps)
+        if found.error <= accuracy:
+            break
+        if len(ladder) > 1 and found.error * (finer.nodes.size / ladder[0]) ** 3 > accuracy:
+            ladder.pop(0)  # the estimate goes like the cube of the spacing
     if len(solved) < 3:
         return _no_solution(case, *failure, steps)
     return _solution(case, solved, steps)
@@ -389,10 +360,11 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
-    last = tuple(solved[-3:])
-    central = extrapolate(np.array([grid.central_film for grid in last]))
-    minimum = extrapolate(np.array([grid.minimum[1] for grid in last]))
-    return LineSolution(case, Outcome.CONVERGED, "", last, central, minimum, steps)
+    viscosity = float(log_viscosities(np.ones(1), case.liquid)[0])
+    scatter = min(SETTINGS.viscous * viscosity, SETTINGS.spiked)
+    central = _tends_to(solved, lambda grid: grid.central_film, scatter)
+    minimum = _tends_to(solved, lambda grid: grid.minimum[1], scatter)
+    return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
 
 
 def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution, steps: int) -> LineSolution:

@@ -60,12 +60,12 @@ class Pace(NamedTuple):
     most : int
         Greatest number of steps.
     tolerance : float
-        Relative size of the last step.
+        Relative size of the last step: what is left is of the size of its square.
     """
 
     clip: float
     most: int
-    tolerance: float = 1e-8
+    tolerance: float = 1e-4
 
 
 class Iterate(NamedTuple):
@@ -337,19 +337,25 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     P, H = guess.copy(), film_on(grid, guess, central)
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
-    for steps in range(1, pace.most + 1):
+    outcome, solved = int(Outcome.UNDER_WAY), listed[:0]
+    for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
+        if outcome == Outcome.CONVERGED and np.array_equal(active, solved):
+            return Iterate(Outcome.CONVERGED, steps, P, central, H)
+        if steps == pace.most:
+            break
+        solved = active.copy()
         order = active.size + 1
         A, b = workspace[: order * order].reshape(order, order), np.empty(order)
         _fill_equations(grid, P, found, active, A, b)
         factors = factorise(A)
         if factors is None:
-            return Iterate(Outcome.SINGULAR, steps, P, central, H)
+            return Iterate(Outcome.SINGULAR, steps + 1, P, central, H)
         solution = factors.solve(b)
         step = -P
         step[active] = solution[:-1]
         outcome, central = _take_step(grid, pace, P, central, H, step, solution[-1])
-        if outcome != Outcome.UNDER_WAY:
-            return Iterate(Outcome(outcome), steps, P, central, H)
+        if outcome == Outcome.FILM_COLLAPSED:
+            return Iterate(Outcome.FILM_COLLAPSED, steps + 1, P, central, H)
     return Iterate(Outcome.TOO_MANY_STEPS, pace.most, P, central, H)

@@ -7,6 +7,7 @@ import pytest
 
 from mdr_dask.physics.lubrication.grids import (
     adapted_density,
+    aligned,
     first_grid,
     inlet_position,
     outlet_position,
@@ -53,3 +54,19 @@ def test_nodes_gather_where_the_film_bends() -> None:
     density = adapted_density(nodes, pressure, film, 0.1)
     assert density.min() > 0
     assert density[np.argmin(abs(nodes + 1.1))] > 2 * density[np.argmin(abs(nodes))]
+
+
+def test_a_film_ends_at_a_node_of_every_aligned_grid() -> None:
+    positions, density = np.linspace(-5.0, 2.0, 60), 1 + np.exp(-((np.linspace(-5.0, 2.0, 60) - 1) ** 2) / 0.1)
+    spacings = []
+    for count in (41, 58, 81):
+        nodes, spacing = aligned(positions, density, count, 1.037)
+        assert np.min(np.abs(nodes - 1.037)) < 1e-12
+        assert nodes[0] == -5.0
+        assert nodes[-2] < 2.0 <= nodes[-1] + 1e-12
+        assert np.all(np.diff(nodes) > 0)
+        assert abs(nodes.size - count) <= 2
+        cells = np.trapezoid(np.interp(np.linspace(-5, 1.037, 20_001), positions, density), dx=6.037 / 20_000)
+        assert cells / spacing == pytest.approx(round(cells / spacing), abs=1e-3)
+        spacings.append(spacing)
+    assert spacings[0] / spacings[2] == pytest.approx(2, rel=0.03)

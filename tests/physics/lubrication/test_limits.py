@@ -1,0 +1,61 @@
+"""What values on finer grids tend to: exact to third order, with an error that covers every power and every chance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mdr_dask.physics.lubrication.limits import TRUST, extrapolate
+
+
+@pytest.mark.parametrize("spacing", [(4.0, 2.0, 1.0), (4.0, 2.8, 2.0), (2.9, 2.0, 1.0), (5.6, 2.9, 2.0)])
+def test_extrapolation_is_exact_to_third_order_and_keeps_an_error(spacing: tuple[float, ...]) -> None:
+    h = np.array(spacing)
+    found = extrapolate(7 + 0.5 * h**2 + 0.02 * h**3, h)
+    assert found.value == pytest.approx(7, abs=1e-13)
+    assert TRUST.floor * 0.5 * h[2] ** 2 < found.error < 0.1 * h[2] ** 2
+    assert found.order == pytest.approx(2.0, abs=0.2)
+
+
+HALVED = np.array([4.0, 2.0, 1.0])
+
+
+@pytest.mark.parametrize("order", [0.3, 0.5, 0.8, 1.0, 1.4, 1.5, 1.6, 1.8, 1.9, 2.0, 2.1, 2.5, 2.7, 3.0, 5.0])
+@pytest.mark.parametrize("ratio", [2.0, 1.41])
+def test_error_covers_every_order(order: float, ratio: float) -> None:
+    spacing = ratio ** np.array([2.0, 1.0, 0.0])
+    found = extrapolate(7 + 0.5 * spacing**order, spacing)
+    assert found.order == pytest.approx(order, rel=1e-6)
+    assert abs(found.value - 7) <= found.error * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("values", [(1.0, 1.1, 1.0), (1.0, 0.9, 1.0), (1.0, 1.0, 1.1), (1.0, 1.2, 1.3999)])
+def test_values_that_approach_nothing_are_not_extrapolated(values: tuple[float, ...]) -> None:
+    found = extrapolate(np.array(values), HALVED)
+    assert found.value == values[-1]
+    assert found.error >= abs(values[2] - values[1])
+
+
+def test_a_small_last_change_after_a_large_one_is_not_trusted() -> None:
+    """Central films of a starved contact, M = 0.37, L = 17, less their limit: the errors change their sign."""
+    found = extrapolate(7 + np.array([1.24, -0.217, -0.153]), HALVED)
+    assert abs(found.value - 7) <= found.error
+
+
+def test_extrapolation_is_elementwise_and_knows_no_value() -> None:
+    spacing = HALVED[:, None]
+    values = np.hstack([1 + spacing**2, np.where(spacing > 3, np.nan, 5.0), np.full((3, 1), np.nan)])
+    found = extrapolate(values, HALVED)
+    np.testing.assert_allclose(found.value, [1.0, 5.0, np.nan])
+    assert np.isfinite(found.error[0])
+    assert found.error[1] == np.inf
+    assert np.isnan(found.error[2])
+
+
+def test_an_extrapolated_value_that_still_moves_is_known_no_better() -> None:
+    """The last three values extrapolate to 7 with a small error, those before to 8."""
+    h = np.array([8.0, 4.0, 2.0, 1.0])
+    values = 7 + 0.5 * h**2 + 0.02 * h**3
+    values[0] += 21.0
+    assert extrapolate(values[1:], h[1:]).error < 0.2
+    assert extrapolate(values, h).error > 0.5 * abs(extrapolate(values[:3], h[:3]).value - 7) > 0.2
