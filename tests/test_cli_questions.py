@@ -12,6 +12,8 @@ import xarray as xr
 from planted import ROLLERS, SLIDING, make
 
 from mdr_dask.cli import main
+from mdr_dask.cli.answers import _print_aligned
+from mdr_dask.questions.table import Table
 
 ASKED = ("friction_coefficient", "--where", "velocity > 5 mm/s", "--sort", "-friction_coefficient")
 COLUMNS = ["normal_force", "velocity", "friction_coefficient_mean", "friction_coefficient_standard_error"]
@@ -164,3 +166,12 @@ def test_numbers_of_a_model_are_listed(capsys):
     assert max(map(len, text.splitlines())) <= 100
     document = json.loads(told(capsys, "models", "ehl_line", "--json").out)
     assert "speed_parameter" in [number["number"] for number in document["numbers"]]
+
+
+def test_a_limit_counts_the_rows_of_all_frames(capsys):
+    """Five rows in frames of two: as many are printed as were asked for, and the rest is told."""
+    frames = [pd.DataFrame({"height": np.arange(first, first + 2.0)}) for first in (0, 2)]
+    _print_aligned(Table(iter(frames), {"height": "m"}, 5), 3, join=False)
+    printed = capsys.readouterr()
+    assert [float(line) for line in printed.out.split("\n")[1:] if line] == [0, 1, 2]
+    assert printed.err == "... 2 more rows (--limit 0 prints all)\n"

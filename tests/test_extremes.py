@@ -176,6 +176,17 @@ def test_films_from_rigid_and_isoviscous_to_heavy_and_piezoviscous(load, liquid)
         assert thicker.central_film.value >= found.central_film.value - slack
 
 
+@pytest.mark.parametrize(("scheme", "rounding"), [("hermite", 1e-12), ("backward_euler", 1e-6)])
+def test_a_line_of_ten_million_nodes_is_solved(scheme, rounding):
+    """Full contact with one wave: the drag is v tau times the mean square of the slope, a time step beside it."""
+    place = np.arange(10**7) / 10**7
+    height, slope = np.sin(2 * np.pi * place), 2 * np.pi * np.cos(2 * np.pi * place)
+    found = on_line(height, slope, np.array([0.1]), np.array([1e3]), scheme)
+    assert found.status[0] == Outcome.CONVERGED
+    assert found.drag[0] == pytest.approx(0.1 * 2 * np.pi**2, rel=rounding)
+    assert found.contact_fraction[0] == 1
+
+
 def factors(groups, curves, vertical):
     """Return a superposition, None if it is refused."""
     with contextlib.suppress(FitError):

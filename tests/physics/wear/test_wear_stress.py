@@ -11,9 +11,11 @@ from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced_rule import fast_forced
 
 EXPONENTS = st.floats(0.3, 20.0)
-STICKS = st.floats(0.001, 0.999)
-#: N from a ten-thousandth of a cycle number that matters to far beyond the last.
-CYCLES = st.floats(-4.0, 4.0).map(lambda power: 10.0**power)
+#: Stick radii, to a millionth beside 0 and 1.
+SMALL = st.floats(-6.0, -1.0).map(lambda power: 10.0**power)
+STICKS = st.one_of(st.floats(0.001, 0.999), SMALL, SMALL.map(lambda small: 1 - small))
+#: N from a millionth of a cycle number that matters to far beyond the last.
+CYCLES = st.floats(-6.0, 6.0).map(lambda power: 10.0**power)
 
 
 @settings(max_examples=300, deadline=None)
@@ -44,7 +46,8 @@ def test_exact_evolution(exponent, c, cycles):
     profile = PowerProfile(exponent)
     worn = exact(profile, c, [cycles], accuracy=1e-3)[0]
     limit = wear.limit(profile, c)
-    share = 0.03 * worn.energy_volume + 3e-3 * limit.wear_volume  # steps of 1e-3 eta, gathered
+    # steps of 1e-3 eta, gathered; few of them see the energy of a ring that is thinner than a thousandth
+    share = (0.03 if c < 0.999 else 0.3) * worn.energy_volume + 3e-3 * limit.wear_volume
     assert abs(worn.wear_volume - worn.energy_volume) <= share
     assert 1.0 - 1e-9 <= worn.contact_radius <= limit.contact_radius * (1.0 + 2e-3)
     assert worn.wear_volume <= limit.wear_volume * 1.003
