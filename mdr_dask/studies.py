@@ -275,7 +275,7 @@ def _of_table(path: str | Path, law: str) -> xr.Dataset:
 
 
 def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
-    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.savefig`` writes it.
+    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.save`` writes it, and its data beside it.
 
     Parameters
     ----------

@@ -275,7 +275,9 @@ def described(text: str, source: str) -> str:
     for name, unit, column in zip(names, sheet.units, columns, strict=True):
         known = column[np.isfinite(column)]
         ends = [f"{end:.4g}" for end in (known.min(), known.max())] if known.size else ["nothing"]
-        ranges.append(" ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit.strip("-1")])))
+        ranges.append(
+            " ".join(filter(None, [name, " to ".join(dict.fromkeys(ends)), unit if unit not in ("-", "1") else ""]))
+        )
     return f"{len(sheet.rows)} rows; {', '.join(ranges)}"
 
 

@@ -18,6 +18,8 @@ from mdr_dask.execute import Part, Resources
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
+from mdr_dask.plots.outputs import View, of_output
+from mdr_dask.plots.style import DATA
 from mdr_dask.questions.table import Question, table
 
 AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
@@ -282,3 +284,24 @@ def test_laws_and_tables_know_what_was_not_needed(study, url):
         away = np.abs(found.y.sel(shift=shift).to_numpy() - truth)
         assert away.max() < 0.015
         assert np.mean(away <= found.y_error.sel(shift=shift).to_numpy() + 1e-9) > 0.8
+
+
+@pytest.mark.parametrize(("ends", "middle"), [((1, 8), 4.5), ((2, 30), 60**0.5), ((-1, 30), 14.5)])
+def test_an_axis_of_more_than_a_decade_begins_in_equal_ratios(study, ends, middle):
+    first = study("shift: 0", f"{{adaptive: {list(ends)}, until: 1 %, at_most: 60}}").series[0].axes[0].values
+    assert (first[0], first[-1]) == ends
+    assert first[len(first) // 2] == pytest.approx(middle)
+
+
+def test_a_figure_has_the_values_that_each_curve_needed(study, url):
+    shifts = [-1.5, 1.7]
+    run(study(f"shift: {shifts}"), url)
+    data = store.datasets(url)[""]
+    (axes,) = of_output(View("y", ("x",))).figure({"": data}).axes
+    drawn = [line for line in axes.lines if line.get_gid() == DATA]
+    for shift, line in zip(shifts, drawn, strict=True):
+        one = data.sel(shift=shift)
+        needed = (one.status == Status.DONE).any("realisation").to_numpy()
+        assert not needed.all()
+        np.testing.assert_allclose(line.get_xdata(), one.x.to_numpy()[needed])
+        np.testing.assert_allclose(line.get_ydata(), one.y.mean("realisation").to_numpy()[needed])

@@ -66,8 +66,8 @@ MISSED = Fit("missed", ("toy",), "mean height by a law that misses it", _missed,
 def own(toy, monkeypatch):
     """Return a study of the toy model, with a fit of one's own, to a tolerance."""
     known = {"level": LEVEL, "missed": MISSED}
+    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: known)  # the first: it is loaded by now
     monkeypatch.setattr(fits, "available", lambda _: known)
-    monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: known)
 
     def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0), answer="level.level"):
         rounds = Replication(10, at_most, {}, {answer: tolerance})

@@ -5,11 +5,14 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mdr_dask.campaign import load
+from mdr_dask.campaign.measured import read_measured
 from mdr_dask.cli import main
 from mdr_dask.cli.understood import human_bytes, spacing
+from mdr_dask.errors import DataError
 
 CAMPAIGN = """\
 name: tyre
@@ -179,6 +182,18 @@ def test_sizes_are_for_people(size, told):
 )
 def test_even_spacing_is_named(values, told):
     assert spacing(values) == told
+
+
+def test_columns_of_measured_points_leave_out_structures_where_nothing_else_is_called_so():
+    """German too, with a unit of its own; a name that two structures have is written in full."""
+    conditions = {"material_temperature": "K", "velocity": "m/s", "oil_density": "kg/m^3", "body_density": "kg/m^3"}
+    text = "Temperatur [°C];Geschwindigkeit [mm/s];Reibwert\n20;1;0,5\n40;10;0,6\n"
+    output = {"friction_coefficient": "1"}
+    read = read_measured(text, "rig.csv", conditions, output, ("material", "oil", "body"))
+    np.testing.assert_allclose(read.conditions["material_temperature"], [293.15, 313.15])
+    np.testing.assert_allclose(read.values, [0.5, 0.6])
+    with pytest.raises(DataError, match="unknown column 'density'"):
+        read_measured("density [kg/m^3],Reibwert\n1,2\n3,4\n", "rig.csv", conditions, output, ("oil", "body"))
 
 
 def test_check_says_how_measured_points_meet_each_series(tmp_path, monkeypatch, capsys):

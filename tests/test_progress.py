@@ -5,6 +5,7 @@ import sys
 import time
 
 import pytest
+from test_execute import run
 
 from mdr_dask import compile_clock as clocks
 from mdr_dask.cli import progress as shown
@@ -103,3 +104,12 @@ def test_every_kind_of_result_counts_once():
     twice = once.after(outcome, 3.0)
     assert twice.warned == 12
     assert (twice.not_needed, twice.to_do, twice.finished, twice.wall_seconds) == (14, 86, 3.0, 3.0)
+
+
+def test_a_run_tells_how_long_it_took(toy, url):
+    began = time.monotonic()
+    progress = run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    assert 0 < progress.wall_seconds < time.monotonic() - began
+    assert progress.compute_seconds + progress.write_seconds > 0
+    again = run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    assert (again.kept, again.done, again.solves, again.compute_seconds) == (12, 0, 0, 0.0)

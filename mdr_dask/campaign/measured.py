@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from pydantic import BaseModel
+
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
@@ -51,7 +53,9 @@ class Measured:
     lines: tuple[int, ...]
 
 
-def read_measured(text: str, source: str, conditions: Mapping[str, str], outputs: Mapping[str, str]) -> Measured:
+def read_measured(
+    text: str, source: str, conditions: Mapping[str, str], outputs: Mapping[str, str], structures: Iterable[str] = ()
+) -> Measured:
     """Read a table of measured points.
 
     Parameters
@@ -60,6 +64,8 @@ def read_measured(text: str, source: str, conditions: Mapping[str, str], outputs
         The table and the name of its file.
     conditions, outputs : mapping of str to str
         SI units of what the columns may be, by the names that they have in a store.
+    structures : iterable of str
+        Structures of parameters: where only one has a ``temperature``, the column may be called so.
 
     Raises
     ------
@@ -75,7 +81,8 @@ def read_measured(text: str, source: str, conditions: Mapping[str, str], outputs
         wanted = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {wanted}, got {got}{hint}")
     output = found[0]
-    columns = [Column(name, unit, needed=False) for name, unit in conditions.items()]
+    short = _short_names([*conditions, *outputs], structures)
+    columns = [Column(name, unit, tuple(short.get(name, ())), needed=False) for name, unit in conditions.items()]
     error = Column(ERROR, outputs[output], (*_ERRORS, f"{output}_error"), needed=False, above=0.0)
     read = read_table(text, source, [*columns, of_outputs[output], error])
     values, errors = read.pop(output), read.pop(ERROR, None)
@@ -83,6 +90,13 @@ def read_measured(text: str, source: str, conditions: Mapping[str, str], outputs
         raise DataError(f"{source}: expected at least two measured points, got {values.size}")
     lines = tuple(row[0].line for row in read_sheet(text, source).rows)
     return Measured(source, output, values, errors, read, lines)
+
+
+def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, list[str]]:
+    """Return the names of parameters without that of their structure, where nothing else is called so."""
+    short = [(name, name.removeprefix(f"{one}_")) for one in structures for name in names if name.startswith(f"{one}_")]
+    called = [*names, *(inner for _, inner in short)]
+    return {name: [inner] for name, inner in short if called.count(inner) == 1}
 
 
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
@@ -105,10 +119,10 @@ def notes(campaign: Campaign) -> tuple[str, ...]:
     told = []
     for series in campaign.series if table else ():
         assert table is not None
-        conditions, outputs = _of_series(campaign.model, campaign.outputs, series)
+        conditions, outputs, structures = _of_series(campaign.model, campaign.outputs, series)
         before = f"measured {table.name}{f', series {series.name}' if series.name else ''}"
         try:
-            found = read_measured(table.read_text(), table.name, conditions, outputs)
+            found = read_measured(table.read_text(), table.name, conditions, outputs, structures)
         except DataError:
             told.append(f"{before}: no table of this series")
             continue
@@ -164,8 +178,8 @@ def _unknown(measured: Measured, series: Series) -> list[str]:
     return [axis.name for axis in series.axes if axis.unit is not None and axis.name not in measured.conditions]
 
 
-def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the units of conditions and outputs of a series."""
+def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[str, str], dict[str, str], list[str]]:
+    """Return the units of conditions and outputs of a series, and its structures of parameters."""
     model = models.load(name)
     special = model.units(series.parameters)
     conditions = {key: unit for key, (_, unit, _) in numbers_of(series.parameters).items()}
@@ -175,4 +189,5 @@ def _of_series(name: str, outputs: Sequence[str], series: Series) -> tuple[dict[
     return (
         {key: special.get(key, unit) for key, unit in conditions.items()},
         {key: special.get(key, unit) for key, unit in declared.items()},
+        [key for key, value in series.parameters if isinstance(value, BaseModel)],
     )

@@ -254,14 +254,13 @@ def save(figure: Figure, path: Path, origin: Mapping[str, str]) -> None:
     """Write a figure, and its data beside it; a table there that is of no figure is not written over."""
     from mdr_dask.plots import table
 
-    beside = path.with_suffix(".csv")
-    if isinstance(figure, table.Drawn) and beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
-        raise click.UsageError(f"{beside}: a table that is of no figure stands there; give the figure another name")
-    with writing(path):
-        table.save_picture(figure, path)
-    if isinstance(figure, table.Drawn):
-        with writing(beside):
-            table.save_table(figure, beside, origin)
+    if not isinstance(figure, table.Drawn):
+        with writing(path):
+            table.save_picture(figure, path)
+        return
+    figure.origin = origin
+    with writing(table.table_beside(path)), writing(path):
+        figure.save(path)
 
 
 def _places(output: Path | None, names: Sequence[str], urls: Sequence[str], suffix: str, alone: bool) -> list[Path]:

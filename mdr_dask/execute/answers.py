@@ -32,8 +32,6 @@ def cases_that_narrow(
         Realisations of every case that count, by group; what else the store holds does not matter here.
     """
     answers = stage.campaign.replication.answers
-    if not answers:
-        return [np.zeros(each.shape, dtype=bool) for each in taken]
     if max(int(each.max()) for each in taken) < FEWEST:
         return cases_of(stage, layout, places, stage.new)
     groups = _groups(url, stage, layout, taken)
@@ -57,8 +55,8 @@ def cases_that_narrow(
 def unanswered(url: str, stage: Stage, layout: Sequence[Template], taken: Sequence[IntArray]) -> Iterator[str]:
     """Yield a sentence for every constant that is not known as well as it should be."""
     answers = stage.campaign.replication.answers
-    groups = _groups(url, stage, layout, taken) if answers else {}
-    known = fits.available(stage.campaign.model) if answers else {}
+    groups = _groups(url, stage, layout, taken)
+    known = fits.available(stage.campaign.model)
     for answer, tolerance in answers.items():
         name, _, constant = answer.partition(".")
         try:

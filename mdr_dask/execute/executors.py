@@ -63,6 +63,7 @@ def _run_threads(threads: int, tell: Tell, works: Iterable[Work], settle: Settle
     However it ends, the blocks that have begun are finished first, for the store is still ours.
     """
     import dask
+    from dask import threaded  # its name alone would load the distributed scheduler
     from dask.callbacks import Callback
 
     def finished(_key: object, value: object, *_: object) -> None:
@@ -80,4 +81,4 @@ def _run_threads(threads: int, tell: Tell, works: Iterable[Work], settle: Settle
     remaining = iter(works)
     with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
         while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
-            dask.compute([task(work) for work in window], scheduler="threads", pool=pool, optimize_graph=False)
+            dask.compute([task(work) for work in window], scheduler=threaded.get, pool=pool, optimize_graph=False)

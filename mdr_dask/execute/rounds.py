@@ -13,14 +13,12 @@ from mdr_dask import store
 from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
-from mdr_dask.execute.answers import cases_that_narrow, unanswered
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
 from mdr_dask.execute.events import Event, Tell, ended
 from mdr_dask.execute.executors import Execute, check, executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
-from mdr_dask.execute.stages import cases_of, following, stored_layout
-from mdr_dask.fits.answers import require_known
+from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Stage
 from mdr_dask.replication import needs_more, rounds
@@ -108,6 +106,8 @@ def run(
     """
     check(resources)  # what is refused leaves no lock behind
     if campaign.replication.answers:
+        from mdr_dask.fits.answers import require_known
+
         require_known(campaign)
     stored_layout(Stage.first(campaign), url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
@@ -218,7 +218,7 @@ def _run_rounds(
         is_last = count == replication.at_most and not job.stage.is_adaptive
         if job.part and not is_last and not _others_are_done(job, job.part, current):
             return None
-    if current and (short := list(unanswered(job.url, job.stage, current.layout, current.taken))):
+    if current and (short := _unanswered(job, current)):
         job.tell(Event("not answered", {"answers": len(short)}, "; ".join(short)))
     return current
 
@@ -260,7 +260,7 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
         before = last.realisations[1] if last else 0
         needed = asked
         if last:
-            narrow = cases_that_narrow(job.url, job.stage, layout, places, last.taken)
+            narrow = _narrow(job, layout, places, last)
             needed = [
                 mask & _still_wide(job.url, template, before) | cases
                 for mask, template, cases in zip(last.needed, layout, narrow, strict=True)
@@ -275,6 +275,24 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
     return _Round(layout, asked, needed, (before, count), taken)
+
+
+def _narrow(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[NDArray[np.bool_]]:
+    """Return the cases that constants follow from whose intervals are too wide."""
+    if not job.stage.campaign.replication.answers:
+        return [np.zeros(each.shape, dtype=bool) for each in last.taken]
+    from mdr_dask.execute.answers import cases_that_narrow  # with the fits and what they stand on
+
+    return cases_that_narrow(job.url, job.stage, layout, places, last.taken)
+
+
+def _unanswered(job: _Job, last: _Round) -> list[str]:
+    """Return a sentence for every constant that is not known as well as it should be."""
+    if not job.stage.campaign.replication.answers:
+        return []
+    from mdr_dask.execute.answers import unanswered
+
+    return list(unanswered(job.url, job.stage, last.layout, last.taken))
 
 
 def _find(job: _Job, current: _Round) -> list[Cells]:

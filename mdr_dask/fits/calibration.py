@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -220,7 +221,9 @@ def measured_of(dataset: xr.Dataset) -> Measured:
         for name, axis in dataset.coords.items()
         if name not in ("realisation", "case") and axis.dtype.kind in "fiu"
     }
-    return read_measured(table["text"], table["name"], conditions, outputs)
+    parameters = json.loads(dataset.attrs.get("parameters", "{}"))
+    structures = [key for key, value in parameters.items() if isinstance(value, dict)]
+    return read_measured(table["text"], table["name"], conditions, outputs, structures)
 
 
 def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dataset]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.tables import numbers, read_sheet
+from mdr_dask.headings import folded, meanings
+from mdr_dask.tables import decoded, numbers, read_sheet
 
 ALIASES: dict[str, tuple[str, ...]] = {
     "friction_coefficient": ("coefficient", "coefficient_of_friction", "friction", "mu", "cof"),
@@ -40,7 +41,7 @@ def read_table(path: str | Path) -> pd.DataFrame:
     DataError
         If there is no row of names, or an entry is not a number.
     """
-    sheet = read_sheet(Path(path).read_text(encoding="utf-8-sig", errors="replace"), str(path))
+    sheet = read_sheet(decoded(Path(path).read_bytes(), str(path)), str(path))
     if not sheet.names:
         raise DataError(f"{path}: expected names of columns, got numbers")
     names = [cell.text for cell in sheet.names]
@@ -75,13 +76,12 @@ def finite_rows(frame: pd.DataFrame, columns: list[str]) -> tuple[pd.DataFrame, 
 
 
 def column_of(frame: pd.DataFrame, wanted: str) -> str | None:
-    """Return the column of a name or of one of its aliases, as written or else in any case."""
+    """Return the column of a name or of one of its aliases, as written or else as tables may have it."""
     columns = [str(name) for name in frame.columns]
-    lowered = [name.strip().lower().replace(" ", "_") for name in columns]
     names = (wanted, *ALIASES.get(wanted, ()))
     exact = [name for name in names if name in columns]
-    loose = [columns[lowered.index(name.lower())] for name in names if lowered.count(name.lower()) == 1]
-    return (exact + loose + [None])[0]
+    loose = [[column for column in columns if folded(name) in meanings(column)] for name in names]
+    return (exact + [found[0] for found in loose if len(found) == 1] + [None])[0]
 
 
 def columns_to_use(frame: pd.DataFrame, *given: str | None) -> tuple[str, str, str]:
@@ -159,4 +159,4 @@ def clusters(values: FloatArray) -> NDArray[np.intp]:
 
 def is_temperature(by: str) -> bool:
     """Say whether a column is one of temperatures, by its name."""
-    return by in ALIASES["temperature"] or by.lower() in ("temperature", *ALIASES["temperature"])
+    return not meanings(by).isdisjoint(map(folded, ("temperature", *ALIASES["temperature"])))

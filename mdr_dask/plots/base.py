@@ -50,7 +50,7 @@ class Plot:
         DataError, FitError
             If the store has not the data for it.
         """
-        from mdr_dask.plots import page
+        from mdr_dask.plots import page, table
         from mdr_dask.plots.style import leave_out
 
         try:
@@ -65,6 +65,8 @@ class Plot:
             problem = f"{type(error).__name__}: {error}"
             raise DataError(f"a fault of this figure, please report it with the campaign: {problem}") from error
         leave_out(figure, _without_value(groups))
+        if isinstance(figure, table.Drawn):
+            figure.origin = table.of_groups(self.name, groups)
         return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from mdr_dask import store as stores
+from mdr_dask.errors import DataError
 from mdr_dask.plots import page, style
 from mdr_dask.version import __version__
 
@@ -61,12 +63,30 @@ class Bar(NamedTuple):
 
 
 class Drawn(Figure):
-    """A figure that keeps what is drawn in it."""
+    """A figure that keeps what is drawn in it, and knows its origin; a notebook shows it at the end of a cell."""
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.rows: list[Rows] = []
         self.bars: list[Bar] = []
+        self.origin: Mapping[str, str] = {}
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        self.savefig(stream, format="png")
+        return stream.getvalue()
+
+    def save(self, path: str | Path) -> None:
+        """Write the figure, and its table beside it: ``mu.pdf`` and ``mu.csv``.
+
+        Raises
+        ------
+        DataError
+            If a table stands there that is of no figure.
+        """
+        beside = table_beside(path)
+        save_picture(self, Path(path))
+        save_table(self, beside, self.origin)
 
     def colorbar(self, mappable: Any, *arguments: Any, **options: Any) -> Colorbar:
         """Draw a colour bar, as any figure does."""
@@ -119,14 +139,28 @@ def _plain(values: NDArray[Any]) -> NDArray[Any]:
 def provenance(name: str, urls: Sequence[str], command: str) -> dict[str, str]:
     """Return what the table of a figure says of its origin."""
     told = {"mdr_dask": f"{__version__}, figure {name}", "command": command}
-    for url in urls:
-        held = stores.attributes(url)
-        digest = hashlib.sha256(str(held["campaign"]).encode()).hexdigest()
-        told[f"store {url}"] = (
-            f"campaign {held['title']}, sha256 {digest}, model {held['model']} version {held['model_version']}, "
-            f"computed by mdr_dask {held['versions']['mdr_dask']}"
-        )
-    return told
+    return told | {f"store {url}": _campaign_of(stores.attributes(url)) for url in urls}
+
+
+def of_groups(name: str, groups: Mapping[str, xr.Dataset]) -> dict[str, str]:
+    """Return what the table of a figure says of its origin where no command drew it."""
+    campaigns = dict.fromkeys(_campaign_of(data.attrs) for data in groups.values())
+    return {"mdr_dask": f"{__version__}, figure {name}", "study": "; ".join(campaigns)}
+
+
+def _campaign_of(held: Mapping[Any, Any]) -> str:
+    """Return which campaign a study is of, by its attributes."""
+    title, text, model, version = (str(held.get(key)) for key in ("title", "campaign", "model", "model_version"))
+    digest, computed = hashlib.sha256(text.encode()).hexdigest(), held.get("versions", {}).get("mdr_dask")
+    return f"campaign {title}, sha256 {digest}, model {model} version {version}, computed by mdr_dask {computed}"
+
+
+def table_beside(path: str | Path) -> Path:
+    """Return the place of the table of a figure; DataError if a table that is of no figure stands there."""
+    beside = Path(path).with_suffix(".csv")
+    if beside.exists() and not beside.read_bytes().startswith(b"# mdr_dask"):
+        raise DataError(f"{beside}: a table that is of no figure stands there; give the figure another name")
+    return beside
 
 
 def save_picture(figure: Figure, path: Path) -> None:

@@ -9,14 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from mdr_dask.errors import StoreError
 from mdr_dask.store.digests import Checked
 from mdr_dask.store.files import bytes_of, group_name
 from mdr_dask.store.sound import require_laid_out
 from mdr_dask.store.study import document, series_names
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Reading through Dask is several times slower for small groups, and the only way for those beyond memory.
 LAZY_BYTES = 2**30
@@ -67,6 +69,8 @@ def datasets(url: str) -> dict[str, xr.Dataset]:
 
 
 def _open_sorted(url: str, series: str) -> xr.Dataset:
+    import xarray as xr
+
     document(url, series)
     store = Checked(bytes_of(url), url, series)
     opened = partial(xr.open_zarr, store, group=group_name(series) or None, consolidated=True, zarr_format=3)

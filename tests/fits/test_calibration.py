@@ -267,14 +267,15 @@ def test_every_model_has_calibration_from_python_and_in_a_shell(toy, tmp_path, c
 
 def test_parts_of_a_marginal_hold_as_many_cells_each():
     """Cells that are all as likely look level, wherever the range drawn begins and ends."""
-    place = np.linspace(0.0, 1.0, 241)
-    across = np.log(2e-4) + 3 * place
+    place = np.linspace(0.1, 0.6, 241)
+    across = np.log(2e-4) + 7 * place
     for ends in ([across[0], across[-1]], [across[31], across[150]], [across[100], across[101]]):
-        edges = _of_whole_cells(np.array(ends), across, place, place[1])
+        edges = _of_whole_cells(np.array(ends), across, place, np.diff(place)[0])
         inside = (across > ends[0]) & (across < ends[1])
         assert edges[0] < across[inside].min(initial=ends[1])
         assert edges[-1] > across[inside].max(initial=ends[0])
         counts = np.histogram(across, edges)[0]
-        whole = (edges[:-1] > across[0] - place[1]) & (edges[1:] < across[-1] + 2 * place[1])
+        cell = np.diff(across)[0]
+        whole = (edges[:-1] > across[0] - cell) & (edges[1:] < across[-1] + cell)
         assert np.ptp(counts[whole]) == 0
         assert len(counts) <= PARTS + 2

@@ -197,6 +197,13 @@ ROWS = {
     ),
 }
 
+#: What has no value on a way: no last state is steady, and a body worn along a path has no estimate of its image.
+NO_VALUE = {
+    "steps": {"friction_coefficient_after", "friction_coefficient_after_error"},
+    "oscillation": {"friction_coefficient_after", "friction_coefficient_after_error"},
+    "wear, path": {"worn_image_error"},
+}
+
 
 def solved(model, parameters):
     outputs = model.with_companions([output.name for output in model.outputs])
@@ -231,5 +238,7 @@ def test_every_output_changes_as_its_unit_says(name, data):
         value, found = one.values[output][0, 0], two.values[output][0, 0]
         scale = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
         np.testing.assert_allclose(found / factor, value, rtol=1e-8, atol=1e-9 * scale, err_msg=output)
+        assert np.isfinite(value).any() == (output not in NO_VALUE.get(name, ())), output
+        assert not output.endswith("_error") or not np.any(value < 0), output
         changed += factor != 1 and np.any(found != value)
     assert changed or all(unit == "1" for unit in units_of(model, plain).values())

@@ -6,7 +6,7 @@ import xarray as xr
 
 from mdr_dask.errors import DataError
 from mdr_dask.plots.mixed import PLOTS
-from mdr_dask.plots.style import DATA
+from mdr_dask.plots.style import DATA, left_out
 
 DRAW = {plot.name: plot.draw for plot in PLOTS}
 REALISATIONS = 4
@@ -101,6 +101,15 @@ def test_stribeck_has_four_panels_and_a_line_a_load():
     figure = DRAW["stribeck"]({"": data})
     assert [len(lines_of(panel)) for panel in figure.axes] == [2, 2, 2, 2]
     np.testing.assert_allclose(lines_of(figure.axes[0])[0].get_xdata(), np.array([1, 10, 100]) * 30 / np.pi)
+
+
+def test_what_is_left_out_is_named_with_its_series():
+    forces, heights = np.arange(1.0, 21.0), [1e-7, 2e-7, 3e-7]
+    axes = {"temperature": np.arange(300.0, 309.0), "normal_force": forces, "rms_roughness": heights}
+    data = dataset(axes, ["breakthrough_probability"])
+    told = "19 of 20 values of normal_force (drawn: $F_N$ = 11 N)"
+    assert left_out(DRAW["sensitivity"]({"": data})) == told
+    assert left_out(DRAW["sensitivity"]({"a": data, "b": data})) == f"a: {told}; b: {told}"
 
 
 @pytest.mark.parametrize("name", sorted(DRAW))

@@ -56,6 +56,10 @@ def test_one_column_a_series_with_friction_velocity_and_load() -> None:
     assert np.allclose(late[0], 0.05)
     assert np.allclose(late[1], 0.3)
     assert velocity[0, 1] == 0.05
+    for panel, curve in zip(figure.axes[::2], (friction, velocity, load), strict=True):
+        assert panel.get_xlim() == pytest.approx((-0.08 * 4, 4))  # a little of the steady state, and all of the rest
+        assert curve[[0, -1], 0] == pytest.approx((-0.08 * 4, 4))
+        assert np.all(np.diff(curve[:, 0]) >= 0)
     _, velocity, _ = curves(figure, 1, 2)
     assert velocity[:, 1].max() == pytest.approx(0.07, rel=1e-4)  # 400 points a curve
 

@@ -11,6 +11,7 @@ from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources, run
 from mdr_dask.report import serving
+from mdr_dask.units import seconds
 
 
 @pytest.fixture
@@ -92,6 +93,16 @@ def test_it_follows_a_store_that_grows_is_gone_and_is_another(server, study, url
     follower.look()
     assert follower.edition == 3
     assert follower.progress["settled"] == 18
+
+
+def test_the_time_left_goes_by_the_last_minute(url, monkeypatch):
+    follower, now = serving.Follower([url]), [0.0]
+    monkeypatch.setattr(serving.time, "monotonic", lambda: now[0])
+    for now[0], missing in ((1000.0, 100), (1090.0, 90), (1120.0, 60)):
+        follower._tell([{"results": 100, "missing": missing, "failed": 2, "not_converged": 1}])
+    assert follower.progress["rate"] == pytest.approx(1.0)
+    told = "40 of 100 results (40%), 3 failed, 1 results/s, about 60 s left, nobody is at work"
+    assert follower.progress["sentence"] == told.replace("60 s", seconds(60.0))
 
 
 def test_what_cannot_be_served_is_refused(capsys, tmp_path):

@@ -35,7 +35,7 @@ from mdr_dask.physics.transients.velocity_jump import Course
 ACCURACY = 0.01  # of the ends, where the campaign does not say
 SECONDS_NODE, SECONDS_MOMENT = 5e-8, 2.7e-9  # for every node of a line, and of a moment
 MOMENTS = 60
-SECONDS_STEPPED = 5e-8  # for every node in square: a history of some turns of the line
+SECONDS_STEPPED = 3.5e-8  # for every node in square: a history of some turns of the line
 FLAT = 1e-12  # of the largest height
 
 #: Outputs that have errors, and the level of a jump that decides the accuracy of each.

@@ -17,8 +17,6 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, relative
 from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
-from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
-from mdr_dask.physics.solids import prony
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
@@ -94,6 +92,9 @@ def solve(
 
 def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
     """Solve cases of any linear solid one by one, each on the coarsest grid that meets the accuracy."""
+    from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding  # kernels that few studies need
+    from mdr_dask.physics.solids import prony
+
     steady, errors = unsolved(loads.size), Errors.unknown(loads.size)
     for k in np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)):
         solid = prony(1.0, arms.moduli, arms.deborah, deborah[k])

@@ -9,9 +9,10 @@ from mdr_dask.physics.mdr.revolution import PowerProfile, image_rise
 @pytest.mark.parametrize("exponent", [0.5, 1.0, 1.5, 2.0, 3.7])
 @pytest.mark.parametrize("gap", [-0.3, -0.2, -1e-9, 1e-9, 0.01, 0.5])
 def test_the_rise_of_a_power_is_that_of_its_formula_down_to_the_centre(exponent, gap):
+    rise = getattr(image_rise, "py_func", image_rise)  # as it is where nothing is compiled
     image, start = PowerProfile(exponent).pieces(), 0.3
     level = start**exponent
     exact = np.longdouble(start + gap) ** exponent - np.longdouble(start) ** exponent
     if abs(gap) < 1e-6:
         exact = exponent * gap * start ** (exponent - 1)
-    assert image_rise.py_func(image, start, level, gap) == pytest.approx(float(exact), rel=1e-7)
+    assert rise(image, start, level, gap) == pytest.approx(float(exact), rel=1e-7)

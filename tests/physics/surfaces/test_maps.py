@@ -157,3 +157,21 @@ def test_the_exponent_and_the_cut_offs_are_found(hurst):
 def test_a_spectrum_ends_where_it_falls_too_steeply_or_to_nothing(density, limit):
     bins = Cut(np.array([1.0, 2.0, 4.0, 8.0]), np.array(density), np.full(4, 0.1))
     assert steep_limit(bins) == pytest.approx(limit)
+
+
+@pytest.mark.parametrize(("longest", "shortest"), [(1e-2, 1e-5), (None, 1e-5), (1e-2, None), (None, None)])
+def test_both_bends_of_a_spectrum_are_found_where_they_are(longest, shortest):
+    """A level, a power law and a steep fall, ten bins a decade, each known to 10 %."""
+    wavenumber = np.geomspace(2e2, 2e6, 41)
+    first, last = 2 * np.pi / (longest or 1.0), 2 * np.pi / (shortest or 1e-9)
+    density = np.clip(wavenumber, first, last) ** (-2 - 2 * 0.7) * np.maximum(wavenumber / last, 1) ** -6
+    density = density * np.exp(0.1 * np.random.default_rng(3).standard_normal(41))
+    found = fit_self_affine(Cut(wavenumber, density, np.full(41, 0.1)))
+    assert found.hurst.low < 0.7 < found.hurst.high
+    assert 0.5 < found.misfit < 1.5
+    for bend, true in ((found.longest, longest), (found.shortest, shortest)):
+        if true is None:
+            assert bend is None
+        else:
+            assert bend.low < true < bend.high < 2 * bend.low
+            assert bend.low < bend.value < bend.high
