@@ -7,11 +7,14 @@
 Files called ``bench_*.py`` time single kernels: ``pytest benchmarks/wear/bench_wear.py --benchmark-enable``.
 """
 
+import os
 import runpy
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
+#: As in the runner's workers: a second thread that waits would count as time.
+os.environ |= dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 def kinds(subject):

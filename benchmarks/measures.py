@@ -45,6 +45,9 @@ def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str
         if goal is not None:
             axes.axhline(goal, color="0.6", linewidth=1)
         axes.set(title=title, xlabel="processor time (s)")
+        low, high = axes.get_xlim()
+        wider = max(10 * low / high, 1.0) ** 0.5  # within less than a decade ticks would lie at each other
+        axes.set_xlim(low / wider, high * wider)
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter(NullFormatter())

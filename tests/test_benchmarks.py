@@ -43,7 +43,7 @@ SOLVERS = {
     "measured_lines": 1e-3,
     "maps": 1e-12,
     "campaigns_of_friction": 0.1,
-    "campaigns_of_films": 1e-3,
+    "campaigns_of_films": 5e-3,
     "campaigns_of_wear": 1e-2,
     "campaigns_of_rollers": 0.3,
     "campaigns_of_jumps": 0.1,

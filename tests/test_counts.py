@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 from planted import SLIDING, make
 
+from mdr_dask import store
+from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.execute import Resources, run
 from mdr_dask.models import load
 from mdr_dask.models.base import Block
 from mdr_dask.physics.sliding import accuracy, kelvin, steady
 from mdr_dask.physics.surfaces import roughness, waves
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
+from mdr_dask.store import files
 
 HEAVY = {"dask", "distributed", "matplotlib", "numba", "pandas", "pint", "scipy", "xarray", "zarr"}
 STORE = HEAVY - {"pandas", "xarray", "zarr"}  # what a reader of stores has no need of
@@ -103,6 +106,22 @@ def test_a_block_is_one_task_and_one_file_of_every_array(toy, url):
     assert sum(files.values()) <= 40
     assert run(study, url, Resources(), lambda _: None).blocks == 0
     assert len(toy.COMPUTED) == 36
+
+
+def test_a_round_writes_what_changes_and_reads_no_block(toy, url, monkeypatch):
+    """Two rounds of which the second needs some cases alone: new blocks, longer arrays, and no coordinate but one."""
+    written, read, give_name, read_block = [], [], files.give_name, store.read_block
+    monkeypatch.setattr(files, "give_name", lambda *paths: written.append(paths[1]) or give_name(*paths))
+    monkeypatch.setattr(store, "read_block", lambda *given: read.append(given) or read_block(*given))
+    tolerance = {"height": Tolerance(absolute=1.0)}
+    study = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 20, tolerance))
+    run(study, url, Resources(threads=1), lambda _: None)
+    assert 20 < len(toy.COMPUTED) < 40
+    assert not read
+    layout = Counter(path.relative_to(url).as_posix() for path in written if "/c/" not in str(path))
+    coordinates = {name for name, count in layout.items() if name.endswith("/zarr.json") and count > 1}
+    assert coordinates == {"height/zarr.json", "status/zarr.json", "realisation/zarr.json"}
+    assert Counter(path.relative_to(url).parts[0] for path in written if "/c/" in str(path))["position"] == 1
 
 
 @pytest.fixture

@@ -126,6 +126,7 @@ parameters:
   rotation_speed: {geometric: [1 rpm, 30 rpm, 4]}
   temperature: HEAT
   rms_roughness: 0.2 um
+  shortest_wavelength: 3.14 um
   SETTING
 outputs: [breakthrough_probability]
 REST
@@ -134,19 +135,19 @@ REST
     {"easy: 80 C": {"HEAT": "80 degC"}, "typical: 60 C": {"HEAT": "60 degC"}, "hard: 40 C": {"HEAT": "40 degC"}},
     {
         (f"{points} points", f"{lines} lines"): (f"points: {points}", f"realisations: {lines}\n")
-        for points in (10_000, 100_000, 1_000_000)
-        for lines in (4, 16)
+        for points in (250_000, 500_000, 1_000_000)
+        for lines in (4, 10, 16)
     },
     {
         a: (
-            "",
-            "realisations: {at_least: 4, at_most: 64, until: {breakthrough_probability: "
+            f"points: {points}",
+            "realisations: {at_least: 10, at_most: 60, until: {breakthrough_probability: "
             f"{{relative: {a:g}, absolute: {a / 4:g}}}}}}}\n",
         )
-        for a in (0.1, 0.05, 0.02)
+        for a, points in {0.1: 250_000, 0.05: 500_000, 0.02: 500_000}.items()
     },
-    ("", "realisations: 64\n"),
-    (("points: 20000", "realisations: 4\n"), ("points: 20000", "realisations: 8\n")),
+    ("points: 3000000", "realisations: 40\nerrors: false\n"),
+    (("points: 220000", "realisations: 4\n"), ("points: 220000", "realisations: 8\n")),
     2,
 )
 FILMS = Study(
@@ -157,10 +158,10 @@ parameters:
   load_parameter: LOAD
   speed_parameter: {geometric: [1e-12, 1e-10, 3]}
   material_parameter: [2504, 5007, 10014]
-outputs: [central_film]
+outputs: [minimum_film]
 REST
 """,
-    "central_film",
+    "minimum_film",
     {"easy: light": {"LOAD": "2e-5"}, "typical": {"LOAD": "1e-4"}, "hard: heavy": {"LOAD": "5e-4"}},
     {},
     {a: ("", f"accuracy: {a:g}\n") for a in (0.1, 0.01, 1e-3, 3e-4)},

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 
 from benchmarks.accuracy import campaigns, contact, sliding, surfaces
-from benchmarks.accuracy.points import Point, write
+from benchmarks.accuracy.points import Point, gathered, write
 
 SOLVERS: dict[str, Callable[[bool], Iterator[Point]]] = {
     "friction": sliding.kelvin,
@@ -33,7 +33,7 @@ def main(*names: str) -> None:
     if unknown:
         sys.exit(f"no solver {', '.join(sorted(unknown))}; known: {', '.join(SOLVERS)}")
     for name in names or SOLVERS:
-        points = list(SOLVERS[name](False))
+        points = gathered(SOLVERS[name](False))
         write(points)
         print(f"{name}: {len(points)} points", flush=True)
 

@@ -47,6 +47,25 @@ def write(points: Iterable[Point], path: Path = FILE) -> None:
             writer.writerow([*point[:4], *(f"{number:.3e}" for number in point[4:])])
 
 
+def gathered(points: Iterable[Point], share: float = 0.9) -> list[Point]:
+    """Return a point for the like cases of every setting, so that none counts as good because it is right by chance.
+
+    Its time is their mean, its error the one that a `share` of them stay within, its stated error that times the median
+    of stated over error.
+    """
+    groups: dict[tuple[str, ...], list[Point]] = {}
+    for point in points:
+        groups.setdefault(point[:4], []).append(point)
+    found = []
+    for key, like in groups.items():
+        seconds, errors, stated = (np.array([point[place] for point in like]) for place in (4, 5, 6))
+        error = float(np.quantile(errors, share, method="lower")) if np.all(np.isfinite(errors)) else np.nan
+        known = np.isfinite(stated)
+        over = float(np.median(stated[known] / errors[known])) if np.any(known) else np.nan
+        found.append(Point(*key, float(np.mean(seconds)), error, error * over, like[0].covered))
+    return found
+
+
 def cheapest(points: Iterable[Point], error: float) -> float:
     """Return the least time of a setting whose error is at most so large; NaN if none is."""
     return min((point.seconds for point in points if point.error <= error), default=np.nan)

@@ -61,7 +61,7 @@ def rough(hurst: float, realisation: int = 1):
 
 
 def ladder(
-    line, arms, deborah: float, truth, grids, scheme="hermite", repeats=3
+    line, arms, deborah: float, truth, grids, scheme="hermite", repeats=15
 ) -> Iterator[tuple[str, float, float, float]]:
     """Yield setting, processor time, error of the friction and its stated error, for every grid."""
     case = np.array([deborah]), np.array([truth.load])

@@ -180,8 +180,9 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     if not is_free:
         for level, alpha in ((0.95, 0.2), (0.6827, 0.35)):
             low, high = determined.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
-            inside = (centres >= low) & (centres <= high)
-            axes.fill_between(x[inside], height[inside], color=colour, alpha=alpha, linewidth=0, gid=style.LAW)
+            inside, shaded = between(centres, height, low, high)
+            inside = np.exp(inside) if geometric else inside
+            axes.fill_between(inside, shaded, color=colour, alpha=alpha, linewidth=0, gid=style.LAW)
     axes.set_ylim(0, 1.1)
     axes.set_yticks([])
     axes.set_xlabel(style.broken(label, 44))
@@ -189,6 +190,12 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
         style.logarithmic(axes, "x")
     if is_free:
         axes.set_title("not determined", fontsize="small")
+
+
+def between(x: FloatArray, y: FloatArray, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+    """Return the part of a curve between two ends, which lie on it."""
+    inside = np.concatenate([[low], x[(x > low) & (x < high)], [high]])
+    return inside, np.interp(inside, x, y)
 
 
 def _of_whole_cells(ends: FloatArray, across: FloatArray, place: FloatArray, width: float) -> FloatArray:

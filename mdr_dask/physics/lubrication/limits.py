@@ -32,7 +32,7 @@ class Trust(NamedTuple):
     highest_order: float = 2.6
     third: float = 1.5
     floor: float = 0.03
-    moved: float = 0.7
+    moved: float = 0.6
     slowest: float = 1.2
 
 

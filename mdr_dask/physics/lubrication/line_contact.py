@@ -63,6 +63,8 @@ class Settings(NamedTuple):
     nodes : tuple of int
         Nodes of the grids that are compared: three, then the next one or the one after it, whichever is expected to
         meet the accuracy. The last is a cap: its dense equations take some 30 ms a step.
+    laid_again : float
+        Greatest distance of a film's end from the nearest node, in cells, with which a grid is kept as it is.
     cut : float
         Added to the least share of an error that is trusted, :class:`Trust`, for a film that ends a whole cell from the
         nearest node: where in its cell it ends makes the minimum film scatter.
@@ -83,7 +85,8 @@ class Settings(NamedTuple):
     adapted_nodes: int = 121
     adaptations: int = 2
     nodes: tuple[int, ...] = (41, 81, 161, 227, 321, 454, 641, 906, 1281)
-    cut: float = 0.3
+    laid_again: float = 0.2
+    cut: float = 0.2
     viscous: float = 0.003
     spiked: float = 0.1
 
@@ -287,12 +290,24 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
 def _refined(
     case: LineContact, state: GridSolution, source: GridSolution, count: int, paces: tuple[Pace, ...]
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`."""
+    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`.
+
+    A grid finer than the source whose film ends too far from a node is laid once more, from its own end.
+    """
     density = grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
-    finer = state if state.nodes.size > source.nodes.size else source
-    nodes, spacing = grids.aligned(source.nodes, density, count, finer.rupture)
-    guess = np.interp(nodes, state.nodes, state.pressure)
-    return _solve_on(case, nodes, guess, state.central, paces, spacing)
+
+    def solved(state: GridSolution) -> tuple[Outcome, GridSolution]:
+        end = max(source, state, key=lambda grid: grid.nodes.size).rupture
+        nodes, spacing = grids.aligned(source.nodes, density, count, end)
+        guess = np.interp(nodes, state.nodes, state.pressure)
+        return _solve_on(case, nodes, guess, state.central, paces, spacing)
+
+    outcome, found = solved(state)
+    if outcome == Outcome.CONVERGED and found.nodes.size > source.nodes.size and found.cut > SETTINGS.laid_again:
+        again, better = solved(found)
+        if again == Outcome.CONVERGED:
+            return again, better._replace(steps=found.steps + better.steps)
+    return outcome, found
 
 
 def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:

@@ -341,7 +341,8 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
-        if outcome == Outcome.CONVERGED and np.array_equal(active, solved):
+        # a first step may be small by chance; from then on steps shrink like squares
+        if steps > 1 and outcome == Outcome.CONVERGED and np.array_equal(active, solved):
             return Iterate(Outcome.CONVERGED, steps, P, central, H)
         if steps == pace.most:
             break

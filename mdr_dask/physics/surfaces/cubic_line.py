@@ -240,8 +240,8 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, fl
         enter, leave, place = slope[i] / n, slope[following] / n, 0.0
         if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = min(max(-enter / (b - np.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
-            b, c = b * place * place, c * place**3
+            place = min(max(-enter / (b - math.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            b, c = b * place * place, c * (place * place * place)
         else:
             b, c = 0.0, 0.0
         peak = height[i] + place * enter + b + c
