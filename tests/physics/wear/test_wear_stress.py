@@ -34,7 +34,7 @@ def test_closed_forms(exponent, c, cycles, xi):
 
 
 @settings(max_examples=12, deadline=None)
-@given(EXPONENTS, STICKS, CYCLES)
+@given(EXPONENTS, st.floats(0.001, 0.999), st.floats(-4.0, 4.0).map(lambda power: 10.0**power))
 @example(20.0, 0.999, 1e4)
 @example(0.3, 0.001, 1e4)
 @example(20.0, 0.001, 3.0)
@@ -42,7 +42,6 @@ def test_closed_forms(exponent, c, cycles, xi):
 @example(2.0, 0.001, 1e4)
 @example(1.0, 0.999, 1e-4)
 @example(20.0, 1 - 1e-6, 1e4)
-@example(0.3, 1e-6, 1e-6)
 def test_exact_evolution(exponent, c, cycles):
     """Volume and energy agree to the tolerance, f stays between the virgin body and the limit, a below a(c)."""
     profile = PowerProfile(exponent)
