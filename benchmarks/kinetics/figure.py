@@ -19,7 +19,7 @@ from mdr_dask.fits.relaxation import exponential, point_weights, widths
 from mdr_dask.physics.sliding.backward_euler import steady_by_steps
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
-from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
+from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jump
 
 POINTS, HURST, LOAD, DEBORAH, CHANGE = 5000, 0.7, 0.3, 0.005, 0.2
 LAW = (DEBORAH * np.pi * POINTS) ** (1 - HURST)
@@ -133,8 +133,8 @@ def graded(amplitude: np.ndarray, phase: np.ndarray, times: np.ndarray) -> np.nd
     """Return mu - mu_2 of the march."""
     nodes = 4 * POINTS
     line = roughness.line(amplitude, phase, nodes), roughness.line(amplitude, phase, nodes, 1)
-    course = Course(times, np.pi * POINTS, 12)
-    jump = velocity_jump(periodic_line(*line), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), course)
+    asked = Transient(times, np.pi * POINTS, 12)
+    jump = velocity_jump(periodic_line(*line), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), asked)
     trace: np.ndarray = (jump.trace - jump.after) / LOAD
     return trace
 

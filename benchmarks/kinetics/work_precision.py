@@ -19,7 +19,7 @@ from benchmarks.measures import draw_errors, print_table, timed
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.steps import Schedule
-from mdr_dask.physics.transients.velocity_jump import Course, velocity_jump
+from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jump
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.followed_kelvin import follow_kelvin
@@ -37,8 +37,8 @@ def line(oversampling: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def march(oversampling: int, per_decade: float) -> np.ndarray:
-    course = Course(TIMES, np.pi * POINTS, per_decade)
-    found = velocity_jump(periodic_line(*line(oversampling)), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), course)
+    asked = Transient(TIMES, np.pi * POINTS, per_decade)
+    found = velocity_jump(periodic_line(*line(oversampling)), LOAD, (DEBORAH, DEBORAH * (1 + CHANGE)), asked)
     return (found.trace - found.after) / found.after
 
 

@@ -30,7 +30,7 @@ from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, Jumps, solve_jumps
 from mdr_dask.physics.transients.elements.foundation import foundation
 from mdr_dask.physics.transients.elements.loading_history import Trace, trace
-from mdr_dask.physics.transients.velocity_jump import Course
+from mdr_dask.physics.transients.velocity_jump import Transient
 
 ACCURACY = 0.01  # of the ends, where the campaign does not say
 SECONDS_NODE, SECONDS_MOMENT = 5e-8, 2.7e-9  # for every node of a line, and of a moment
@@ -166,15 +166,15 @@ class _Marched(_Group):
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the different cases together."""
         loads, deborah, which = self._different()
-        transient = any(name in self.outputs for name in TRANSIENT)
+        is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
-        course = Course(times, wavenumber, self.steps, self.block.accuracy or 0.0) if transient else None
+        transient = Transient(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
         with_errors = any(f"{name}_error" in self.block.outputs for name in LEVELS)
         aim = JumpAim(
             {LEVELS[name] for name in self.outputs},
             self.block.accuracy or (ACCURACY if with_errors else None),
             self.oversampling,
-            course,
+            transient,
             any(f"{name}_error" in self.block.outputs for name in TRANSIENT),
         )
         jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), aim)
@@ -214,8 +214,8 @@ class _Followed(_Group):
         fine, coarse = (self._trace(waves, every) for every in (1, 2))
         outcome = fine.outcome if fine.outcome != Outcome.CONVERGED else coarse.outcome
         levels = [np.array([t.before, t.at - t.before, t.after]) for t in (fine, coarse)]
-        courses = [np.concatenate([[t.before, t.at], t.friction]) for t in (fine, coarse)]
-        error = float(np.max(np.abs(courses[0] - courses[1])))
+        frictions = [np.concatenate([[t.before, t.at], t.friction]) for t in (fine, coarse)]
+        error = float(np.max(np.abs(frictions[0] - frictions[1])))
         sinking = np.max(np.abs(fine.depth - coarse.depth))
         names = list(LEVELS)
         values = {name: level[None] for name, level in zip(names, levels[0], strict=False)}
@@ -234,15 +234,15 @@ class _Followed(_Group):
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
         static = solid.static_modulus
-        before, course = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+        before, history = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
         velocity, force = length / unit, 4 * static * length * height
-        course = [piece.scaled(unit, velocity, force) for piece in course]
+        history = [piece.scaled(unit, velocity, force) for piece in history]
         nodes = waves.points * self.oversampling
         heights, slopes = waves.heights(nodes)[::every], waves.slopes(nodes)[::every]
         line = without_kinks(RoughLine(waves, self.setting.body).through(heights, slopes))
         elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
         times = np.array(case.relaxation_times)
-        return trace(line, elements, before / velocity, course, times, self.steps / every)
+        return trace(line, elements, before / velocity, history, times, self.steps / every)
 
 
 def _check_rough(roughness: Roughness) -> None:

@@ -17,7 +17,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
-from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jumps
+from mdr_dask.physics.transients.velocity_jump import EVERY, Jump, Transient, retraced, velocity_jumps
 
 
 class Settings(NamedTuple):
@@ -97,7 +97,7 @@ class JumpAim(NamedTuple):
         must do.
     oversampling : int
         Even number of nodes for every Nyquist point that the march takes, and the ends at least.
-    course : Course or None
+    transient : Transient or None
         Of the transient, with the error allowed for it; None if it is not wanted.
     with_errors : bool
         Whether the error of the transient is wanted, which takes an accuracy.
@@ -106,7 +106,7 @@ class JumpAim(NamedTuple):
     levels: Collection[str]
     accuracy: float | None
     oversampling: int
-    course: Course | None
+    transient: Transient | None
     with_errors: bool
 
 
@@ -157,20 +157,20 @@ def solve_jumps(problem: JumpProblem, aim: JumpAim) -> Jumps:
     levels, errors = Levels.of(fine), Levels(*np.full((4, problem.loads.size), np.nan))
     if near is not None:
         levels, errors = _refined(problem, aim, near, fine)
-    shape = problem.loads.size, aim.course.times.size if aim.course else 0
+    shape = problem.loads.size, aim.transient.times.size if aim.transient else 0
     trace, depth, trace_error, depth_error = (np.full(shape, np.nan) for _ in range(4))
     jumps = Jumps(levels, errors, trace, depth, trace_error, depth_error, fine.outcome.copy())
-    if aim.course is None:
+    if aim.transient is None:
         return jumps
-    marched = velocity_jumps(whole, problem.loads, problem.deborah, fine, aim.course)
+    marched = velocity_jumps(whole, problem.loads, problem.deborah, fine, aim.transient)
     for k, jump in enumerate(marched):
         jumps.outcome[k] = jump.outcome
         jumps.trace[k] = levels.after[k] + (jump.trace - jump.after)
         jumps.depth[k] = levels.depth[k] + (jump.depth - fine.depth[k, 1])
     if aim.with_errors and near is not None:
-        paths = retraced(half, problem.loads, problem.deborah, near, marched, aim.course)
+        paths = retraced(half, problem.loads, problem.deborah, near, marched, aim.transient)
         for k, (jump, path) in enumerate(zip(marched, paths, strict=True)):
-            change, sinking = SETTINGS.of_transient * _changes(jump, path, (fine, near), k, aim.course.times)
+            change, sinking = SETTINGS.of_transient * _changes(jump, path, (fine, near), k, aim.transient.times)
             jumps.trace_error[k], jumps.depth_error[k] = change + errors.after[k], sinking + errors.depth[k]
     return jumps
 

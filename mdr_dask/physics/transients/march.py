@@ -218,7 +218,7 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     marching, work
         As in `march_depth`.
     depths : array, shape (moments,)
-        Depths on another grid, from whose course those found depart slowly.
+        Depths on another grid; those found depart from them slowly.
     found : Trajectory
         Its times and places are given; written from the second entry on.
 

@@ -69,7 +69,7 @@ FINE_STEPS = 24.0  # steps per decade of which the settings speak
 EVERY = 2  # of the moments of a path that are marched on another grid
 
 
-class Course(NamedTuple):
+class Transient(NamedTuple):
     """What is asked of a march.
 
     Parameters
@@ -122,26 +122,26 @@ class Jump(NamedTuple):
         return int(self.path.shape[1])
 
 
-def pace_after(course: Course, deborah: float, change: float, load: float) -> Stepping:
+def pace_after(asked: Transient, deborah: float, change: float, load: float) -> Stepping:
     """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio.
 
     Parameters
     ----------
-    course : Course
+    asked : Transient
     deborah : float
         v_2 tau / L.
     change, load : float
         Difference of the depths before and after, and F_N / (4 G L), in the same unit.
     """
-    finer = FINE_STEPS / course.per_decade
-    first = SETTINGS.first_step * finer * min(1.0, 1 / (course.wavenumber * deborah))
+    finer = FINE_STEPS / asked.per_decade
+    first = SETTINGS.first_step * finer * min(1.0, 1 / (asked.wavenumber * deborah))
     scale = max(abs(change), SETTINGS.negligible * load)
-    close = SETTINGS.newton * min(1.0, (8 / course.per_decade) ** 2)
-    last = float(course.times[-1])
-    return Stepping(first, 10 ** (1 / course.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
+    close = SETTINGS.newton * min(1.0, (8 / asked.per_decade) ** 2)
+    last = float(asked.times[-1])
+    return Stepping(first, 10 ** (1 / asked.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
 
 
-def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], course: Course) -> Jump:
+def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], asked: Transient) -> Jump:
     """Return the friction of a Kelvin foundation on a periodic line through a jump of the velocity at constant load.
 
     The start is steady sliding at v_1; then the depth is marched by backward differentiation of order three over the
@@ -155,10 +155,10 @@ def velocity_jump(line: CubicLine, load: float, deborah: tuple[float, float], co
         F_N / (4 G L), in the unit of height.
     deborah : tuple of float
         v_1 tau / L and v_2 tau / L.
-    course : Course
+    asked : Transient
     """
     prepared, loads, numbers = PreparedLine.of(line), np.array([load]), np.array([deborah])
-    return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), course)[0]
+    return velocity_jumps(prepared, loads, numbers, ends_on(prepared, loads, numbers), asked)[0]
 
 
 def velocity_jumps(
@@ -166,7 +166,7 @@ def velocity_jumps(
     loads: FloatArray,
     deborah: FloatArray,
     ends: Ends,
-    course: Course,
+    asked: Transient,
 ) -> list[Jump]:
     """Return the jumps of many cases on one line, of which none depends on the others.
 
@@ -176,26 +176,26 @@ def velocity_jumps(
         As in :func:`~mdr_dask.physics.transients.ends.ends_on`.
     ends : Ends
         Of the same line.
-    course : Course
+    asked : Transient
         What is asked of the march.
     """
     jumps = []
     for k in range(loads.size):
         if ends.outcome[k] != Outcome.CONVERGED:
-            jumps.append(_failed(course.times, Outcome(ends.outcome[k])))
+            jumps.append(_failed(asked.times, Outcome(ends.outcome[k])))
         else:
-            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, course).solve())
+            jumps.append(_Relaxation.of(line, loads[k], deborah[k], ends, k, asked).solve())
     return jumps
 
 
 def retraced(
-    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump], course: Course
+    line: PreparedLine, loads: FloatArray, deborah: FloatArray, ends: Ends, jumps: list[Jump], asked: Transient
 ) -> list[FloatArray]:
     """Return the paths of jumps on another grid at every second of their moments, with NaN where none is found.
 
     Parameters
     ----------
-    line, loads, deborah, ends, course
+    line, loads, deborah, ends, asked
         As in :func:`velocity_jumps`, on the other grid.
     jumps : list of Jump
         The same cases, whose paths are followed.
@@ -205,7 +205,7 @@ def retraced(
         path = jump.path[:, ::EVERY].copy()
         path[1:] = np.nan
         if jump.outcome == Outcome.CONVERGED == ends.outcome[k] and jump.moments:
-            path = _Relaxation.of(line, loads[k], deborah[k], ends, k, course).retrace(jump.path[:, ::EVERY])
+            path = _Relaxation.of(line, loads[k], deborah[k], ends, k, asked).retrace(jump.path[:, ::EVERY])
         paths.append(path)
     return paths
 
@@ -229,12 +229,12 @@ class _Relaxation(NamedTuple):
     depth: FloatArray
     first: Patches
     is_full: bool
-    course: Course
+    asked: Transient
     pace: Stepping
 
     @classmethod
     def of(
-        cls, line: PreparedLine, load: float, deborah: FloatArray, ends: Ends, k: int, course: Course
+        cls, line: PreparedLine, load: float, deborah: FloatArray, ends: Ends, k: int, asked: Transient
     ) -> _Relaxation:
         """Take the k-th case of some ends."""
         n, depth = line.track.cells, ends.depth[k]
@@ -250,13 +250,13 @@ class _Relaxation(NamedTuple):
             depth + line.cells.top,
             ends.first[k],
             bool(np.all(ends.contact[k] >= WHOLE)),
-            course,
-            pace_after(course, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
+            asked,
+            pace_after(asked, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
         )
 
     def solve(self) -> Jump:
         """March from end to end, within limits of the depth that may widen."""
-        times, constant = self.course.times, np.ones(self.course.times.size)
+        times, constant = self.asked.times, np.ones(self.asked.times.size)
         jump = Jump(
             self.before,
             self.at,
@@ -269,8 +269,8 @@ class _Relaxation(NamedTuple):
         )
         if self.is_full:  # then u = d + h, d is constant and nothing relaxes
             return jump
-        transient = self.transient() if self.course.accuracy > 0 else np.inf
-        if transient <= self.course.accuracy * self.after:
+        transient = self.transient() if self.asked.accuracy > 0 else np.inf
+        if transient <= self.asked.accuracy * self.after:
             trace = np.where(times > 0, self.after, self.at)
             sinking = np.where(times > 0, self.depth[1], self.depth[0]) - self.line.cells.top
             return jump._replace(trace=trace, depth=sinking, left_out=transient)
@@ -300,8 +300,8 @@ class _Relaxation(NamedTuple):
 
     def march(self, jump: Jump, limits: tuple[float, float], transient: float) -> Jump | None:
         """Return the jump with what a march between two depths finds, or None if it leaves them."""
-        accuracy, course = self.course.accuracy, self.course
-        equilibrium = SETTINGS.equilibrium * (FINE_STEPS / course.per_decade) ** 3
+        accuracy, asked = self.asked.accuracy, self.asked
+        equilibrium = SETTINGS.equilibrium * (FINE_STEPS / asked.per_decade) ** 3
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
         close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
         marching, found, work = self.begun(limits, SETTINGS.moments)
@@ -314,10 +314,10 @@ class _Relaxation(NamedTuple):
         near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
-            return _failed(course.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
+            return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
         ends = np.array([self.after, self.depth[1]])
         path = np.stack([time, drag, depth])
-        trace, sinking = _at_times(time, path[1:], course.times, ends)
+        trace, sinking = _at_times(time, path[1:], asked.times, ends)
         path[2] -= self.line.cells.top
         return jump._replace(trace=trace, depth=sinking - self.line.cells.top, path=path)
 

@@ -10,7 +10,7 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
-from mdr_dask.physics.transients.velocity_jump import EVERY, Course, Jump, retraced, velocity_jump, velocity_jumps
+from mdr_dask.physics.transients.velocity_jump import EVERY, Jump, Transient, retraced, velocity_jump, velocity_jumps
 
 POINTS, OVERSAMPLING = 100, 8
 DEBORAH, LOAD = 0.1, 0.3
@@ -36,7 +36,9 @@ def solved(
     accuracy: float = 0.0,
     wavenumber: float = WAVENUMBER,
 ) -> Jump:
-    return velocity_jump(periodic_line(height, slope), load, deborah, Course(times, wavenumber, per_decade, accuracy))
+    return velocity_jump(
+        periodic_line(height, slope), load, deborah, Transient(times, wavenumber, per_decade, accuracy)
+    )
 
 
 def jump(change: float = 0.2, per_decade: float = 24, load: float = LOAD, oversampling: int = OVERSAMPLING) -> Jump:
@@ -246,11 +248,11 @@ def test_a_path_is_retraced_at_every_second_moment(deborah: float) -> None:
     loads, deborah, apart = np.array([LOAD]), np.array([[deborah, 1.2 * deborah]]), []
     grids = [PreparedLine.of(periodic_line(*line(oversampling=nodes))) for nodes in (8, 4)]
     ends = [ends_on(grid, loads, deborah) for grid in grids]
-    course = Course(TIMES, WAVENUMBER, 12)
-    jumps = velocity_jumps(grids[0], loads, deborah, ends[0], course)
+    asked = Transient(TIMES, WAVENUMBER, 12)
+    jumps = velocity_jumps(grids[0], loads, deborah, ends[0], asked)
     path = jumps[0].path[:, ::EVERY]
     for grid, known in zip(grids, ends, strict=True):
-        other = retraced(grid, loads, deborah, known, jumps, course)[0]
+        other = retraced(grid, loads, deborah, known, jumps, asked)[0]
         assert np.array_equal(other[0], path[0])
         assert other[1, 0] == known.at[0]
         apart.append(np.abs((other[1] - known.after[0]) - (path[1] - ends[0].after[0])).max())
@@ -263,9 +265,9 @@ def test_a_path_without_a_solution_on_the_other_grid_is_unknown() -> None:
     loads, deborah = np.array([LOAD]), np.array([[DEBORAH, 1.2 * DEBORAH]])
     grid = PreparedLine.of(periodic_line(*line()))
     ends = ends_on(grid, loads, deborah)
-    course = Course(TIMES, WAVENUMBER, 8)
-    jumps = velocity_jumps(grid, loads, deborah, ends, course)
+    asked = Transient(TIMES, WAVENUMBER, 8)
+    jumps = velocity_jumps(grid, loads, deborah, ends, asked)
     nowhere = ends._replace(outcome=np.array([Outcome.DEPTH_NOT_FOUND], np.int8))
-    path = retraced(grid, loads, deborah, nowhere, jumps, course)[0]
+    path = retraced(grid, loads, deborah, nowhere, jumps, asked)[0]
     assert np.all(np.isnan(path[1:]))
     assert path.shape[1] == -(-jumps[0].moments // EVERY)

@@ -5,7 +5,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
-from mdr_dask.physics.transients.velocity_jump import Course, velocity_jumps
+from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
 
 POINTS = 500
 TIMES = np.geomspace(1e-3, 20, 30)
@@ -22,7 +22,7 @@ def test_extremes_come_to_rest(hurst: float) -> None:
     load, deborah, change = (axis.ravel() for axis in np.meshgrid(LOADS, DEBORAHS, CHANGES))
     both = np.column_stack([deborah, deborah * (1 + change)])
     line = PreparedLine.of(line)
-    jumps = velocity_jumps(line, load, both, ends_on(line, load, both), Course(TIMES, np.pi * POINTS, 8))
+    jumps = velocity_jumps(line, load, both, ends_on(line, load, both), Transient(TIMES, np.pi * POINTS, 8))
     failed = sum(jump.outcome != Outcome.CONVERGED for jump in jumps)
     assert failed <= 0.02 * load.size  # single asperities that come and go at the lowest velocity
     for jump in jumps:
