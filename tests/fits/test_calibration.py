@@ -279,3 +279,12 @@ def test_parts_of_a_marginal_hold_as_many_cells_each():
         whole = (edges[:-1] > across[0] - cell) & (edges[1:] < across[-1] + cell)
         assert np.ptp(counts[whole]) == 0
         assert len(counts) <= PARTS + 2
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_error_of_measurement_is_told_where_it_was_not_given(given):
+    found = summary(calibrate(study(), table(np.random.default_rng(8), points=40, given=given)))
+    told = {name for name in found if "measurement_error" in str(name)}
+    assert len(told) == (not given)
+    if not given:  # equal shares were planted; forty residuals tell their size to an eighth
+        assert found["relative_measurement_error"].item() == pytest.approx(0.03, rel=0.35)

@@ -5,6 +5,7 @@ import xarray as xr
 from mdr_dask.errors import FitError
 from mdr_dask.fits import available
 from mdr_dask.fits.jumps import jump_law
+from mdr_dask.fits.kinetics import relaxation_curves
 from mdr_dask.fits.relaxation import exponential, widths
 
 FIT = available("velocity_jump")
@@ -186,3 +187,17 @@ def test_exponential_outside_its_first_grid() -> None:
     rate, amplitude, left = exponential(time, 3 * np.exp(-5 * time)[None], widths(time))
     assert (rate[0], amplitude[0]) == (pytest.approx(5, rel=1e-6), pytest.approx(3, rel=1e-6))
     assert left[0] < 1e-12
+
+
+def test_curves_of_a_relaxation_are_those_of_its_constants():
+    """What a figure draws of a stretched decay: each law by its formula, and two exponentials nearer than one."""
+    data = store(np.array([0.05]), 0.7, 0.3, shape=0.5)
+    found = relaxation_curves(data)
+    relaxing = ((data["friction_coefficient"] - data["friction_coefficient_after"]) / SLOPE).mean("realisation")[0]
+    inside = (found["t"] > TIMES[0]) & (found["t"] < found["window"])
+    planted = np.interp(found["t"][inside], TIMES, relaxing)
+    left = {name: np.abs(found[name][inside] - planted).max() for name in ("one", "two")}
+    assert left["two"] < 0.5 * left["one"]
+    rate = -np.polyfit(found["t"], np.log(found["one"]), 1)[0]
+    assert rate == pytest.approx(found["rate"].item())
+    assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))

@@ -75,3 +75,8 @@ def test_error_map_finds_the_better_xi():
 def test_a_study_that_holds_too_little(draw):
     with pytest.raises(DataError, match="series"):
         draw({"": xr.Dataset()})
+
+
+def test_one_number_of_cycles_is_no_growth():
+    with pytest.raises(DataError, match="no series holds wear_volume over cycles or path"):
+        wear.draw_volume({"": study("limit", [2.0])})

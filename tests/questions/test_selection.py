@@ -126,3 +126,10 @@ def test_groups_and_outputs_are_named(study):
     assert list(outputs(errors, ["force"]).data_vars) == ["force", "force_error"]
     with pytest.raises(DataError, match="no output 'forse' in this study"):
         outputs(study, ["forse"])
+
+
+@pytest.mark.parametrize(("wanted", "silently"), [("0.1000005", True), ("0.1004", False)])
+def test_a_number_that_is_none_of_the_axis_is_told(study, wanted, silently):
+    told = []
+    assert select(study, [f"velocity={wanted}"], told.append)["velocity"].values.tolist() == [0.1]
+    assert told == ([] if silently else ["velocity: 0.1004 m/s is no value of this axis, the nearest is 0.1 m/s"])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from mdr_dask.physics.sliding.accuracy import SETTINGS, Ladder, Seen, _sampled_errors
-from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
@@ -41,14 +40,13 @@ def test_light_slow_planes_are_right_to_their_estimates():
 @pytest.mark.parametrize("fraction", [0.01, 0.9])
 def test_grids_that_agree_by_chance_are_trusted_no_more_than_the_nodes_that_tell_allow(fraction):
     """Nothing changed between the first two grids: what is left is chance, 0.3 over the nodes, and the profile."""
-    fractions = np.full(1, fraction)
-    steady = Steady(np.full(1, 0.2), np.full(1, -1.5), fractions, np.full(1, 0.3), np.zeros(1, np.int8))
+    columns, seen = np.array([[0.2], [-1.5], [fraction], [0.3]]), Seen(np.full(1, 50.0), np.full(1, 0.1))
     same = np.zeros((4, 1))
-    errors = _sampled_errors(steady, Seen(np.full(1, 50.0), np.full(1, 0.1)), SETTINGS.sampled, same, same)[:, 0]
+    errors = _sampled_errors(columns, seen, SETTINGS.sampled, same, same)[:, 0]
     drag, depth, contact, slope = errors / [0.2, 1.0, fraction, 0.3]
     touching, apart = 100, min(100, 100 * (1 / fraction - 1))
     np.testing.assert_allclose([drag, contact, slope], 0.3 / np.array([touching, apart, apart]), rtol=0.05)
     assert depth < 1e-5
     # on finer grids it is the change before that tells
-    later = _sampled_errors(steady, Seen(np.full(1, 50.0), np.full(1, 0.1)), 2 * SETTINGS.sampled, same, same)[:, 0]
+    later = _sampled_errors(columns, seen, 2 * SETTINGS.sampled, same, same)[:, 0]
     assert np.all(later / [0.2, 1.0, fraction, 0.3] < 1e-4)
