@@ -55,7 +55,7 @@ def whole(tmp_path_factory):
 
 
 def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_again(folder, slurm, whole):
-    slurm.environment["PAUSE"] = "3"  # longer than SLURM may take to see that the signal is due
+    slurm.environment["PAUSE"] = "5"  # eight of them: longer than SLURM may take to see that the signal is due
     ends = []
     while ends[-1:] != [{"COMPLETED"}] and len(ends) < 12:
         options = [

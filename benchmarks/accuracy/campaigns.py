@@ -166,7 +166,7 @@ REST
     {},
     {a: ("", f"accuracy: {a:g}\n") for a in (0.1, 0.01, 1e-3, 3e-4)},
     ("", "accuracy: 2e-5\n"),
-    (("", "accuracy: 0.01\n"), ("", "accuracy: 1e-3\n")),
+    (("", "accuracy: 0.01\n"), ("", "accuracy: 1e-4\n")),  # three grids alone reach 1e-3
 )
 WEAR = Study(
     """
