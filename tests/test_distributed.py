@@ -3,6 +3,8 @@
 import os
 import platform
 import shutil
+import subprocess
+import sys
 from collections import Counter
 from concurrent import futures
 from dataclasses import replace
@@ -13,7 +15,6 @@ import dask
 import numpy as np
 import psutil
 import pytest
-from distributed import Client
 from test_execute import digests, run, values
 
 from mdr_dask import execute, store, task
@@ -241,19 +242,30 @@ def test_a_worker_that_does_not_see_the_store_is_told_apart_and_relative_paths_a
 
 @pytest.mark.slow
 def test_a_client_without_the_credentials_is_refused_and_no_page_is_served_to_others(toy, url, workers):
-    addresses, pages = [], []
+    addresses, pages, answers = [], [], []
 
     def look(event):
         if event.name == "block begun":
             addresses.append(event.facts["worker"])
             pages.extend(listening_beyond_this_machine())
-            for address in (event.facts["worker"], event.facts["worker"].replace("tls", "tcp")):
-                with pytest.raises((OSError, TypeError, ValueError)):
-                    Client(address, timeout=2, set_as_default=False)
+            answers.extend(answer_to_a_stranger(at) for at in (addresses[-1], addresses[-1].replace("tls", "tcp")))
 
     execute.run(toy.campaign(toy.axis("position", [1.0])), url, workers, lambda _: None, tell=look)
     assert [address[:16] for address in addresses] == ["tls://127.0.0.1:"]
     assert pages == []
+    assert answers == ["refused", "refused"]
+
+
+def answer_to_a_stranger(address: str) -> str:
+    """Return what a client of Dask in a process of its own, without credentials, is told at an address."""
+    lines = [
+        "from distributed import Client",
+        f"try: Client({address!r}, timeout=2)",
+        "except (OSError, TypeError, ValueError): print('refused')",
+        "else: print('let in')",
+    ]
+    command = [sys.executable, "-c", "\n".join(lines)]
+    return subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=120).stdout.strip()
 
 
 def listening_beyond_this_machine() -> list[str]:
