@@ -108,7 +108,7 @@ def beside(url: str, part: Part) -> Iterator[Hold]:
 
 @contextmanager
 def _leaving_nothing(url: str) -> Iterator[None]:
-    """After an error or Ctrl-C where nobody was at work before, take away the files of locks and the folders made for them."""
+    """After an error or Ctrl-C where nobody was at work before, take away locks and the folders made for them."""
     if local(url) is None:
         yield
         return
