@@ -93,6 +93,16 @@ def refused(url, part, meanwhile=lambda: None):
         raise StoreError("no workers")
 
 
+def test_a_run_that_is_interrupted_before_there_is_a_store_leaves_nothing(tmp_path):
+    def waiting_for_workers():
+        with store.alone(str(tmp_path / "results/study.zarr")):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        waiting_for_workers()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_refusal_takes_no_lock_of_others_away(url):
     def meanwhile():
         with pytest.raises(StoreError, match="no workers"):

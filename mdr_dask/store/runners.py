@@ -108,7 +108,7 @@ def beside(url: str, part: Part) -> Iterator[Hold]:
 
 @contextmanager
 def _leaving_nothing(url: str) -> Iterator[None]:
-    """After an error where nobody was at work before, take away the files of locks and the folders made for them."""
+    """After an error or Ctrl-C where nobody was at work before, take away locks and the folders made for them."""
     if local(url) is None:
         yield
         return
@@ -119,7 +119,7 @@ def _leaving_nothing(url: str) -> Iterator[None]:
     missing = [folder for folder in door.parents if not folder.exists()]
     try:
         yield
-    except MdrDaskError:
+    except (MdrDaskError, KeyboardInterrupt):
         if door.exists():
             with suppress(StoreBusyError), entrance(url, GLANCE):
                 names = {"", *lock_names(url)} - {_ENTRANCE}

@@ -63,5 +63,5 @@ MODEL = Model(
             "friction over sqrt 2 times the rms slope",
         ),
     ),
-    compiling=20.0,
+    compiling=10.0,
 )

@@ -105,5 +105,5 @@ MODEL = Model(
         ),
     ),
     notes=frequency_notes,
-    compiling=28.0,
+    compiling=18.0,
 )

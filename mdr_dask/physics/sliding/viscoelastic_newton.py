@@ -154,7 +154,7 @@ def newton_step(
     size = residual.size
     right = rotations[2]
     step[:] = 0.0
-    basis[0] = residual / scale
+    np.divide(residual, scale, basis[0])
     norm = np.sqrt(np.sum(basis[0] ** 2))
     if not norm > 0:
         return

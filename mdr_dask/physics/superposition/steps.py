@@ -166,7 +166,7 @@ def likelihoods(
         low, size = extent(points, ways[place], step)
         part = Normal(whole.band[:size], whole.right[:size], whole.cross[:, :size], whole.border, whole.pull)
         total = assemble(points, Shifts(ways[place], level), nothing, low, step, part)
-        part.border[:] += known
+        np.add(part.border, known, part.border)
         _, explained = eliminate(part, weight)
         freedom = size - weight * _roughness_trace(part.band, near)
         if rises.size > 0:
