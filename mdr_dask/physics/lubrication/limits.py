@@ -18,8 +18,8 @@ class Trust(NamedTuple):
     lowest_order, highest_order : float
         Observed orders of convergence between which values are extrapolated; the scheme is of second order.
     third : float
-        The error of an extrapolated value over what the third order moved it, at an observed order of two; it doubles
-        at one and a half, so that it covers every pure power.
+        The error of an extrapolated value over what the third order moved it, at an observed order of two; two and
+        a half times that at one and a half, so that it covers every pure power.
     floor : float
         Least error over what the second order moved a value.
     moved : float
@@ -30,7 +30,7 @@ class Trust(NamedTuple):
 
     lowest_order: float = 1.5
     highest_order: float = 2.6
-    third: float = 1.5
+    third: float = 1.25
     floor: float = 0.03
     moved: float = 0.6
     slowest: float = 1.2
@@ -98,7 +98,7 @@ def extrapolate(
     of_limit = 1.0 - cubes[1] / squares[1]
     of_earlier = h[1] ** 3 - cubes[0] * h[1] ** 2 / squares[0]
     cube = (earlier - second) * of_limit / (of_earlier - of_limit)
-    third = trust.third * (1 + 2 * np.maximum(2 - order, 0.0))
+    third = trust.third * (1 + 3 * np.maximum(2 - order, 0.0))
     trusted = np.maximum(third * np.abs(cube), least * np.abs(second - fine))
     is_trusted = (order >= trust.lowest_order) & (order <= trust.highest_order)
     to_come = 1 / (h[1] ** np.maximum(np.nan_to_num(shrinks), np.log2(trust.slowest)) - 1)

@@ -64,13 +64,17 @@ class Settings(NamedTuple):
         Nodes of the grids that are compared: three, then the next one or the one after it, whichever is expected to
         meet the accuracy. The last is a cap: its dense equations take some 30 ms a step.
     laid_again : float
-        Greatest distance of a film's end from the nearest node, in cells, with which a grid is kept as it is.
+        Greatest distance of a film's end from the nearest node, in cells, with which a grid is kept as it is, unless
+        it meets the accuracy. Else it is laid once more, from its own end.
     cut : float
         Added to the least share of an error that is trusted, :class:`Trust`, for a film that ends a whole cell from the
         nearest node: where in its cell it ends makes the minimum film scatter.
-    viscous, spiked : float
-        Added to that share for each logarithm of the viscosity at Hertz' pressure, and at most, as the spike grows
-        sharp; at most for readings other than films, which pass it.
+    viscous, sharpest : float
+        Added to that share for each logarithm of the viscosity at Hertz' pressure, and at most: the spike grows sharp.
+    seen : float
+        Part of it that stays where a fourth grid shows what the limit moves by.
+    spiked : float
+        Added to that share for readings other than films, which pass the spike.
     """
 
     attempts: tuple[Attempt, ...] = (
@@ -88,6 +92,8 @@ class Settings(NamedTuple):
     laid_again: float = 0.2
     cut: float = 0.2
     viscous: float = 0.003
+    sharpest: float = 0.2
+    seen: float = 0.3
     spiked: float = 0.1
 
 
@@ -290,24 +296,12 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
 def _refined(
     case: LineContact, state: GridSolution, source: GridSolution, count: int, paces: tuple[Pace, ...]
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`.
-
-    A grid finer than the source whose film ends too far from a node is laid once more, from its own end.
-    """
+    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`."""
     density = grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
-
-    def solved(state: GridSolution) -> tuple[Outcome, GridSolution]:
-        end = max(source, state, key=lambda grid: grid.nodes.size).rupture
-        nodes, spacing = grids.aligned(source.nodes, density, count, end)
-        guess = np.interp(nodes, state.nodes, state.pressure)
-        return _solve_on(case, nodes, guess, state.central, paces, spacing)
-
-    outcome, found = solved(state)
-    if outcome == Outcome.CONVERGED and found.nodes.size > source.nodes.size and found.cut > SETTINGS.laid_again:
-        again, better = solved(found)
-        if again == Outcome.CONVERGED:
-            return again, better._replace(steps=found.steps + better.steps)
-    return outcome, found
+    end = max(source, state, key=lambda grid: grid.nodes.size).rupture
+    nodes, spacing = grids.aligned(source.nodes, density, count, end)
+    guess = np.interp(nodes, state.nodes, state.pressure)
+    return _solve_on(case, nodes, guess, state.central, paces, spacing)
 
 
 def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
@@ -359,24 +353,33 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
             if solved:
                 break  # a grid before the first solution is too coarse for this film
             continue
-        state = finer
         solved.append(finer)
-        if len(solved) < 3:
-            continue
-        found = _solution(case, solved, steps)
-        if found.error <= accuracy:
+        if _error(case, solved) <= accuracy:
             break
-        if len(ladder) > 1 and found.error * (finer.nodes.size / ladder[0]) ** 3 > accuracy:
+        if finer.cut > settings.laid_again and finer.nodes.size > settings.adapted_nodes:
+            outcome, again = _refined(case, finer, source, finer.nodes.size, settings.paces)
+            steps += again.steps
+            if outcome == Outcome.CONVERGED:
+                solved[-1] = again
+        state, error = solved[-1], _error(case, solved)
+        if error <= accuracy:
+            break
+        if len(ladder) > 1 and len(solved) > 2 and error * (state.nodes.size / ladder[0]) ** 3 > accuracy:
             ladder.pop(0)  # the estimate goes like the cube of the spacing
     if len(solved) < 3:
         return _no_solution(case, *failure, steps)
     return _solution(case, solved, steps)
 
 
+def _error(case: LineContact, solved: list[GridSolution]) -> float:
+    """Return the estimated relative error of the worse film, infinite with fewer than three grids."""
+    return _solution(case, solved, 0).error if len(solved) > 2 else np.inf
+
+
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
     viscosity = float(log_viscosities(np.ones(1), case.liquid)[0])
-    scatter = min(SETTINGS.viscous * viscosity, SETTINGS.spiked)
+    scatter = min(SETTINGS.viscous * viscosity, SETTINGS.sharpest) * (1.0 if len(solved) < 4 else SETTINGS.seen)
     central = _tends_to(solved, lambda grid: grid.central_film, scatter)
     minimum = _tends_to(solved, lambda grid: grid.minimum[1], scatter)
     return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
