@@ -122,7 +122,8 @@ def _draw_row(axes: Axes, family: curves.Family, row: _Row, along: str, bars: bo
     if along != "temperature" and style.is_geometric(across):
         style.logarithmic(axes, "x")
     if row.logarithmic and style.is_geometric(drawn):
-        axes.set_ylim(bottom=max(axes.get_ylim()[0], LEAST_PART * np.nanmax(drawn)))
+        least, most = np.nanmin(drawn), np.nanmax(drawn)
+        axes.set_ylim(max(0.5 * least, LEAST_PART * most), 2 * most)
         style.logarithmic(axes, "y")
 
 

@@ -103,6 +103,16 @@ def test_stribeck_has_four_panels_and_a_line_a_load():
     np.testing.assert_allclose(lines_of(figure.axes[0])[0].get_xdata(), np.array([1, 10, 100]) * 30 / np.pi)
 
 
+@pytest.mark.parametrize(("least", "bottom", "cut"), [(1e-3, 5e-4, ""), (1e-9, 1e-7, "values below 1e-07")])
+def test_logarithmic_rows_end_at_their_data(least, bottom, cut):
+    """They ended at a ten-millionth of the largest value, whatever there was to see."""
+    data = dataset({"rotation_speed": [1.0, 10.0, 100.0]}, ["friction_coefficient"])
+    data["friction_coefficient"][...] = np.array([1.0, 0.1, least])[:, None]
+    figure = DRAW["stribeck"]({"": data})
+    assert figure.axes[0].get_ylim() == pytest.approx((bottom, 2.0))
+    assert (cut in left_out(figure)) if cut else (left_out(figure) == "")
+
+
 def test_what_is_left_out_is_named_with_its_series():
     forces, heights = np.arange(1.0, 21.0), [1e-7, 2e-7, 3e-7]
     axes = {"temperature": np.arange(300.0, 309.0), "normal_force": forces, "rms_roughness": heights}

@@ -93,7 +93,7 @@ class Settings(NamedTuple):
     cut: float = 0.2
     viscous: float = 0.003
     sharpest: float = 0.2
-    seen: float = 0.3
+    seen: float = 0.5
     spiked: float = 0.1
 
 
