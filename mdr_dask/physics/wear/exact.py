@@ -28,7 +28,7 @@ from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
 #: At constant depth: accuracy above which solutions are no coarser, and how much wider steps may be from 1e-3 on.
-COARSEST, WIDEST = 1e-2, 3.0
+COARSEST, WIDEST = 1e-2, 2.0
 Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 

@@ -42,7 +42,7 @@ class Settings(NamedTuple):
     """
 
     safety: float = 1.5
-    edges: float = 4.0
+    edges: float = 3.0
     volumes: float = 0.6
     second: float = 0.5
     reach: int = 5
