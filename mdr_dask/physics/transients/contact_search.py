@@ -37,7 +37,7 @@ from mdr_dask.physics.transients.patches import (
     unloading,
 )
 
-CANDIDATES = 8  # places of leaving whose wakes are compared
+CANDIDATES = 64  # most places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 GUARD_CELLS = 200.0  # travelled, until which elements that the jump found free are told apart
