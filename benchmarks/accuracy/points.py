@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 FILE = Path(__file__).parents[2] / "docs/evidence/accuracy-and-speed.csv"
+LIKE = 10  # cases that one setting is judged by, and seeds of a campaign
 
 
 class Point(NamedTuple):
@@ -45,6 +46,14 @@ def write(points: Iterable[Point], path: Path = FILE) -> None:
         writer.writerow(Point._fields)
         for point in [*kept, *points]:
             writer.writerow([*point[:4], *(f"{number:.3e}" for number in point[4:])])
+
+
+def neighbours(short: bool) -> Iterator[tuple[int, float, float]]:
+    """Yield the number of every like case and where it lies: the first at the origin, the others around it."""
+    yield 0, 0.0, 0.0
+    for number in range(1, 1 if short else LIKE):
+        angle = 2 * np.pi * number / (LIKE - 1)
+        yield number, float(np.cos(angle)), float(np.sin(angle))
 
 
 def gathered(points: Iterable[Point], share: float = 0.9) -> list[Point]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy.points import Point
+from benchmarks.accuracy.points import Point, neighbours
 from benchmarks.measures import timed
 from mdr_dask.physics.sliding.problem import Aim, Arms, solve
 from mdr_dask.physics.surfaces import roughness
@@ -77,31 +77,35 @@ def ladder(
 
 
 def kelvin(short: bool) -> Iterator[Point]:
-    """Yield every scheme on finer and finer grids, with its error estimate, and what `accuracy` picks."""
+    """Yield every scheme on finer and finer grids, with its error estimate, and what `accuracy` picks, on ten lines."""
     grids = (2, 8) if short else (1, 2, 4, 8, 16, 32, 64)
-    for case, (hurst, depth, deborah) in CASES.items():
-        line, reference = rough(hurst)
-        truth = exact(reference, depth, slow.Body(np.empty(0), np.empty(0), deborah), True, short)
-        for scheme, name in SCHEMES.items():
-            for found in ladder(line, None, deborah, truth, grids, scheme):
-                yield Point("steady friction", case, name, *found)
-        for found in ladder(line, None, deborah, truth, (0.1, 0.01, 0.001, 1e-4)[: 2 if short else 4]):
-            yield Point("steady friction", case, "accuracy: auto", *found)
+    for case, (hurst, depth, slowest) in CASES.items():
+        for number, higher, faster in neighbours(short):
+            line, reference = rough(hurst, 1 + number)
+            deborah, deep = slowest * 1.5**faster, depth + 0.1 * higher
+            truth = exact(reference, deep, slow.Body(np.empty(0), np.empty(0), deborah), True, short)
+            for scheme, name in SCHEMES.items():
+                for found in ladder(line, None, deborah, truth, grids, scheme):
+                    yield Point("steady friction", case, name, *found)
+            for found in ladder(line, None, deborah, truth, (0.1, 0.01, 0.001, 1e-4)[: 2 if short else 4]):
+                yield Point("steady friction", case, "accuracy: auto", *found)
 
 
 def solids(short: bool) -> Iterator[Point]:
-    """Yield solids of one to fifty arms at the transition."""
+    """Yield solids of one to fifty arms at the transition, on ten lines."""
     hurst, depth, _ = CASES["typical: transition"]
-    line, reference = rough(hurst)
-    for case, arms in SOLIDS.items():
-        if short and len(arms.moduli) > 1:
+    for case, solid in SOLIDS.items():
+        if short and len(solid.moduli) > 1:
             continue
-        body = slow.Body(np.array(arms.moduli), np.array(arms.deborah), 0.0)
-        truth = exact(reference, depth, body, True, short)
-        for found in ladder(line, arms, 0.0, truth, (4, 16) if short else (4, 8, 16, 32, 64)):
-            yield Point("general solids", case, "straight cells, extrapolated", *found)
-        for found in ladder(line, arms, 0.0, truth, (0.05, 0.01, 0.001)[: 1 if short else 3]):
-            yield Point("general solids", case, "accuracy: auto", *found)
+        for number, higher, faster in neighbours(short):
+            line, reference = rough(hurst, 1 + number)
+            arms = Arms(solid.moduli, tuple(1.5**faster * each for each in solid.deborah))
+            body = slow.Body(np.array(arms.moduli), np.array(arms.deborah), 0.0)
+            truth = exact(reference, depth + 0.1 * higher, body, True, short)
+            for found in ladder(line, arms, 0.0, truth, (4, 16) if short else (4, 8, 16, 32, 64)):
+                yield Point("general solids", case, "straight cells, extrapolated", *found)
+            for found in ladder(line, arms, 0.0, truth, (0.05, 0.01, 0.001)[: 1 if short else 3]):
+                yield Point("general solids", case, "accuracy: auto", *found)
 
 
 def indenters(short: bool) -> Iterator[Point]:

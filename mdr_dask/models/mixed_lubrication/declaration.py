@@ -261,7 +261,7 @@ def seconds(block: Block[MixedLubrication]) -> float:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=5,
+    version=6,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,

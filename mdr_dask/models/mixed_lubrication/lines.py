@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
@@ -41,16 +43,38 @@ class _Random:
         """Return the amplitudes of both lines."""
         raise NotImplementedError
 
+    def slope(self, perimeter: float) -> float:
+        """Return the rms slope of both lines together, over their unit of height, around a perimeter in m."""
+        return _slope(self) / perimeter
+
     def lines(self, seed: int, realisation: int) -> tuple[FloatArray, FloatArray]:
         """Return both lines; one stream feeds them in turn, so that a shorter cut-off keeps the longer waves."""
+        from mdr_dask.physics.surfaces.waves import series
+
+        first, second = self._waves(seed, realisation)
+        return series(first, self.points), series(second, self.points)
+
+    def together(self, seed: int, realisation: int) -> FloatArray:
+        """Return the sum of both lines, all that pure rolling asks for."""
+        from mdr_dask.physics.surfaces.waves import series
+
+        return series(np.add(*self._waves(seed, realisation)), self.points)
+
+    def _waves(self, seed: int, realisation: int) -> tuple[NDArray[np.complex128], ...]:
+        """Return the Fourier coefficients of both lines."""
         from mdr_dask.physics.surfaces import roughness
 
-        amplitude_1, amplitude_2 = self.amplitudes(realisation)
-        phase = roughness.phases(seed, realisation, 2 * self.modes).reshape(-1, 2)
-        return (
-            roughness.line(amplitude_1, phase[:, 0], self.points),
-            roughness.line(amplitude_2, phase[:, 1], self.points),
-        )
+        factors = roughness.phase_factors(seed, realisation, 2 * self.modes).reshape(-1, 2)
+        amplitudes = zip(self.amplitudes(realisation), factors.T, strict=True)
+        return tuple(0.5 * amplitude * of_roller for amplitude, of_roller in amplitudes)
+
+
+@lru_cache(maxsize=64)
+def _slope(lines: _Random) -> float:
+    from mdr_dask.physics.surfaces.roughness import spectral_slope
+
+    first, second = (spectral_slope(amplitude) for amplitude in lines.amplitudes(0))
+    return float(np.hypot(first, second))
 
 
 @dataclass(frozen=True)
@@ -138,6 +162,15 @@ class Measured:
         line_1, line_2 = self._pair()
         stream = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,)))
         return line_1, np.roll(line_2, int(np.random.Generator(stream).integers(line_2.size)))
+
+    def slope(self, perimeter: float) -> float:
+        """Return the rms slope of both lines together, over their unit of height."""
+        squares = sum(np.mean(np.diff(line) ** 2) for line in self._pair())
+        return float(np.sqrt(squares)) / self.spacing(perimeter)
+
+    def together(self, seed: int, realisation: int) -> FloatArray:
+        """Return the sum of both lines."""
+        return np.add(*self.lines(seed, realisation))
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
         """Return the lines without mean and tilt, so that their ends nearly meet."""

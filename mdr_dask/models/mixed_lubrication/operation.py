@@ -61,6 +61,11 @@ class Operation:
         return self.film / self.scale
 
     @property
+    def coarseness(self) -> float:
+        """Spacing of the points over the length ``slope/s`` of the pieces, cut off by an edge, that break the layer."""
+        return self.spacing * self.strength / self.source.slope(self.case.perimeter)
+
+    @property
     def rms(self) -> float:
         """Rms height of both lines together in m."""
         return self.scale * self.source.combined_rms()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
-from mdr_dask.models.mixed_lubrication.turn import Turn, creeping, profiles, rolling, trace, turn_values
+from mdr_dask.models.mixed_lubrication.turn import SETTINGS, Turn, creeping, profiles, rolling, trace, turn_values
 from mdr_dask.physics.lubrication.clusters import Excursions, excursions
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
@@ -117,22 +117,25 @@ def _realise(
     position: int,
 ) -> None:
     """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest."""
-    lines = source.lines(block.seed, block.realisations[position])
+    drawn = block.seed, block.realisations[position]
+    lines = cache(partial(source.lines, *drawn))
     above: Excursions | None = None
     for index, operation in members:
-        solve: Callable[..., Turn] = partial(creeping, operation, lines)
+        solve: Callable[..., Turn]
         if operation.case.slide_roll_ratio == 0:
             level = operation.level
-            above = excursions(lines[0] + lines[1], level) if above is None else above.above(level)
+            above = excursions(source.together(*drawn), level) if above is None else above.above(level)
             solve = partial(rolling, operation, above)
+        else:
+            solve = partial(creeping, operation, lines())
         turn = solve()
-        found = turn_values(operation, turn, partial(solve, coarser=2), block.outputs)
+        found = turn_values(operation, turn, partial(solve, coarser=SETTINGS.coarser), block.outputs)
         _store(result, block, index, position, found)
         _note(result, index, position, _missed(block, found, "; raise points"))
         if "contact_length_trace" in block.outputs:
             _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
         if _PROFILES & set(block.outputs):
-            _store(result, block, index, position, profiles(operation, turn, lines))
+            _store(result, block, index, position, profiles(operation, turn, lines()))
 
 
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:

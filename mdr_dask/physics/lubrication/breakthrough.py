@@ -99,10 +99,10 @@ def _add_parts(
 
 
 @kernel
-def _collect(clusters: Clusters, window: int, rule: int, jumps: NDArray[np.int32], trace: NDArray[np.int32]) -> None:
-    """Gather the jumps of the trace cluster by cluster, then sum them up."""
+def _collect(clusters: Clusters, window: int, rule: int, jumps: NDArray[np.int32]) -> None:
+    """Gather the jumps of the trace cluster by cluster, then sum them up in place."""
     limit, overlap = clusters.limit, clusters.overlap
-    points = trace.size
+    points = jumps.size - 1
     offset = 0
     for c in range(clusters.start.size):
         s, n = clusters.start[c], clusters.length[c]
@@ -117,7 +117,7 @@ def _collect(clusters: Clusters, window: int, rule: int, jumps: NDArray[np.int32
     height = 0
     for p in range(points):
         height += jumps[p]
-        trace[p] = height
+        jumps[p] = height
 
 
 def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArray[np.int32]:
@@ -138,10 +138,10 @@ def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArr
         Entry p belongs to the window over points p to p + window - 1. The share of entries above zero is the
         breakthrough probability; their mean times dx is the mean contact length.
     """
-    jumps, trace = np.zeros(clusters.points + 1, dtype=np.int32), np.zeros(clusters.points, dtype=np.int32)
+    trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
-        _collect(clusters, window, EDGE_RULES.index(rule), jumps, trace)
-    return trace
+        _collect(clusters, window, EDGE_RULES.index(rule), trace)
+    return trace[:-1]
 
 
 class Pair(NamedTuple):
@@ -271,12 +271,31 @@ def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tup
 
 
 @compiled
-def occupied(contact_points: NDArray[np.int32] | IntArray) -> tuple[int, int]:
-    """Return the number of windows in contact, and the sum of their points in contact, in one pass."""
-    windows, points = 0, 0
-    for number in contact_points:
-        windows += number > 0
-        points += number
+def _occupied(contact_points: NDArray[np.int32] | IntArray, windows: IntArray, points: IntArray) -> None:
+    """Count windows in contact and their points in contact, part by part."""
+    parts = windows.size
+    for part in range(parts):
+        for k in range(part * contact_points.size // parts, (part + 1) * contact_points.size // parts):
+            windows[part] += contact_points[k] > 0
+            points[part] += contact_points[k]
+
+
+def occupied(contact_points: NDArray[np.int32] | IntArray, parts: int = 1) -> tuple[IntArray, IntArray]:
+    """Return the number of windows in contact, and the sum of their points in contact, of equal parts of a turn.
+
+    Parameters
+    ----------
+    contact_points : int array, shape (positions,)
+        Of the windows, in the order of time.
+    parts : int
+        Part k begins at position ``k positions // parts``.
+
+    Returns
+    -------
+    two int arrays, shape (parts,)
+    """
+    windows, points = np.zeros(parts, dtype=np.int64), np.zeros(parts, dtype=np.int64)
+    _occupied(contact_points, windows, points)
     return windows, points
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 COARSEST, FINEST = 4, 256  # points for every Nyquist point that `auto` begins and ends with for a general solid
+ROUGHLY = 0.01  # accuracy that the coarsest often meets; errors fall with the third power of the points
 CELLS = 4  # the general solver compares grids of every, every second and every fourth node
 CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
 
@@ -92,16 +94,19 @@ def solve(
 
 def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
     """Solve cases of any linear solid one by one, each on the coarsest grid that meets the accuracy."""
-    from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding  # kernels that few studies need
+    from mdr_dask.physics.sliding.viscoelastic import ViscoelasticLadder  # kernels that few studies need
     from mdr_dask.physics.solids import prony
 
     steady, errors = unsolved(loads.size), Errors.unknown(loads.size)
+    finer = max(0, int(np.log2(ROUGHLY / aim.accuracy) / 3))
+    first = min(COARSEST * 2**finer, FINEST) if aim.oversampling == "auto" else aim.oversampling
+    turned = line.from_summit()
+    straight = cache(lambda oversampling: turned.straight(-(-line.points * oversampling // CELLS) * CELLS))
     for k in np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)):
-        solid = prony(1.0, arms.moduli, arms.deborah, deborah[k])
-        oversampling = COARSEST if aim.oversampling == "auto" else aim.oversampling
+        ladder = ViscoelasticLadder(prony(1.0, arms.moduli, arms.deborah, deborah[k]), float(loads[k]))
+        oversampling = first
         while True:
-            nodes = -(-line.points * oversampling // CELLS) * CELLS
-            found = steady_viscoelastic_sliding(line.straight(nodes), solid, float(loads[k]))
+            found = ladder.on(straight(oversampling))
             one = _columns(found.values[:, None], np.array([found.status], np.int8))
             known = Errors(*found.errors[:, None])
             met = np.all(relative(one, known, aim.columns) <= aim.accuracy)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,27 +90,55 @@ def steady_viscoelastic_sliding(line: CubicLine, solid: LinearSolid, load: float
     The line is swept exactly; the result is extrapolated from the same line with every second node. The answer depends
     on nothing but the arguments: the coarsest grid starts from the statics.
     """
-    _check(line, load)
-    cells = line.enter.size
-    heights = line.height[:cells] if line.periodic else line.height
-    top = int(np.argmax(heights))
-    below = heights - heights[top]
-    below = np.append(np.roll(below, -top), 0.0) if line.periodic else below
-    travelling = _Load.of(solid, load, 1 / cells)
-    solutions: list[_Solution] = []
-    for step in reversed(GRIDS):
-        start = solutions[-1].start if solutions else None
-        found = _solve(below[::step], step, travelling, line.periodic, start)
-        if found.status == Outcome.DEPTH_NOT_FOUND and start is not None:
-            found = _solve(below[::step], step, travelling, line.periodic, None)
-        solutions.append(found)
-    mean = float(heights.mean()) if line.periodic else 0.0
-    return _extrapolated(solutions, _Top.of(below, mean - float(heights[top]), line.periodic))
+    return ViscoelasticLadder(solid, load).on(line)
+
+
+class ViscoelasticLadder:
+    """One case on a line of ever finer nodes: each grid is solved once, and the last three tell state and error.
+
+    Parameters
+    ----------
+    solid, load
+        As in :func:`steady_viscoelastic_sliding`.
+    """
+
+    def __init__(self, solid: LinearSolid, load: float) -> None:
+        if not (np.isfinite(load) and load > 0):
+            raise ValueError(f"the load must be positive and finite, got {load!r}")
+        self._solid, self._load = solid, load
+        self._first: tuple[int, int, _Load] | None = None  # cells of the first line, its highest node, the case there
+        self._solutions: tuple[_Solution, ...] = ()
+
+    def on(self, line: CubicLine) -> ViscoelasticSteady:
+        """Return the steady state on a line; on a second one, which has twice its cells, only the finest grid is new.
+
+        A periodic line is followed from the highest node of the first one on, which has to be that of all.
+        """
+        _check(line)
+        cells = line.enter.size
+        heights = line.height[:cells] if line.periodic else line.height
+        if self._first is None:
+            self._first = cells, int(np.argmax(heights)), _Load.of(self._solid, self._load, 1 / cells)
+        coarsest, begins, load = self._first
+        top = begins * cells // coarsest if line.periodic else int(np.argmax(heights))
+        summit = float(heights[top])
+        below = heights - summit
+        below = np.append(np.roll(below, -top), 0.0) if line.periodic else below
+        for step in reversed(GRIDS[: 1 if self._solutions else None]):
+            start = self._solutions[-1].from_summit(summit).start if self._solutions else None
+            args = below[::step], summit, step * coarsest / cells, load, line.periodic
+            found = _solve(*args, start)
+            if found.status == Outcome.DEPTH_NOT_FOUND and start is not None:
+                found = _solve(*args, None)
+            self._solutions = (*self._solutions, found)[-len(GRIDS) :]
+        mean = float(heights.mean()) if line.periodic else 0.0
+        solutions = [each.from_summit(summit) for each in self._solutions]
+        return _extrapolated(solutions, _Top.of(below, mean - summit, line.periodic))
 
 
 @dataclass(frozen=True)
 class _Load:
-    """A cell of the finest grid, the static load in these times height, and the arms as they travel over them."""
+    """A cell of the first line, the static load in these times height, and the arms as they travel over them."""
 
     cell: float
     strain_area: float
@@ -139,10 +167,22 @@ class _Solution:
     imbalance: float
     status: Outcome
     sweeps: int
+    summit: float  # the height that depths are counted from
+
+    def from_summit(self, summit: float) -> _Solution:
+        """Return it with depths from another height."""
+        if summit == self.summit:
+            return self
+        values, start = self.values.copy(), self.start.copy()
+        values[DEPTH] += summit - self.summit
+        start[-1] += summit - self.summit
+        return replace(self, values=values, start=start, summit=summit)
 
 
-def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: FloatArray | None) -> _Solution:
-    """Solve on cells `step` times the finest, from the statics or from the state found on the grid before."""
+def _solve(
+    profile: FloatArray, summit: float, step: float, load: _Load, periodic: bool, start: FloatArray | None
+) -> _Solution:
+    """Solve on cells `step` times those of the first line, from the statics or from the state on the grid before."""
     profile, strain_area = np.ascontiguousarray(profile), load.strain_area / step
     cell = load.cell * step
     if start is None or not np.all(np.isfinite(start)):
@@ -155,12 +195,12 @@ def _solve(profile: FloatArray, step: int, load: _Load, periodic: bool, start: F
         profile, strain_area, periodic, solid, SETTINGS.tolerance, unknown, totals
     )
     imbalance = abs(float(totals[1]) / strain_area - 1)
-    good = converged and imbalance < SETTINGS.balance
+    good = converged and imbalance < SETTINGS.balance and unknown[-1] > 0
     status = Outcome.CONVERGED if good else Outcome.DEPTH_NOT_FOUND
     status = status if inside else Outcome.OUTSIDE_LINE
     slope = np.sqrt(totals[4] / totals[3]) / cell if totals[3] > 0 else 0.0
     values = np.array([totals[2], unknown[-1], totals[3] / (profile.size - 1), slope])
-    return _Solution(values, unknown, imbalance, status, sweeps)
+    return _Solution(values, unknown, imbalance, status, sweeps, summit)
 
 
 class _Top(NamedTuple):
@@ -218,11 +258,9 @@ def _extrapolated(solutions: list[_Solution], top: _Top) -> ViscoelasticSteady:
     return ViscoelasticSteady(values, errors, fine.status, fine.sweeps)
 
 
-def _check(line: CubicLine, load: float) -> None:
+def _check(line: CubicLine) -> None:
     if not np.all(np.isfinite(line.height)):
         raise ValueError("the heights must be finite")
     cells = line.enter.size
     if cells < 8 or cells % GRIDS[-1]:
         raise ValueError(f"a line needs a multiple of four cells and at least eight, got {cells}")
-    if not (np.isfinite(load) and load > 0):
-        raise ValueError(f"the load must be positive and finite, got {load!r}")

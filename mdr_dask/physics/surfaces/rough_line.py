@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, highest_point, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import Shape
 from mdr_dask.physics.surfaces.waves import Waves
+
+SEEN = 8  # nodes for every Nyquist point that show the highest point of a line
 
 
 @dataclass(frozen=True)
@@ -49,3 +51,11 @@ class RoughLine:
     def straight(self, nodes: int) -> CubicLine:
         """Return the line of straight cells on a grid."""
         return self.through(self.heights(nodes), None)
+
+    def from_summit(self) -> RoughLine:
+        """Return a periodic line from its highest point on, which every grid has a node at; one of a body as it is."""
+        if self.body is not None:
+            return self
+        nodes = SEEN * self.points
+        cell, place, _ = highest_point(self.heights(nodes), self.slopes(nodes))
+        return replace(self, roughness=self.roughness.from_place((cell + place) / nodes))

@@ -34,6 +34,11 @@ class Waves:
         """Return dh/dx at the same places, exact."""
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
+    def from_place(self, place: float) -> Waves:
+        """Return the same line from a place on, 0..1, for grids of more than two nodes for the shortest wave."""
+        wave = np.arange(1, self.coefficients.size + 1)
+        return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
+
     def rms_slope(self) -> float:
         """Return the spectral rms slope, sqrt(sum (A_k q_k)^2 / 2) with A_k = 2 |c_k| and q_k = 2 pi k."""
         q = 2 * np.pi * np.arange(1, self.coefficients.size + 1)

@@ -129,13 +129,14 @@ def test_number_of_clusters_by_rice():
     assert abs(np.mean(counts) - expected) < 4 * error + 0.01 * expected
 
 
-def test_every_second_point_makes_the_coarser_line():
-    line, _, _ = rough_line(1000, 3, 100, 0.7, 8)
-    fine = excursions(line, 0.5).every_second()
-    coarse = excursions(line[::2], 0.5)
+def test_every_fourth_point_makes_the_coarser_line():
+    line, _, _ = rough_line(1002, 3, 100, 0.7, 8)  # two points are left over
+    line[1000] = 9.0
+    fine = excursions(line, 0.2).above(0.5, 4)
+    coarse = excursions(line[:1000:4], 0.5)
     np.testing.assert_array_equal(fine.place, coarse.place)
     np.testing.assert_array_equal(fine.height, coarse.height)
-    assert fine.points == coarse.points == 500
+    assert fine.points == coarse.points == 250
 
 
 def test_window_wider_than_the_line_is_refused():

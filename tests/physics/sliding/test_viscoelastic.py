@@ -6,10 +6,15 @@ from schemes import material_on_line, on_line
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.viscoelastic import steady_viscoelastic_sliding
+from mdr_dask.physics.sliding import viscoelastic
+from mdr_dask.physics.sliding.problem import Aim, Arms, solve
+from mdr_dask.physics.sliding.viscoelastic import ViscoelasticLadder, steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.shapes import PowerLaw
+from mdr_dask.physics.surfaces.waves import Waves
 
 LENGTH, POINTS, RMS = 0.02, 400, 5e-7
 
@@ -229,6 +234,44 @@ def test_flat_line_carries_load_without_friction():
     assert state.status == Outcome.CONVERGED
     assert state.friction_coefficient == pytest.approx(0, abs=1e-12)
     assert state.depth == pytest.approx(1.0 / (4e6 * 64e-4), rel=1e-9)
+
+
+@pytest.mark.parametrize("body", [None, PowerLaw(5.0, 2.0)])
+def test_a_finer_grid_gives_what_it_gives_alone(body):
+    """On a line from its highest point on; the coarser two grids of three are those of before."""
+    waves = Waves(0.05 * roughness.amplitudes(32, 0.7) * roughness.phase_factors(1, 4, 32), 64)
+    rough, solid = RoughLine(waves, body).from_summit(), prony(1.0, [4.0, 2.0], [0.02, 0.3], 0.01)
+    ladder = ViscoelasticLadder(solid, 0.03)
+    for grid in (4, 8, 16):
+        fine = rough.straight(64 * grid)
+        found, alone = ladder.on(fine), steady_viscoelastic_sliding(fine, solid, 0.03)
+        assert found.status == alone.status == Outcome.CONVERGED
+        np.testing.assert_allclose(found.values, alone.values, rtol=1e-9)
+        np.testing.assert_allclose(found.errors, alone.errors, rtol=1e-3, atol=1e-12)
+
+
+@pytest.mark.parametrize("realisation", range(5))
+def test_a_line_from_its_summit_has_it_on_every_grid(realisation):
+    waves = Waves(0.5 * roughness.amplitudes(64, 0.3) * roughness.phase_factors(1, realisation, 64), 128)
+    turned = RoughLine(waves).from_summit()
+    finest = waves.heights(2**16)
+    for grid in (4, 8, 64, 256):
+        height = turned.heights(128 * grid)
+        assert height.argmax() == 0
+        assert height[0] == pytest.approx(finest.max(), rel=1e-5)
+    before = np.roll(finest, -int(finest.argmax()))
+    np.testing.assert_allclose(turned.heights(2**16), before, atol=np.abs(np.diff(finest)).max())
+
+
+def test_an_accuracy_solves_no_grid_twice(monkeypatch):
+    seen, whole = [], viscoelastic._solve
+    monkeypatch.setattr(
+        viscoelastic, "_solve", lambda profile, *rest: seen.append(profile.size - 1) or whole(profile, *rest)
+    )
+    waves = Waves(0.5 * roughness.amplitudes(64, 0.7) * roughness.phase_factors(0, 1, 64), 128)
+    steady, errors = solve(RoughLine(waves), Arms((9.0,), (0.01,)), *np.array([[0.0], [0.6]]), Aim(("drag",), 2e-4))
+    assert errors.drag[0] <= 2e-4 * steady.drag[0]
+    assert seen == [256, 512, 1024, 2048]
 
 
 @pytest.mark.parametrize(
