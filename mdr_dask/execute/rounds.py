@@ -54,6 +54,7 @@ class _Round:
     """
 
     layout: tuple[Template, ...]
+    places: Places
     asked: Masks
     needed: Masks
     realisations: tuple[int, int]
@@ -234,7 +235,7 @@ def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], rea
     layout, places = stored_layout(job.stage, job.url)
     asked = cases_of(job.stage, layout, places, [np.ones(mesh.cases.shape, dtype=bool) for mesh in job.stage.meshes])
     nothing = [np.zeros_like(mask) for mask in asked]
-    rest = _Round(layout, asked, nothing, (0, realisations), tuple(mask.astype(np.int64) for mask in nothing))
+    rest = _Round(layout, places, asked, nothing, (0, realisations), tuple(mask.astype(np.int64) for mask in nothing))
     run_round(rest, [replace(cells, kept=0) for cells in _find(job, rest)])
 
 
@@ -249,13 +250,14 @@ def _behind(job: _Job, count: int) -> _Round:
     """Return the round that all cases of a stage have behind them."""
     layout, places = stored_layout(job.stage, job.url)
     asked = cases_of(job.stage, layout, places, job.stage.new)
-    return _Round(layout, asked, asked, (0, count), tuple(np.where(mask, count, 0) for mask in asked))
+    return _Round(layout, places, asked, asked, (0, count), tuple(np.where(mask, count, 0) for mask in asked))
 
 
 def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
     """Lay the next round out, if any case takes part in it, while no other part does."""
     with store.entrance(job.url):
-        layout, places = stored_layout(job.stage, job.url)
+        alone = last if not job.part else None  # other parts may have changed the store
+        layout, places = (alone.layout, alone.places) if alone else stored_layout(job.stage, job.url)
         asked = cases_of(job.stage, layout, places, job.stage.new)
         before = last.realisations[1] if last else 0
         needed = asked
@@ -274,7 +276,7 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
             job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
-    return _Round(layout, asked, needed, (before, count), taken)
+    return _Round(layout, places, asked, needed, (before, count), taken)
 
 
 def _narrow(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[NDArray[np.bool_]]:

@@ -32,8 +32,9 @@ from mdr_dask.physics.wear.worn import Worn
 _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border")
 #: Outputs whose name in a campaign is not that of a worn contact's number: a parameter has it.
 _RENAMED = {"contact_force": "normal_force"}
-#: Accuracies that are tried in turn where the campaign asks for a relative one: each a quarter of the last.
-_FINEST, _FINER = 1e-5, 0.25
+#: Accuracies that are tried in turn where the campaign asks for a relative one: down to the finest, each half of the
+#: last at most, and less the more was missed, as errors fall with it; somewhat less, for they may fall more slowly.
+_FINEST, _FINER, _ENOUGH = 1e-5, 0.5, 0.7
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -233,13 +234,17 @@ class _Demand:
         self.outputs = [name for name in block.outputs if name in MODEL.companions]
         self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
 
-    def missed(self, records: Sequence[Worn]) -> str:
-        """Say which outputs miss the relative accuracy and by how much; nothing if none does."""
+    def missed(self, records: Sequence[Worn]) -> tuple[str, float]:
+        """Say which outputs miss the relative accuracy and by how much, nothing if none does; and how often at most."""
         if self.accuracy is None:
-            return ""
+            return "", 0.0
         shares = {name: self._share(records, name) for name in self.outputs}
         told = [f"{name} {share:.1e}" for name, share in shares.items() if share > self.accuracy]
-        return f"estimated relative error of {', '.join(told)}, {self.accuracy:.1e} was asked for" if told else ""
+        times = max(shares.values(), default=0.0) / self.accuracy
+        return (
+            f"estimated relative error of {', '.join(told)}, {self.accuracy:.1e} was asked for" if told else "",
+            times,
+        )
 
     def _share(self, records: Sequence[Worn], name: str) -> float:
         """Return the error of an output over its largest value; 0 over 0 is none."""
@@ -300,18 +305,19 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
     """Solve a task for all its (N, xi), more finely for those that miss the accuracy asked; say which still do."""
-    accuracy, left = task.accuracy, dict.fromkeys(range(len(wanted)), True)
+    accuracy, left = max(min(task.accuracy, demand.accuracy or np.inf), _FINEST), list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
-        numbers = list(left)
-        contacts = _solved(task, [wanted[number] for number in numbers], accuracy, errors=demand.errors)
-        for number, records in zip(numbers, contacts, strict=True):
-            found[number] = (records, demand.missed(records))
-            if not found[number][1]:
-                del left[number]
+        contacts = _solved(task, [wanted[number] for number in left], accuracy, errors=demand.errors)
+        most = 0.0
+        for number, records in zip(left, contacts, strict=True):
+            told, times = demand.missed(records)
+            found[number] = records, told
+            most = max(most, times)
+        left = [number for number in left if found[number][1]]
         if accuracy <= _FINEST or task.blocks:
             break
-        accuracy = max(_FINER * accuracy, _FINEST)
+        accuracy = max(min(_FINER, _ENOUGH / most) * accuracy, _FINEST) if left else accuracy
     return [found[number] for number in range(len(wanted))]
 
 

@@ -37,7 +37,7 @@ from mdr_dask.physics.transients.patches import (
     unloading,
 )
 
-CANDIDATES = 8  # places of leaving whose wakes are compared
+CANDIDATES = 64  # most places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 GUARD_CELLS = 200.0  # travelled, until which elements that the jump found free are told apart
@@ -173,7 +173,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     found += 1
                     w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
-                    least_free, known_at = (w - spreads[0]) * fade_of_cell, until
+                    least_free, known_at = (w - 2 * spreads[0]) * fade_of_cell, until
                     oldest, last_start = last_start, begin
                     if not lost:
                         known = _remember(until, places, known)
@@ -195,7 +195,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
                 spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
-                least_free, known_at = (u - spread) * fade_of_cell, probe
+                least_free, known_at = (u - 2 * spread) * fade_of_cell, probe
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
                     begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)

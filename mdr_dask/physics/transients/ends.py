@@ -79,6 +79,8 @@ class Ends(NamedTuple):
         Fraction in contact there.
     first : array of Patches, shape (cases,)
         What touches before.
+    slower : array of Patches, shape (cases,)
+        What touches in steady sliding at the lower velocity.
     outcome : array, shape (cases,)
     """
 
@@ -90,6 +92,7 @@ class Ends(NamedTuple):
     depth: FloatArray
     contact: FloatArray
     first: NDArray[np.object_]
+    slower: NDArray[np.object_]
     outcome: NDArray[np.int8]
 
     def only(self, cases: NDArray[np.int64]) -> Ends:
@@ -127,7 +130,7 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
-    touching = np.full(loads.size, None, dtype=object)
+    touching, slower = np.full((2, loads.size), None, dtype=object)
     good = np.flatnonzero(outcome == Outcome.CONVERGED)
     if good.size:
         n, sums = line.track.cells, np.empty(SWEEP_SUMS)
@@ -136,11 +139,11 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
             # at the depth itself: the search for it ends nearby, where other cells may be in contact as a whole
             first = touching[k] = line.patches(depth[k, 0] + line.cells.top, before, sums)
             drag[k, 0] = sums[SWEEP_DRAG]
-            line.patches(depth[k, 1] + line.cells.top, after, sums)
-            drag[k, 1] = sums[SWEEP_DRAG]
+            last = line.patches(depth[k, 1] + line.cells.top, after, sums)
+            drag[k, 1], slower[k] = sums[SWEEP_DRAG], first if before <= after else last
             found = _release(line.track, first, line.barriers(after), after, loads[k] * n)
             at[k], rate[k], tilt[k], outcome[k] = found
-    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, outcome)
+    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, slower, outcome)
 
 
 @kernel

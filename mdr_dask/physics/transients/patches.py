@@ -241,7 +241,8 @@ def released(track: Track, first: Patches, barriers: Barriers, deborah: float, r
             i = min(int(x), n)
             stop = min(i + 1.0, end)
             if pressed and x == i and i < n and stop == i + 1 and keeps_pressed(track, barriers, deborah, i, lift):
-                x = stop
+                whole = i % BLOCK == 0 and i + BLOCK <= min(int(end), n)
+                x = i + BLOCK if whole and barriers.block[i // BLOCK] < lift else stop
                 continue
             c0, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
             if entered:

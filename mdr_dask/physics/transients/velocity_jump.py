@@ -228,6 +228,7 @@ class _Relaxation(NamedTuple):
     tilt: float
     depth: FloatArray
     first: Patches
+    slower: Patches
     is_full: bool
     asked: Transient
     pace: Stepping
@@ -249,6 +250,7 @@ class _Relaxation(NamedTuple):
             float(ends.tilt[k]),
             depth + line.cells.top,
             ends.first[k],
+            ends.slower[k],
             bool(np.all(ends.contact[k] >= WHOLE)),
             asked,
             pace_after(asked, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
@@ -326,8 +328,7 @@ class _Relaxation(NamedTuple):
         found = Trajectory(*np.empty((5, moments)))
         for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at), strict=True):
             column[0] = value
-        slowest = self.line.patches(limits[0], float(self.deborah.min()), np.empty(SWEEP_SUMS))
-        reachable = _reachable(self.line.track, slowest, limits[1])
+        reachable = _reachable(self.line.track, self.slower, limits)
         onset = self.pace.first / (self.pace.growth - 1)
         marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
         return marching, found, workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
@@ -348,21 +349,23 @@ class _Relaxation(NamedTuple):
 
 
 @kernel
-def _reachable(track: Track, slowest: Patches, high: float) -> Reachable:
-    """Return where elements can be in contact up to a depth, from the steady state at the least depth and speed."""
-    floor = np.empty(track.height.size)
-    k, decay, flying = -1, np.exp(-1 / slowest.deborah), False
+def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Reachable:
+    """Return where elements can be in contact between two depths, from the steady state at the lower velocity.
+
+    Where the depth is less by some length, displacements are less by that length at most.
+    """
+    floor, (low, high) = np.empty(track.height.size), limits
+    k, decay, free, flying = -1, np.exp(-1 / slower.deborah), -np.inf, False
     for i in range(floor.size):
-        while k + 1 < slowest.count and slowest.start[k + 1] <= i:
+        while k + 1 < slower.count and slower.start[k + 1] <= i:
             k += 1
-        if k < 0:
-            floor[i] = -np.inf
-        elif i <= slowest.end[k]:
-            floor[i], flying = slowest.depth + track.height[i], False
-        elif flying and slowest.start[k] <= i - 1:
-            floor[i] = floor[i - 1] * decay
-        else:
-            floor[i], flying = slowest.pressed[k] * np.exp(-(i - slowest.end[k]) / slowest.deborah), True
+        if k >= 0 and i <= slower.end[k]:
+            free, flying = slower.depth + track.height[i], False
+        elif flying and slower.start[k] <= i - 1:
+            free *= decay
+        elif k >= 0:
+            free, flying = slower.pressed[k] * np.exp(-(i - slower.end[k]) / slower.deborah), True
+        floor[i] = free - (slower.depth - low)
     last = floor.size - 1
     runs, count = np.empty((last // 2 + 1, 2), np.int64), 0
     for i in range(last):

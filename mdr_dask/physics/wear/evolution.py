@@ -67,6 +67,8 @@ class Resolution(NamedTuple):
         Nodes that each panel, and halvings that each end, has less.
     thinned : int
         Most nodes that a panel may have less.
+    order : int, optional
+        Nodes of a panel; by default four, or six for the finest accuracies.
     rough : tuple of float
         How much wider the accuracy of two rougher solutions is, which tell the error.
     slowness : float
@@ -77,6 +79,7 @@ class Resolution(NamedTuple):
     wider: float = 1.0
     fewer: int = 0
     thinned: int = 2
+    order: int | None = None
     rough: tuple[float, float] = (8.0, 64.0)
     slowness: float = 1.0
 
@@ -94,7 +97,7 @@ class Resolution(NamedTuple):
         """Return panels, halved `near` times more towards the inner border than towards the edge."""
         digits = max(-np.log10(self.accuracy), fewest_digits)
         levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
-        order = 4 if self.accuracy > 3e-5 else 6
+        order = self.order or (4 if self.accuracy > 3e-5 else 6)
         left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
         return graded_panels(left, right, order - min(self.fewer, self.thinned))
 
@@ -114,7 +117,7 @@ class Resolution(NamedTuple):
     def rougher(self) -> tuple[Resolution, Resolution]:
         """Return the two rougher resolutions."""
         first, second = self.rough
-        return self._replace(wider=first, fewer=1), self._replace(wider=second, fewer=2)
+        return self._replace(wider=first * self.wider, fewer=1), self._replace(wider=second * self.wider, fewer=2)
 
 
 class NotConvergedError(ArithmeticError):

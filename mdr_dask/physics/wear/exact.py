@@ -27,6 +27,8 @@ from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
+#: At constant depth: accuracy above which solutions are no coarser, and how much wider steps may be from 1e-3 on.
+COARSEST, WIDEST = 1e-2, 2.0
 Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
@@ -83,7 +85,8 @@ def exact(
         check_stick_radius(stick_radius)
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
     wanted = sorted({float(amount) for amount in amounts})
-    resolution = forced_resolution(accuracy) if solve is forced_contacts else Resolution(accuracy)
+    resolutions = {forced_contacts: forced_resolution, _fretted: fretted_resolution}
+    resolution = resolutions.get(solve, Resolution)(accuracy)
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
     judged = {
@@ -136,6 +139,16 @@ def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) 
         except NotConvergedError:
             continue
     return solve(ways[-1])
+
+
+def fretted_resolution(accuracy: float) -> Resolution:
+    """Return the resolution for an accuracy at constant depth: the error falls as the root of that of the steps.
+
+    Steep bodies need more nodes a panel, and nothing is known of solutions that are rougher still than those of 1 %.
+    """
+    finest = min(accuracy, COARSEST)
+    order = 4 if finest > 5e-3 else 5 if finest > 5e-4 else 6
+    return Resolution(finest, wider=float(np.clip(WIDEST * (finest / 1e-3) ** 0.6, 1.0, WIDEST)), order=order)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:

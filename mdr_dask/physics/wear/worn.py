@@ -22,15 +22,17 @@ Function = Callable[[FloatArray], FloatArray]
 #: Outputs that are functions of a place, and how a worn contact calls them; all others are numbers.
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
+VOLUMES = ("wear_volume", "energy_volume")
+
 
 class Settings(NamedTuple):
     """Tuned numbers of the error estimate; `python -m benchmarks wear` measures what it covers.
 
     Parameters
     ----------
-    safety, edges : float
+    safety, edges, volumes : float
         Error over the distance from rougher solutions; of the radii of scar and stick zone, which are the least
-        determined quantities.
+        determined quantities; of volumes, in which errors cancel.
     second : float
         Share of the distance from the second one, which counts where the first is close by chance.
     reach : int
@@ -40,7 +42,8 @@ class Settings(NamedTuple):
     """
 
     safety: float = 1.5
-    edges: float = 2.5
+    edges: float = 3.0
+    volumes: float = 0.6
     second: float = 0.5
     reach: int = 5
     floor: float = 0.02
@@ -133,7 +136,7 @@ class Worn:
         distance = self.slowness * np.max(weighted, axis=0)
         if output in ("contact_radius", "stick_border"):
             return np.asarray(np.maximum(SETTINGS.edges * distance, self.least_edge_error))
-        return np.asarray(SETTINGS.safety * distance)
+        return np.asarray((SETTINGS.volumes if output in VOLUMES else SETTINGS.safety) * distance)
 
     def _crowd(self, last: float) -> FloatArray:
         """Return places that crowd at the borders of stick and contact."""

@@ -4,6 +4,8 @@ import pytest
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients import velocity_jump
+from mdr_dask.physics.transients.contact_search import Reachable
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
 
@@ -32,3 +34,33 @@ def test_extremes_come_to_rest(hurst: float) -> None:
             # a single line may overshoot, by as much as it jumps
             assert away < 2 * span
             assert abs(jump.trace[-1] - jump.after) <= 0.02 * max(away, span)
+
+
+@pytest.mark.parametrize(
+    ("hurst", "load", "deborah", "ratio"),
+    [
+        # with few places of leaving remembered
+        (0.7, 1.16, 1.0, 0.4),
+        (0.7, 25.0, 1.0, 5.0),
+        (0.7, 1.16, 0.147, 5.0),
+        (0.3, 5.4, 1.0, 5.0),
+        # with stretches from a state at the least depth
+        (0.7, 0.0116, 0.0215, 5.0),
+        (0, 0.0539, 0.147, 5.0),
+    ],
+)
+def test_jump_does_not_depend_on_where_contact_is_looked_for(
+    hurst: float, load: float, deborah: float, ratio: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Stretches that elements can touch save work only: the whole line gives the same, after large jumps too."""
+    amplitude, phase = roughness.amplitudes(POINTS, hurst), roughness.phases(2014, 0, POINTS)
+    line = PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, 8 * POINTS, order) for order in (0, 1))))
+    loads, both = np.array([load]), np.array([[deborah, ratio * deborah]])
+    ends, asked = ends_on(line, loads, both), Transient(TIMES, 2 * np.pi * POINTS, 6)
+    (near,) = velocity_jumps(line, loads, both, ends, asked)
+    last = line.track.height.size - 1
+    everywhere = Reachable(np.array([[0, last]]), np.full(last + 1, -np.inf))
+    monkeypatch.setattr(velocity_jump, "_reachable", lambda *_: everywhere)
+    (whole,) = velocity_jumps(line, loads, both, ends, asked)
+    assert near.outcome == whole.outcome == Outcome.CONVERGED
+    assert np.max(np.abs(near.trace - whole.trace)) <= 0.01 * np.max(np.abs(whole.trace - whole.after))

@@ -131,7 +131,7 @@ def test_extremes_reach_the_limit(exponent, c):
     limit = wear.limit(profile, c)
     assert worn.contact_radius == pytest.approx(limit.contact_radius, abs=1e-3)
     assert worn.wear_volume == pytest.approx(limit.wear_volume, rel=2e-3)
-    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1e-2)
+    assert worn.energy_volume == pytest.approx(limit.wear_volume, rel=1.5e-2)
 
 
 def test_table_of_a_parabola():
