@@ -37,6 +37,7 @@ from mdr_dask.physics.transients.patches import (
     unloading,
 )
 
+CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
 CANDIDATES = 64  # most places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
@@ -124,6 +125,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     start, end, sums, places, spreads, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
+    deepest = depth  # so far: elements may fly from where the line is no longer touched
+    for moment in range(history.count):
+        deepest = max(deepest, history.depth[moment])
     known, found, edges, edges_drag = 0, 0, 0.0, 0.0
     oldest, last_start = -np.inf, -np.inf
     n, finish = int(track.cells), track.cells + track.origin
@@ -142,7 +146,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                highest = depth + peak[i]
+                highest = deepest + peak[i]
                 if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
@@ -173,7 +177,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     found += 1
                     w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
-                    least_free, known_at = (w - 2 * spreads[0]) * fade_of_cell, until
+                    least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
                     oldest, last_start = last_start, begin
                     if not lost:
                         known = _remember(until, places, known)
@@ -195,7 +199,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
                 spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
-                least_free, known_at = (u - 2 * spread) * fade_of_cell, probe
+                least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
                     begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
@@ -207,9 +211,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     continue
                 if not pulls:
                     break
-                if gap > -2 * spread:
-                    known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
-                    known = _remember(probe, places, known)
+                known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
+                known = _remember(probe, places, known)
                 free_from = x = probe
         if contact and run + 1 < runs.shape[0]:
             return -1

@@ -8,8 +8,11 @@ from scipy.optimize import brentq
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients import velocity_jump as jumps_of
+from mdr_dask.physics.transients.contact_search import Reachable
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
+from mdr_dask.physics.transients.patches import Track
 from mdr_dask.physics.transients.velocity_jump import EVERY, Jump, Transient, retraced, velocity_jump, velocity_jumps
 
 POINTS, OVERSAMPLING = 100, 8
@@ -142,6 +145,28 @@ def test_jump_condition_against_ever_finer_steps() -> None:
         errors.append(abs(state.drag[0] / found.at - 1))
     assert errors[1] < 0.5 * errors[0]
     assert errors[1] < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("hurst", "realisation", "deborah", "load"),
+    [(0.3, 1, 0.1, 0.5), (0.7, 1, 0.1, 0.5), (1.0, 2, 0.3, 0.1)],
+)
+def test_cells_left_out_change_nothing(
+    monkeypatch: pytest.MonkeyPatch, hurst: float, realisation: int, deborah: float, load: float
+) -> None:
+    """Elements may fly from where the line was touched earlier, though it is not touched there any more."""
+
+    def whole(track: Track, *_: object) -> Reachable:
+        nodes = track.height.size
+        return Reachable(np.array([[0, nodes - 1]]), np.full(nodes, -np.inf))
+
+    height, slope = line(hurst, realisation, 12)
+    case = (height, slope, load, (deborah, 3 * deborah), TIMES, 6)
+    few = solved(*case)
+    monkeypatch.setattr(jumps_of, "_reachable", whole)
+    every = solved(*case)
+    assert few.outcome == every.outcome == Outcome.CONVERGED
+    assert few.path == pytest.approx(every.path, abs=1e-9 * np.ptp(every.path[1]))
 
 
 def test_trace_begins_at_the_jump() -> None:

@@ -47,6 +47,10 @@ def test_extremes_come_to_rest(hurst: float) -> None:
         # with stretches from a state at the least depth
         (0.7, 0.0116, 0.0215, 5.0),
         (0, 0.0539, 0.147, 5.0),
+        # with cells passed by where elements left earlier
+        (0.3, 5.4, 1.0, 3.0),
+        (0.7, 0.0025, 0.00316, 3.0),
+        (1.0, 5.4, 1.0, 1.2),
     ],
 )
 def test_jump_does_not_depend_on_where_contact_is_looked_for(
