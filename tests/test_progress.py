@@ -8,6 +8,7 @@ import pytest
 from test_execute import run
 
 from mdr_dask import compile_clock as clocks
+from mdr_dask import execute
 from mdr_dask.cli import progress as shown
 from mdr_dask.cli.progress import at_work, describe, reporter
 from mdr_dask.execute import Progress
@@ -108,7 +109,9 @@ def test_every_kind_of_result_counts_once():
 
 def test_a_run_tells_how_long_it_took(toy, url):
     began = time.monotonic()
-    progress = run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)
+    reported = []
+    progress = execute.run(toy.campaign(toy.axis("position", [1.0, 2.0])), url, execute.Resources(), reported.append)
+    assert all(0 <= each.wall_seconds < time.monotonic() - began for each in reported)
     assert 0 < progress.wall_seconds < time.monotonic() - began
     assert progress.compute_seconds + progress.write_seconds > 0
     again = run(toy.campaign(toy.axis("position", [1.0, 2.0])), url)

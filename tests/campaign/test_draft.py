@@ -75,10 +75,17 @@ def test_every_way_to_give_a_thing_passes(name, tmp_path):
 def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
-    (tmp_path / "drafted.py").write_text(MODULE)
+    hardness = '    hardness: float = quantity("Pa", "hardness of the softer body", gt=0)\n'
+    bounds = (
+        '    passes: int = quantity("1", "passes", ge=2)\n    shift: float = quantity("K", "shift of temperature")\n'
+    )
+    assert hardness in MODULE
+    (tmp_path / "drafted.py").write_text(MODULE.replace(hardness, hardness + bounds))
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 0
     assert main(["check", "pin.yaml"]) == 0
     assert "hardness: 1 Pa" in (tmp_path / "pin.yaml").read_text()
+    assert "passes: 3 " in (tmp_path / "pin.yaml").read_text()  # above a bound without an upper one
+    assert "shift: 1 K " in (tmp_path / "pin.yaml").read_text()  # without any bound
     capsys.readouterr()
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 2
     assert "pin.yaml: exists already" in capsys.readouterr().err

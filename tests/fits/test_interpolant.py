@@ -66,6 +66,10 @@ def test_the_study_itself_is_in_the_table():
 def test_a_law_of_a_file_takes_many_points_and_refuses_to_extrapolate(tmp_path):
     save(law(study("friction"), "mu"), tmp_path / "mu.nc")
     found = mdr_dask.Law(tmp_path / "mu.nc")
+    for end in (0, -1):
+        assert found(force=FORCE[end], velocity=VELOCITY[end])[0] == pytest.approx(
+            SHAPES["friction"][0](FORCE[end], VELOCITY[end])
+        )
     force, velocity = inside("friction", 100)
     mu, error = found(force=force[:, None], velocity=velocity)
     assert mu.shape == error.shape == (100, 100)

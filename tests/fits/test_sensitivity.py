@@ -135,6 +135,13 @@ def test_the_command_prints_rows_draws_and_refuses(toy, tmp_path, monkeypatch, c
         assert row["first_low"] <= one <= row["first_high"]
         assert row["total_low"] <= whole <= row["total_high"]
     assert (tmp_path / "s.png").stat().st_size > 5000
+    printed = {}
+    for form in ([], ["--csv"]):
+        assert main(["sensitivity", "results/a.zarr", "height", *form]) == 0
+        printed[bool(form)] = capsys.readouterr().out
+    low, high = (f"{rows[0][f'first_{end}']:.4g}" for end in ("low", "high"))
+    assert f" ({low}, {high}) " in printed[False]  # an interval for a reader
+    assert "first_low" in printed[True].splitlines()[0]  # two columns for a program
     assert main(["sensitivity", "results/a.zarr", "heigth"]) == 2
     assert "did you mean 'height'" in capsys.readouterr().err
     assert main(["sensitivity", "results/a.zarr", "trace"]) == 2

@@ -406,6 +406,8 @@ def test_a_table_of_viscosities_is_the_oil_that_it_was_made_of(kind, tmp_path):
     values[2] *= 1.05
     told = own_oil(tmp_path, f"T [degC];Viscosity [{unit}]\n{rows()}", highest_temperature=400.05).oil.notes()
     assert re.search(r"ASTM D341 through 5 kinematic viscosities, .*; \+4 % off at 60 degC", told[0])
+    ends = re.search(r"viscosities, (\S+) to (\S+) mm\^2/s", told[0]).groups()
+    assert [float(end) for end in ends] == pytest.approx([1e6 * given.kinematic(T) for T in (293.15, 373.15)], rel=0.05)
     assert told[1:] == ("oil: its viscosity is extrapolated above 100 degC, to 126.9 degC",)
 
 

@@ -5,7 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.velocity_jump import MODEL, VelocityJump
+from mdr_dask.models.parts.loading_history import pieces
+from mdr_dask.models.velocity_jump import MODEL, VelocityJump, solve
 from mdr_dask.models.velocity_jump.solve import compute
 from mdr_dask.physics.surfaces import roughness
 
@@ -174,3 +175,33 @@ def test_flat_measured_line_is_a_status(tmp_path: Path) -> None:
 def test_a_line_is_generated_or_measured() -> None:
     with pytest.raises(ValidationError, match="expected length with rms_roughness, or length with surface"):
         block(length=None)
+
+
+def test_steps_of_velocity_and_force_are_pieces_between_their_times() -> None:
+    protocol = VelocityJump.model_validate(
+        BASE | {"protocol": {"shape": "steps", "times": [0.0, 2.0], "velocities": [0.3, 0.5], "forces": [7.0, 9.0]}}
+    ).protocol
+    before, found = pieces(protocol, 0.1, 5.0, 0.2)
+    assert before == 0.1
+    assert [(each.start, each.end, each.velocity, each.force) for each in found] == [
+        (0.0, 2.0, (0.3, 0.3), (7.0, 7.0)),
+        (2.0, np.inf, (0.5, 0.5), (9.0, 9.0)),
+    ]
+    ramp = VelocityJump.model_validate(
+        BASE | {"protocol": {"shape": "ramp", "duration": 2.0, "velocity": 0.5, "force": 9.0}}
+    ).protocol
+    (rising, kept) = pieces(ramp, 0.1, 5.0, 0.2)[1]
+    assert (rising.start, rising.end, rising.velocity, rising.force) == (0.0, 2.0, (0.1, 0.5), (5.0, 9.0))
+    assert (kept.velocity, kept.force) == ((0.5, 0.5), (9.0, 9.0))
+
+
+def test_the_error_of_a_history_is_that_of_half_the_nodes_in_half_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    real = solve.trace
+    monkeypatch.setattr(
+        solve, "trace", lambda line, *rest: asked.append((line.enter.size, rest[-1])) or real(line, *rest)
+    )
+    compute(block(protocol=STEP, oversampling=4).part(0, 0))
+    (fine, coarse) = sorted(asked, reverse=True)
+    assert fine[0] == pytest.approx(2 * coarse[0], abs=2)
+    assert fine[1] == 2 * coarse[1]

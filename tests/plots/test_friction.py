@@ -52,6 +52,15 @@ def test_curves_hold_the_mean_over_realisations(forces):
     assert np.sort(drawn, axis=0) == pytest.approx(np.sort(expected.values.reshape(-1, 15), axis=0))
 
 
+def test_every_region_of_the_law_has_its_number(forces):
+    """From the lowest velocity on, also where it is below one in the unit shown."""
+    one = forces.isel(hurst=1, normal_force=6)
+    axes = DRAW["regions"]({"": one}).axes[0]
+    assert axes.get_xlim()[0] < 1
+    places = {text.get_text(): text.get_position()[0] for text in axes.texts if set(text.get_text()) <= {"I", "V"}}
+    assert sorted(places, key=places.get) == ["I", "II", "III", "IV"]
+
+
 def test_a_fixed_hurst_exponent_is_a_point_at_its_value(forces):
     axes = DRAW["plateau"]({"": forces.isel(hurst=1)}).axes[0]
     drawn = [line.get_xdata() for line in axes.get_lines() if line.get_gid() == DATA]

@@ -23,6 +23,11 @@ def test_three_panels_with_units_bars_and_extrapolated_range(tmp_path):
     assert np.isnan(solid).any()
     assert np.nanmin(solid) >= 0.99
     assert factors.get_xscale() == "log"
+    assert (
+        {axes.get_xscale() for axes in (measured, merged)}
+        == {axes.get_yscale() for axes in (measured, merged)}
+        == {"log"}
+    )
     figure.savefig(tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 1e4
 

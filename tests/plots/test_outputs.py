@@ -295,3 +295,14 @@ def test_numbers_are_shown_in_the_unit_that_stands_behind_them(name):
     unit = quantity.unit or "1"
     factor, zero = units.conversion(unit, units.dimension_of(unit)[1])
     assert quantity.of(293.7) * factor + zero == pytest.approx(293.7, rel=1e-12)
+
+
+@pytest.mark.parametrize("low", [0.02, 0.2, 2.0, 200.0])
+def test_an_axis_of_less_than_two_decades_has_plain_numbers(low):
+    axes = Figure().subplots()
+    axes.plot([low, 6 * low], [1, 2])
+    axes.set_xlim(low, 6 * low)
+    style.logarithmic(axes, "x")
+    axes.figure.draw_without_rendering()
+    shown = [float(label.get_text()) for label in axes.get_xticklabels() if label.get_text()]
+    assert shown == pytest.approx([low, 2.5 * low, 5 * low])

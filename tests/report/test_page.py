@@ -136,6 +136,11 @@ def test_the_sections_say_what_was_asked_and_how_it_went(html, study, url):
     assert html.count("<math") == len(study.subject.equations) == 4
     (errors,) = study.errors
     assert {row[0] for row in errors.rows} == {"friction_coefficient", "contact_fraction", "rms_slope"}
+    friction = xr.open_zarr(url).friction_coefficient.load()
+    relative = friction.std("realisation", ddof=1) / friction.sizes["realisation"] ** 0.5 / friction.mean("realisation")
+    (row,) = (row for row in errors.rows if row[0] == "friction_coefficient")
+    expected = [float(relative.median()), float(relative.max())]
+    assert [float(cell.strip("%")) / 100 for cell in row[1:3]] == pytest.approx(expected, rel=6e-2)
 
 
 def test_a_page_is_made_while_half_of_the_study_is_missing(tmp_path, toy):

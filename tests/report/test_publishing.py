@@ -86,6 +86,11 @@ def test_it_holds_all_that_belongs_to_it(folder):
         assert {"@id": "published/road.csv"} in known["#run"]["object"]
         linked = [part["@id"] for part in (*root["hasPart"], *known["#run"]["object"], *known["#run"]["result"])]
         assert set(linked) <= known.keys()
+        arrays = {name.split("/c/")[0] for name in packed.namelist() if "/c/" in name}
+        assert {"friction_coefficient", "velocity"} <= arrays
+        assert {name.removesuffix("/") for name in linked if known[name]["@type"] == "Dataset"} == arrays
+        assert known["zarr.json"]["description"] == "metadata of the Zarr store"
+        assert known["published/road.csv"]["description"] == "a file that the campaign names"
         for part in (known[name] for name in linked if known[name]["@type"] == "File"):
             assert part["sha256"] == hashlib.sha256(packed.read(part["@id"])).hexdigest()
 

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -272,3 +273,17 @@ def test_wlf_of_factors_linear_in_temperature_has_no_upper_end_of_c2():
         assert 10 < low < value < high == np.inf
     assert law.constants["c1"][1] / law.constants["c2"][1] == pytest.approx(0.1, rel=0.02)
     assert law.residual < 0.03
+
+
+def test_the_chance_of_a_law_is_that_of_the_errors_alone():
+    """Factors 0.03 decades off a law, known to 0.01: chi-squared of the residuals has its probability."""
+    groups = np.geomspace(1e-3, 1, 9)
+    factors = -0.3 * np.log10(groups) + 0.03 * np.array([0, 1, -1, 1, 1, -1, -1, 1, -1])
+    factors -= factors[0]
+    covariance = np.diag([0.0] + [0.01**2] * 8)
+    found = fit_power(groups, factors, covariance, groups[0])
+    distance = np.log10(groups / groups[0])[1:]
+    slope = distance @ factors[1:] / (distance @ distance)
+    squares = np.sum((factors[1:] - slope * distance) ** 2) / 0.01**2
+    assert found.chance == pytest.approx(stats.chi2.sf(squares, 7), rel=1e-6)
+    assert found.chance < 1e-6

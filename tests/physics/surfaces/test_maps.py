@@ -175,3 +175,10 @@ def test_both_bends_of_a_spectrum_are_found_where_they_are(longest, shortest):
         else:
             assert bend.low < true < bend.high < 2 * bend.low
             assert bend.low < bend.value < bend.high
+
+
+def test_a_map_of_one_long_wave_has_no_direction():
+    """No ring in the middle tells anything: neither axis has more than its share."""
+    wave = np.cos(2 * np.pi * np.arange(16) / 16)
+    found = spectrum_of_map(SurfaceMap(1e-6 * (wave[:, None] + wave), (LENGTH, LENGTH)), hann=False)
+    assert found.axes == (1.0, 1.0)

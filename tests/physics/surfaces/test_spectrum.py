@@ -113,3 +113,11 @@ def test_the_spectrum_goes_on_by_a_power_law_only_where_asked():
 def test_impossible_spectra_are_refused(q, density, message):
     with pytest.raises(DataError, match=message):
         Spectrum(np.array(q), np.array(density))
+
+
+@pytest.mark.parametrize(
+    "other", [MeasuredLine(np.arange(64.0) % 3, 1.01 * LENGTH), MeasuredLine(np.arange(63.0) % 3, LENGTH)]
+)
+def test_scans_of_two_lengths_are_two_surfaces(other):
+    with pytest.raises(DataError, match="expected scans of one length and number of points"):
+        cut_of_lines([MeasuredLine(np.arange(64.0) % 3, LENGTH), other])

@@ -57,6 +57,14 @@ def jump(
     return moments, found
 
 
+@pytest.mark.parametrize("load", [1e-3, 0.04])
+def test_a_light_load_has_a_steady_start(load: float) -> None:
+    state, depth, status = steady_start(periodic_line(*rough()), KELVIN, 0.05, load)
+    assert status == Outcome.CONVERGED
+    assert state.displacement.mean() == pytest.approx(load, rel=1e-6)
+    assert np.isfinite(depth)
+
+
 def missing(found: Response) -> float:
     """Return the part of the work that is neither stored nor dissipated."""
     work, dissipated, stored = (row[-1] - row[0] for row in (found.work, found.dissipated, found.stored))
