@@ -226,7 +226,7 @@ REST
     | {("exact rule", f"to {a:g} of the depth that wears"): (f"accuracy: {a:g}", "") for a in (0.1, 0.01, 1e-3, 1e-4)},
     {a: ("", f"accuracy: {a:g}\n") for a in (0.1, 0.01, 1e-3, 1e-4)},
     ("accuracy: 1e-5", ""),
-    (("accuracy: 0.1", ""), ("accuracy: 0.01", "")),
+    (("accuracy: 0.1", ""), ("accuracy: 1e-4", "")),
 )
 
 

@@ -182,10 +182,10 @@ ASKED = re.compile(r"(?:auto, |accuracy |asked )([\d.e-]+)$")
 PICKED = """## What asking for an accuracy costs
 
 For each accuracy asked for: time over that of the cheapest setting tried that is adequate, whatever the method; 1 if it
-is the cheapest itself. A setting is adequate if nine of ten like cases, or of ten seeds of a campaign, have an error no
-larger than what was asked for, or than what was found by asking. Every setting states its errors too, as asking does. A
-user does not know the cheapest one beforehand. Then the largest error over the accuracy, of nine in ten. {within} of
-{number} are at most 1.3 times the cheapest; the largest is {most:.2g} times.
+is the cheapest itself. A setting is judged by ten like cases, a campaign by ten seeds. It is adequate if the errors of
+nine are no larger than what was asked for, or than what was found by asking. Every setting states its errors too, as
+asking does. A user does not know the cheapest one beforehand. Then the largest error over the accuracy, of nine in ten.
+{within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times.
 
 Like cases are other lines, depths, speeds, exponents and amounts of wear about the one named. A campaign asks for a
 standard error, so that nine of ten seeds lie within 1.6 times that. It takes ten lines: fewer do not know their own

@@ -76,15 +76,15 @@ def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     hardness = '    hardness: float = quantity("Pa", "hardness of the softer body", gt=0)\n'
-    bounds = (
-        '    passes: int = quantity("1", "passes", ge=2)\n    shift: float = quantity("K", "shift of temperature")\n'
-    )
+    more = {"passes: int": ("1", ", ge=2"), "shift: float": ("K", ""), "angle: float": ("rad", ", ge=10, le=20")}
+    bounds = "".join(f'    {field} = quantity({unit!r}, "more"{ends})\n' for field, (unit, ends) in more.items())
     assert hardness in MODULE
     (tmp_path / "drafted.py").write_text(MODULE.replace(hardness, hardness + bounds))
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 0
     assert main(["check", "pin.yaml"]) == 0
     assert "hardness: 1 Pa" in (tmp_path / "pin.yaml").read_text()
     assert "passes: 3 " in (tmp_path / "pin.yaml").read_text()  # above a bound without an upper one
+    assert "angle: 15 rad " in (tmp_path / "pin.yaml").read_text()  # between two bounds
     assert "shift: 1 K " in (tmp_path / "pin.yaml").read_text()  # without any bound
     capsys.readouterr()
     assert main(["init", "drafted:MODEL", "-o", "pin.yaml"]) == 2

@@ -237,7 +237,8 @@ def test_every_output_changes_as_its_unit_says(name, data):
         factor = float(reduce(np.multiply, factors ** powers(unit)))
         value, found = one.values[output][0, 0], two.values[output][0, 0]
         scale = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
-        np.testing.assert_allclose(found / factor, value, rtol=1e-8, atol=1e-9 * scale, err_msg=output)
+        rounding = 1e-6 if output.endswith("_error") else 1e-8  # a difference of two grids may be next to nothing
+        np.testing.assert_allclose(found / factor, value, rtol=rounding, atol=1e-9 * scale, err_msg=output)
         assert np.isfinite(value).any() == (output not in NO_VALUE.get(name, ())), output
         assert not output.endswith("_error") or not np.any(value < 0), output
         changed += factor != 1 and np.any(found != value)

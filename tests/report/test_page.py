@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from report_stores import HOSTILE, friction, hostile
 
-from mdr_dask import plots, store
+from mdr_dask import aggregation, plots, store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
 from mdr_dask.report import cases, figures, page, read_study, words
@@ -136,11 +136,13 @@ def test_the_sections_say_what_was_asked_and_how_it_went(html, study, url):
     assert html.count("<math") == len(study.subject.equations) == 4
     (errors,) = study.errors
     assert {row[0] for row in errors.rows} == {"friction_coefficient", "contact_fraction", "rms_slope"}
-    friction = xr.open_zarr(url).friction_coefficient.load()
-    relative = friction.std("realisation", ddof=1) / friction.sizes["realisation"] ** 0.5 / friction.mean("realisation")
+    data = xr.open_zarr(url).load()
+    mean, lines = data.friction_coefficient.mean("realisation"), aggregation.standard_error(data.friction_coefficient)
+    grid = aggregation.grid_error(data.friction_coefficient_error)
+    shares = [lines / mean, lines / mean, grid / mean, grid / mean, grid / (lines + grid)]
+    reduced = zip(shares, ("median", "max", "median", "max", "median"), strict=True)
     (row,) = (row for row in errors.rows if row[0] == "friction_coefficient")
-    expected = [float(relative.median()), float(relative.max())]
-    assert [float(cell.strip("%")) / 100 for cell in row[1:3]] == pytest.approx(expected, rel=6e-2)
+    assert row[1:] == [f"{100 * float(getattr(share, name)()):.2g} %" for share, name in reduced]
 
 
 def test_a_page_is_made_while_half_of_the_study_is_missing(tmp_path, toy):

@@ -24,7 +24,7 @@ class Settings(NamedTuple):
     resolved: float = 0.5  # largest relative change of a number between two grids that is extrapolated
     hardly: float = 1.5  # cells in contact below which the change between two grids is a part of the error only
     cells_of_a_peak: int = 16  # cells in contact for every peak of the line whose errors are independent
-    safety: float = 2.4
+    safety: float = 3.3
     # of the last change of drag, depth, contact fraction and slope, which their errors are never below
     by_chance: tuple[float, ...] = (0.03, 0.03, 0.15, 0.15)
     of_before: float = 0.15  # of the change before, which the last one is never taken for less than
