@@ -187,7 +187,7 @@ from test_locks import small
 from mdr_dask import execute
 from mdr_dask.execute import Resources
 compute = toy.MODEL.compute
-object.__setattr__(toy.MODEL, "compute", lambda block: time.sleep(0.1) or compute(block))
+object.__setattr__(toy.MODEL, "compute", lambda block: time.sleep(0.5) or compute(block))
 print("begun", flush=True)
 execute.run(small(toy, {count}), {url!r}, Resources(threads=2), lambda progress: print(progress.blocks, flush=True))
 """
