@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -65,15 +66,33 @@ def worker(start, head, address):
     return process
 
 
-def told_by(driver, stop):
-    """Return what a driver says to its end; something is stopped as soon as results have come."""
+def told_by(driver, kill):
+    """Return what a driver says to its end; something is killed as soon as results have come."""
     told = []
     for line in driver.stderr:
         told.append(line.strip())
-        if re.search(r"[1-9]\d* of 120 results", line) and stop.poll() is None:
-            stop.kill()
+        if re.search(r"[1-9]\d* of 120 results", line):
+            kill()
     assert driver.wait() == 2
     return told
+
+
+def events():
+    """Return the names of all events of the log."""
+    return [json.loads(line)["event"] for line in Path("log.jsonl").read_text().splitlines()]
+
+
+def kill_in_a_block(process):
+    """Kill a worker of which the driver has heard that a block has begun, and not that it is done."""
+    while process.poll() is None:
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        if events()[-1] == "block begun":
+            process.kill()
+            process.wait()
+        else:
+            process.send_signal(signal.SIGCONT)
+            time.sleep(0.1)
 
 
 def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, start):
@@ -86,20 +105,19 @@ def test_no_worker_and_a_worker_that_dies_and_a_scheduler_that_dies(folder, star
     assert re.fullmatch(rf"no worker for \d+ s; {KEPT}, with more --patience if need be", last)
 
     first = worker(start, head, address)
-    told = told_by(start(*command, "--patience", "6"), first)
+    told = told_by(start(*command, "--patience", "6"), lambda: kill_in_a_block(first))
     assert any(re.match("all workers are gone, waiting for", line) for line in told)
 
     worker(start, head, address)
-    told += told_by(start(*command), head)
+    told += told_by(start(*command), head.kill)
     assert told[-1] == f"the scheduler went away; {KEPT}"
     assert not any(word in line for line in told for word in ("Traceback", "asyncio", "Error"))
 
     assert mdr_dask("run", "long.yaml", PAUSE="0").returncode == 0
     assert mdr_dask("run", "long.yaml", "--store", "whole.zarr", PAUSE="0").returncode == 0
     assert digests("long.zarr") == digests("whole.zarr")
-    events = [json.loads(line)["event"] for line in Path("log.jsonl").read_text().splitlines()]
-    assert {"run begun", "laid out", "block begun", "block done", "worker lost", "block lost"} <= set(events)
-    assert events.count("run broken off") == 3
+    assert {"run begun", "laid out", "block begun", "block done", "worker lost", "block lost"} <= set(events())
+    assert events().count("run broken off") == 3
 
 
 def test_a_scheduler_that_is_stopped_ends_a_run_in_one_sentence(folder, start):
