@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from references.areal import areal_surface
 
@@ -29,7 +30,7 @@ MAPS = ["road0.npy", "road1.npy", "--spacing", f"{LENGTH / POINTS * 1e6}um", "--
 
 
 def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
-    assert main(["surface", *MAPS, "--json", "-o", "road.csv", "--plot", "road.png"]) == 0
+    assert main(["surface", *MAPS, "--json", "-o", "c2d.csv", "--plot", "road.png"]) == 0
     out, err = capsys.readouterr()
     told = json.loads(out)
     assert told["units"]["rms_height"] == "m"
@@ -43,10 +44,22 @@ def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
         assert row["anisotropy"] < 0.1
     assert "plane subtracted, Hann's window" in err
     assert (folder / "road.png").stat().st_size > 10_000
-    (spectrum,) = spectra_of(Surface.model_validate({"spectrum": str(folder / "road.csv")}))
+    drawn = pd.read_csv(folder / "road.csv", comment="#")
+    assert {"# files: road0.npy, road1.npy", "# panel 1: x: wave number (rad/m); y: C^{2D} (m^4)"} <= set(
+        (folder / "road.csv").read_text().splitlines()
+    )
+    taken = drawn[(drawn["what"] == "line of the method, pi q C^{2D}") & (drawn["file"] == "road1.npy")]
+    expected = np.pi * taken["x"] * SPECTRUM.at(taken["x"].to_numpy())
+    assert np.median(taken["y"] / expected) == pytest.approx(1, rel=0.1)
+    bins = drawn[(drawn["what"] == "data") & (drawn["file"] == "road0.npy")]
+    assert len(bins) > 10
+    assert ((bins["y_low"] < bins["y"]) & (bins["y"] < bins["y_high"])).all()
+    assert main(["surface", *MAPS, "-o", "road.csv", "--plot", "road.png"]) == 2
+    assert "road.csv is the table of the figure road.png: give the spectrum another name" in capsys.readouterr().err
+    (spectrum,) = spectra_of(Surface.model_validate({"spectrum": str(folder / "c2d.csv")}))
     gradients = [row["rms_gradient"] for row in told["rows"]]
     assert spectrum.rms_gradient() == pytest.approx(np.sqrt(np.mean(np.square(gradients))), rel=0.01)
-    assert main(["surface", "road.csv", "--csv"]) == 0
+    assert main(["surface", "c2d.csv", "--csv"]) == 0
     assert capsys.readouterr().out.startswith("file,rms_height [m]")
 
 
@@ -72,4 +85,4 @@ def test_a_scan_is_told_by_its_two_columns(folder, capsys):
 def test_a_mistake_is_one_sentence_and_writes_nothing(folder, arguments, message, capsys):
     assert main(["surface", *arguments, "-o", "road.csv"]) == 2
     assert message in capsys.readouterr().err
-    assert not (folder / "road.csv").exists()
+    assert not (folder / "c2d.csv").exists()

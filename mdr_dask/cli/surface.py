@@ -10,6 +10,7 @@ import click
 from mdr_dask.cli.options import csv_option, json_option
 from mdr_dask.cli.printing import print_rows, with_intervals
 from mdr_dask.cli.writing import FIGURES, require_suffix, writing
+from mdr_dask.version import __version__
 
 if TYPE_CHECKING:
     from mdr_dask.models.parts.surface import Surface
@@ -30,7 +31,12 @@ KINDS = ("map", "scan", "spectrum")
 @click.option("--longest-wavelength", help="Leave out longer waves.")
 @click.option("--shortest-wavelength", help="Leave out shorter waves; else those that are noise.")
 @click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D into FILE.csv, for a campaign.")
-@click.option("--plot", "figure", type=click.Path(path_type=Path), help="Draw the spectra into FILE.png, .pdf or .svg.")
+@click.option(
+    "--plot",
+    "figure",
+    type=click.Path(path_type=Path),
+    help="Draw the spectra into FILE.png, .pdf or .svg, their table beside it.",
+)
 @json_option
 @csv_option
 def surface(
@@ -47,11 +53,13 @@ def surface(
     wavelengths at which the power law ends, empty if it does not within the data.
 
     \b
-    mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o road.csv
+    mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv
     mdr-dask surface scan1.csv scan2.csv scan3.csv
     """
     require_suffix(spectrum, (".csv", ".txt"))
     require_suffix(figure, FIGURES)
+    if figure is not None and spectrum is not None and figure.with_suffix(".csv") == spectrum:
+        raise click.UsageError(f"{spectrum} is the table of the figure {figure}: give the spectrum another name")
     from mdr_dask.models.parts.surface import spectra_of
     from mdr_dask.models.parts.surface_report import UNITS, reports
 
@@ -61,10 +69,12 @@ def surface(
         with writing(spectrum):
             _write(read, spectrum)
     if figure is not None:
+        from mdr_dask.cli.figures import save
         from mdr_dask.plots.surface import draw_surface
 
-        with writing(figure):
-            draw_surface(told, spectra_of(read)).savefig(figure, dpi=150)
+        sources = ", ".join(Path(file.name).name for file in read.measured.files)
+        origin = {"mdr_dask": f"{__version__}, surface", "files": sources, "method": _method(read)}
+        save(draw_surface(told, spectra_of(read)), figure, origin)
     rows, units = [report.row for report in told], dict(UNITS)
     if form is None:
         known = [name for name in units if any(row[name] == row[name] for row in rows)]

@@ -6,18 +6,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from mdr_dask.plots import drawing, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
+    from mdr_dask.arrays import FloatArray
     from mdr_dask.models.parts.surface_report import FileReport
     from mdr_dask.physics.surfaces.spectrum import Spectrum
+    from mdr_dask.plots.table import Drawn
 
 
-def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Figure:
+#: How a legend names the line that replaces a surface.
+METHOD = r"line of the method, $\pi q\,C^{2D}$"
+
+
+def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...]) -> Drawn:
     """Draw C2D of every file with its law, and C1D of the line that a campaign takes with the cuts.
 
     Parameters
@@ -28,20 +34,25 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
         What a campaign takes of each: between the cut-offs, without noise.
     """
     figure, (areal, line) = drawing.panels(2, columns=2, size=(5.2, 4.2))
-    colours = style.scale(len(reports))
-    for report, taken, colour in zip(reports, spectra, colours, strict=True):
-        name = Path(report.file.name).name
-        _areal(areal, report, taken, colour, name if len(reports) > 1 else "")
+    for axes in (areal, line):
+        axes.set(xscale="log", yscale="log", xlabel="wave number (rad/m)")
+    for report, taken, colour in zip(reports, spectra, style.scale(len(reports)), strict=True):
+        first = report is reports[0]
+        file = xr.Dataset(coords={"file": Path(report.file.name).name})
+        _areal(areal, report, taken, colour, file, "taken" if len(reports) == 1 else f"{file['file'].item()} taken")
         for (direction, (q, cut)), dash in zip(report.cuts.items(), ("-", ":"), strict=False):
             there = cut > 1e-20 * cut.max()
-            label = f"straight cut along {direction}" if report is reports[0] else None
-            line.loglog(q[there], cut[there], dash, color="0.6", lw=0.8, label=label)
-    for taken, colour in zip(spectra, colours, strict=True):
+            look: dict[str, Any] = {
+                "color": "0.6",
+                "lw": 0.8,
+                "label": f"straight cut along {direction}" if first else None,
+            }
+            drawing.law(line, q[there], cut[there], dash, name=f"straight cut along {direction}", of=file, **look)
         q = np.geomspace(taken.wavenumber[0], taken.wavenumber[-1], 400)
-        label = r"line of the method, $\pi q\,C^{2D}$" if taken is spectra[0] else None
-        line.loglog(q, np.pi * q * taken.at(q), color=colour, lw=1.5, label=label)
-    areal.set(xlabel="wave number (rad/m)", ylabel=r"$C^{2D}$ (m$^4$)")
-    line.set(xlabel="wave number (rad/m)", ylabel=r"spectrum of a line (m$^3$)")
+        look = {"color": colour, "lw": 1.5, "zorder": 3, "label": METHOD if first else None}
+        drawing.law(line, q, np.pi * q * taken.at(q), name=METHOD, of=file, **look)
+    areal.set_ylabel(r"$C^{2D}$ (m$^4$)")
+    line.set_ylabel("spectrum of a line (m$^3$)")
     for axes in (areal, line):
         axes.legend(fontsize="x-small")
         axes.grid(alpha=0.3)
@@ -55,25 +66,31 @@ def draw_surface(reports: tuple[FileReport, ...], spectra: tuple[Spectrum, ...])
     return figure
 
 
-def _areal(axes: Axes, report: FileReport, taken: Spectrum, colour: str, name: str) -> None:
+def _areal(axes: Axes, report: FileReport, taken: Spectrum, colour: Any, file: xr.Dataset, label: str) -> None:
+    """Draw C2D of a file: all of it, in bins with their errors, what of it is taken, and its power law."""
     spectrum, bins = report.found.spectrum, report.bins
-    axes.loglog(spectrum.wavenumber, spectrum.density, color=colour, lw=0.5, alpha=0.4)
+    raw = {"color": colour, "lw": 0.5, "alpha": 0.4}
+    drawing.law(axes, spectrum.wavenumber, spectrum.density, name="spectrum as measured", of=file, **raw)
     there = bins.density > 0
-    axes.errorbar(
-        bins.wavenumber[there], bins.density[there], (bins.density * bins.error)[there], fmt="o", ms=3, color=colour
-    )
+    q, density, error = (each[there] for each in (bins.wavenumber, bins.density, bins.density * bins.error))
+    mean = drawing.Mean(*(_of(file, each) for each in (density, density - error, density + error)))
+    drawing.points(axes, q, mean, colour, "o", None)
     low, high = taken.wavenumber[[0, -1]]
-    axes.axvspan(low, high, color=colour, alpha=0.06, label=f"{name} taken".strip())
-    if report.law is not None:
-        ends = [2 * np.pi / end.value if end else None for end in (report.law.longest, report.law.shortest)]
-        q = np.array([ends[0] or bins.wavenumber[0], ends[1] or high])
-        middle = (bins.wavenumber >= q[0] * 0.999) & (bins.wavenumber <= q[1] * 1.001) & there
-        level = np.median(
-            np.log(bins.density[middle]) + (2 + 2 * report.law.hurst.value) * np.log(bins.wavenumber[middle])
-        )
-        law = np.exp(level) * q ** (-2 - 2 * report.law.hurst.value)
-        hurst = report.law.hurst
-        axes.loglog(q, law, "k--", lw=1, label=f"H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})")
+    axes.axvspan(low, high, color=colour, alpha=0.06, label=label)
+    if report.law is None:
+        return
+    hurst = report.law.hurst
+    ends = [2 * np.pi / end.value if end else None for end in (report.law.longest, report.law.shortest)]
+    along = np.array([ends[0] or bins.wavenumber[0], ends[1] or high])
+    middle = (q >= along[0] * 0.999) & (q <= along[1] * 1.001)
+    power = -2 - 2 * hurst.value
+    level = np.exp(np.median(np.log(density[middle]) - power * np.log(q[middle])))
+    told = f"H = {hurst.value:.2f} ({hurst.low:.2f}, {hurst.high:.2f})"
+    drawing.law(axes, along, level * along**power, "k--", lw=1, label=told, name="power law", of=file)
+
+
+def _of(file: xr.Dataset, values: FloatArray) -> xr.DataArray:
+    return xr.DataArray(values, dims="wavenumber", coords=file.coords)
 
 
 def _other(number: Any) -> Any:

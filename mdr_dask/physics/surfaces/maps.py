@@ -133,16 +133,21 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
     gram = np.array([[np.mean(x ** (a + c)) * np.mean(y ** (b + d)) for c, d in wanted] for a, b in wanted])
     right = [x**a @ surface.height @ y**b / surface.height.size for a, b in wanted]
     height = surface.height.copy()
-    for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True):
-        height -= factor * (x**a)[:, None] * y**b
+    terms = [(factor * x**a, y**b) for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True)]
+    for first in range(0, x.size, BAND):
+        rows = slice(first, first + BAND)
+        for along, across in terms:
+            height[rows] -= along[rows, None] * across
     return SurfaceMap(height, surface.size)
 
 
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
     """Return Hann's window of the distance from the middle, 0 beyond half the shorter side, of a mean square of one."""
-    x, y = (length * (np.arange(n) - n // 2) / n for n, length in zip(points, size, strict=True))
+    x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
-    window = 0.5 + 0.5 * np.cos(np.pi * distance)
+    quarter = 0.5 + 0.5 * np.cos(np.pi * distance)
+    mirrored = np.ix_(*(np.abs(np.arange(n) - n // 2) for n in points))
+    window = quarter[mirrored]
     return np.asarray(window / np.sqrt(np.mean(window**2)))
 
 
