@@ -1,7 +1,8 @@
 """How honest the errors of a velocity jump are: ``python -m benchmarks kinetics honesty [cases [seed]]``.
 
 Random cases in all regions; the truth is a march on a four times finer grid with five times as many steps, and ends to
-a relative accuracy of 1e-6. Below them, light and slow cases for the ends alone, where contact is a few peaks.
+a relative accuracy of 1e-6. Below them, light and slow cases for the ends alone, where contact is a few peaks. Then
+jumps to a fifth or to ten times, on short lines, beside every element followed, which shares no search with the march.
 """
 
 import sys
@@ -16,6 +17,7 @@ ENDS = ("friction_coefficient_before", "friction_coefficient_jump", "friction_co
 TRACE = (*ENDS, "friction_coefficient")
 EVERY = (*TRACE, "indentation_depth")
 EXACT = 1e-6
+EARLY = tuple(float(time) for time in np.geomspace(1e-3, 5, 20))
 ROUNDING = 1e-9  # of a value: errors below are met
 
 
@@ -78,6 +80,36 @@ def honesty(cases, seed, kind=broad, outputs=EVERY, grid=(4, 8), accuracy=None):
     return rows
 
 
+def large(generator):
+    """Return a jump to a fifth or to as much as ten times the velocity, on a short line."""
+    hurst, points = float(generator.uniform(0, 1)), int(generator.choice([40, 80, 120]))
+    slope = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
+    force, velocity = 10 ** generator.uniform(-2.5, 1.5), 10 ** generator.uniform(-2, 0.6) / slope
+    change = float(generator.choice([-0.8, -0.5, 0.3, 1, 2, 4, 9]))
+    case = {"hurst": hurst, "points": points, "normal_force": force, "velocity": velocity, "relaxation_times": EARLY}
+    steps = {"shape": "steps", "times": [0.0], "velocities": [velocity * (1 + change)]}
+    return case | {"velocity_change": change}, case | {"protocol": steps}
+
+
+def beside_elements(cases, seed, grid=(4, 8)):
+    """Return what `honesty` does, of large jumps beside every element followed, whose own error counts as met."""
+    generator, outputs = np.random.default_rng(seed), ("friction_coefficient", "indentation_depth")
+    rows = np.full((cases, len(outputs), 2), np.nan)
+    for k in range(cases):
+        jump, history = large(generator)
+        found, exact = (
+            solve(case, 1000 * seed + k, *on, MODEL.with_companions(outputs))
+            for case, on in ((jump, grid), (history, (16, 24)))
+        )
+        if not found or not exact:
+            continue
+        for j, name in enumerate(outputs):
+            size, doubt = np.max(np.abs(exact[name])), np.max(exact[f"{name}_error"])
+            error = np.maximum(np.max(np.abs(found[name] - exact[name])) - doubt, 0.0)
+            rows[k, j] = error / np.maximum(np.max(found[f"{name}_error"]), ROUNDING * size), error / size
+    return rows
+
+
 def report(title, rows, outputs, accuracy=0.01):
     done = np.isfinite(rows[:, 0, 0])
     print(f"{title}: {done.sum()} of {len(rows)} converged")
@@ -98,3 +130,5 @@ if __name__ == "__main__":
     for accuracy in (0.05, 0.01, 0.002):
         rows = honesty(number, first, light, ENDS, accuracy=accuracy)
         report(f"light and slow, ends to {accuracy:g}", rows, ENDS, accuracy)
+    rows = beside_elements(number, first)
+    report("large jumps beside every element followed, 8 steps", rows, ("friction_coefficient", "indentation_depth"))

@@ -122,19 +122,22 @@ class Jump(NamedTuple):
         return int(self.path.shape[1])
 
 
-def pace_after(asked: Transient, deborah: float, change: float, load: float) -> Stepping:
+def pace_after(asked: Transient, deborah: FloatArray, change: float, load: float) -> Stepping:
     """Return steps from a part of the time in which 1 / q_max is passed, growing in a constant ratio.
+
+    It is passed at v_2, or at v_1 - v_2: so fast does contact grow behind a patch when the velocity falls.
 
     Parameters
     ----------
     asked : Transient
-    deborah : float
-        v_2 tau / L.
+    deborah : array, shape (2,)
+        v_1 tau / L and v_2 tau / L.
     change, load : float
         Difference of the depths before and after, and F_N / (4 G L), in the same unit.
     """
     finer = FINE_STEPS / asked.per_decade
-    first = SETTINGS.first_step * finer * min(1.0, 1 / (asked.wavenumber * deborah))
+    fastest = max(deborah[1], deborah[0] - deborah[1])
+    first = SETTINGS.first_step * finer * min(1.0, 1 / (asked.wavenumber * float(fastest)))
     scale = max(abs(change), SETTINGS.negligible * load)
     close = SETTINGS.newton * min(1.0, (8 / asked.per_decade) ** 2)
     last = float(asked.times[-1])
@@ -253,7 +256,7 @@ class _Relaxation(NamedTuple):
             ends.slower[k],
             bool(np.all(ends.contact[k] >= WHOLE)),
             asked,
-            pace_after(asked, float(deborah[1]), float(depth[1] - depth[0]), float(load)),
+            pace_after(asked, deborah, float(depth[1] - depth[0]), float(load)),
         )
 
     def solve(self) -> Jump:
@@ -319,7 +322,7 @@ class _Relaxation(NamedTuple):
             return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
         ends = np.array([self.after, self.depth[1]])
         path = np.stack([time, drag, depth])
-        trace, sinking = _at_times(time, path[1:], asked.times, ends)
+        trace, sinking = _at_times(time, path[1:], asked.times, ends, bool(self.deborah[1] < self.deborah[0]))
         path[2] -= self.line.cells.top
         return jump._replace(trace=trace, depth=sinking - self.line.cells.top, path=path)
 
@@ -379,10 +382,13 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
     return Reachable(runs[:count].copy(), floor)
 
 
-def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray) -> FloatArray:
-    """Interpolate over log time by modified Akima curves, which no kink makes overshoot; linear in the first step."""
-    scale = moments[1]
-    x, places = np.log1p(moments / scale), np.log1p(times / scale)
+def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray, falls: bool) -> FloatArray:
+    """Interpolate over log time by modified Akima curves, which no kink makes overshoot.
+
+    In the first step friction goes as the time; where the velocity falls as its root, as contact grows behind a patch.
+    """
+    scale, power = moments[1], 0.5 if falls else 1.0
+    x, places = (np.log1p((each / scale) ** power) for each in (moments, times))
     traces = np.empty((len(rows), times.size))
     for row, trace in zip(rows, traces, strict=True):
         curve_through(x, row, places, trace)

@@ -10,6 +10,8 @@ from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import velocity_jump as jumps_of
 from mdr_dask.physics.transients.contact_search import Reachable
+from mdr_dask.physics.transients.elements.foundation import KELVIN
+from mdr_dask.physics.transients.elements.loading_history import Piece, trace
 from mdr_dask.physics.transients.elements.steps import Schedule
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.patches import Track
@@ -121,6 +123,20 @@ def test_agrees_with_following_every_element(change: float) -> None:
         errors.append(np.max(np.abs(np.interp(times, moments, drag) - fast.trace)) / fast.after)
     assert errors[2] < 0.4 * errors[0]
     assert errors[2] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("deborah", "change", "load"), [(0.01, -0.8, 0.3), (0.01, -0.5, 0.3), (0.1, -0.8, 0.03), (0.01, 2.0, 0.03)]
+)
+def test_a_large_jump_is_right_from_its_beginning(deborah: float, change: float, load: float) -> None:
+    """Where the velocity falls, contact grows behind every patch as the root of the time, before the first step."""
+    times = np.geomspace(1e-3, 2, 25)
+    ends = deborah, deborah * (1 + change)
+    piece = Piece(0.0, np.inf, (ends[1], ends[1]), (load, load))
+    followed = trace(periodic_line(*line(oversampling=16)), KELVIN, deborah, [piece], times, 12)
+    found = solved(*line(oversampling=4), load, ends, times, 8)
+    transient = np.max(np.abs(followed.friction - followed.after))
+    assert np.max(np.abs(found.trace / load - followed.friction)) < 0.05 * transient
 
 
 def test_jump_condition_against_ever_finer_steps() -> None:
