@@ -211,7 +211,7 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.virgin.inner_radius
     unknowns = dense.unknowns(time)
     y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
-    before = dense.history[max(dense.steps(time) - 1, 0)]
+    before, after = dense.around(time)
     path = onward(before.path, problem.place(unknowns))
     moment = replace(before, time=time, unknowns=unknowns, gathered=dense.gathered(time), path=path)
     frozen, slope = _frozen(problem, path), panels.slope @ y
@@ -260,7 +260,13 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
         pressure=contact_pressure(profile, scar, a, depth, border),
         energy_volume=energy,
         steps=steps,
+        edge_step=abs(_edge(problem, after) - _edge(problem, before)),
     )
+
+
+def _edge(problem: ForcedSlip, moment: Pressed) -> float:
+    place = problem.place(moment.unknowns)
+    return problem.radius(place.border + place.width)
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:
