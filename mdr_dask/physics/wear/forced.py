@@ -36,7 +36,7 @@ class Settings(NamedTuple):
     torn : float
         The image is torn where y falls below minus this: the border stands from the moment before.
     coarsest : float
-        Accuracy beyond which steps do not follow the border.
+        Accuracy beyond which steps do not follow the border: more of them fail, so that less accuracy takes longer.
     rougher : tuple of float
         How much wider the accuracy of the two rougher solutions is.
     thinned : int
@@ -53,7 +53,7 @@ class Settings(NamedTuple):
     finer: int = 5
     latest_jump: float = 1e3
     torn: float = 1e-2
-    coarsest: float = 1e-3
+    coarsest: float = 3e-4
     rougher: tuple[float, float] = (4.0, 8.0)
     thinned: int = 1
     slowness: float = 2.0
@@ -97,7 +97,8 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
 def forced_resolution(accuracy: float) -> Resolution:
     """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
     finest = min(accuracy, SETTINGS.coarsest)
-    return Resolution(finest, thinned=SETTINGS.thinned, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
+    order = 4 if finest > 2e-4 else 5 if finest > 3e-5 else 6
+    return Resolution(finest, thinned=SETTINGS.thinned, order=order, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
