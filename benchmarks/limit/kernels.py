@@ -244,7 +244,8 @@ def breakthrough() -> Work:
     from mdr_dask.physics.lubrication import breakthrough as layers
     from mdr_dask.physics.lubrication import clusters
 
-    line = 0.2e-6 * _nodes(2)[0]
+    waves = 10_000
+    line = 0.2e-6 * roughness.line(roughness.amplitudes(waves, 0.7), roughness.phases(1, 0, waves), 20 * waves, 0)
     strength = float(layers.layer_strength(1e6, 115.385e9, 5e-9))
     above = clusters.excursions(line, 2e-7)
 
