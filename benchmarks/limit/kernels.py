@@ -151,8 +151,8 @@ def search_after_jump() -> Work:
 
     line, loads, deborah = PreparedLine.of(periodic_line(*_nodes(4))), np.array([0.3]), np.array([[0.02, 0.024]])
     ends = ends_on(line, loads, deborah)
-    course = jumps.Course(np.geomspace(1e-4, 8, 30), np.pi * POINTS, 6.0)
-    case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, course)
+    asked = jumps.Transient(np.geomspace(1e-4, 8, 30), np.pi * POINTS, 6.0)
+    case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, asked)
     marching, found, work = case.begun(next(case.limits(case.depth)), 3000)
     finish = Finish(case.depth[1], case.after, 1e-3 * abs(case.depth[1] - case.depth[0]), 1e-3)
     now = march_depth(marching, case.pace, finish, found, work)[0] // 2
