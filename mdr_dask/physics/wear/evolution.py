@@ -93,18 +93,18 @@ class Resolution(NamedTuple):
         """The length of the first step, over the time in which a contact changes."""
         return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
-    def panels(self, near: int, fewest_digits: float = 2.0) -> Panels:
-        """Return panels, halved `near` times more towards the inner border than towards the edge."""
+    def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0) -> Panels:
+        """Return panels, halved `near` times more at the inner border than at the edge, `sharpness` times as often."""
         digits = max(-np.log10(self.accuracy), fewest_digits)
         levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
         order = self.order or (4 if self.accuracy > 3e-5 else 6)
         left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))
-        return graded_panels(left, right, order - min(self.fewer, self.thinned))
+        return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
 
-    def panels_of_a_punch(self) -> Panels:
+    def panels_of_a_punch(self, sharpness: float) -> Panels:
         """Return panels for a pressure that tends to a jump at the edge."""
         halvings = round(2.0 * max(-np.log10(self.accuracy), 2.0)) - self.fewer
-        return graded_panels(halvings + 1, halvings + 4, 4 - min(self.fewer, self.thinned))
+        return graded_panels(round(sharpness * (halvings + 1)), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
         """Return the resolution for a finer accuracy."""

@@ -27,8 +27,11 @@ from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
-#: At constant depth: accuracy above which solutions are no coarser, and how much wider steps may be from 1e-3 on.
+#: Accuracy above which solutions are no coarser, and how much wider steps may be at constant depth from 1e-3 on.
 COARSEST, WIDEST = 1e-2, 2.0
+#: In gross slip: where the power of a body at its axis is told, how many times as many halvings the sharpest takes, and
+#: the error of the contact radius over the way that it moves in a step.
+NEAR_AXIS, SHARPEST, EDGE_OF_A_STEP = 1e-5, 8.0, 0.2
 Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
@@ -86,7 +89,7 @@ def exact(
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
     wanted = sorted({float(amount) for amount in amounts})
     resolutions = {forced_contacts: forced_resolution, _fretted: fretted_resolution}
-    resolution = resolutions.get(solve, Resolution)(accuracy)
+    resolution = resolutions.get(solve, Resolution)(min(accuracy, COARSEST))
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
     judged = {
@@ -94,7 +97,7 @@ def exact(
             one,
             rougher=tuple(other[amount] for other in rougher),
             slowness=resolution.slowness,
-            least_edge_error=least,
+            least_edge_error=max(least, one.least_edge_error),
         )
         for amount, one in found.items()
     }
@@ -144,11 +147,10 @@ def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) 
 def fretted_resolution(accuracy: float) -> Resolution:
     """Return the resolution for an accuracy at constant depth: the error falls as the root of that of the steps.
 
-    Steep bodies need more nodes a panel, and nothing is known of solutions that are rougher still than those of 1 %.
+    Steep bodies need more nodes a panel.
     """
-    finest = min(accuracy, COARSEST)
-    order = 4 if finest > 5e-3 else 5 if finest > 5e-4 else 6
-    return Resolution(finest, wider=float(np.clip(WIDEST * (finest / 1e-3) ** 0.6, 1.0, WIDEST)), order=order)
+    order = 4 if accuracy > 5e-3 else 5 if accuracy > 5e-4 else 6
+    return Resolution(accuracy, wider=float(np.clip(WIDEST * (accuracy / 1e-3) ** 0.6, 1.0, WIDEST)), order=order)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
@@ -213,7 +215,8 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
 
 def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
     """Solve gross slip at constant depth."""
-    return _slid_contacts(GrossSlip(profile, resolution.panels(3)), wanted, resolution.step, resolution.first)
+    panels = resolution.panels(3, sharpness=_sharpness(profile))
+    return _slid_contacts(GrossSlip(profile, panels), wanted, resolution.step, resolution.first)
 
 
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
@@ -222,10 +225,16 @@ def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resol
     The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps
     follow the panels' noise.
     """
-    panels = resolution.panels_of_a_punch()
+    panels = resolution.panels_of_a_punch(_sharpness(profile))
     virgin = GrossSlip(profile, panels)
     problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
     return _slid_contacts(problem, wanted, 5.0 * resolution.step, resolution.first)
+
+
+def _sharpness(profile: Profile) -> float:
+    """Return how many times as many halvings the axis needs as under a parabola: f is a power n/2 of r^2 there."""
+    near, far = profile.image(np.array([NEAR_AXIS, 2.0 * NEAR_AXIS]))
+    return float(np.clip(2.0 / np.log2(far / near), 1.0, SHARPEST)) if near > 0.0 else 1.0
 
 
 def _slid_contacts(problem: GrossSlip, wanted: Sequence[float], step: float, first: float) -> dict[float, Worn]:
@@ -240,6 +249,8 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
     profile, panels = problem.profile, problem.panels
     unknowns, gathered = (dense.unknowns(path), dense.gathered(path)) if path > 0.0 else (problem.start().unknowns, 0.0)
     worn = np.zeros(panels.nodes.size) + gathered
+    last = dense.steps(path)
+    before, after = (np.sqrt(problem.width(dense.history[k].unknowns)) for k in (max(last - 1, 0), last))
     (image, depth), width, radii = problem.image(unknowns), problem.width(unknowns), problem.radii(unknowns)
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
@@ -257,10 +268,11 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
         depth=depth,
         normal_force=problem.normal_force(unknowns),
         wear_volume=energy,  # int F ds exactly
-        worn_depth=float(np.max(worn)),
+        worn_depth=float(max(np.max(worn), depths(np.zeros(1))[0])),
         height=lambda r: np.asarray(profile.height(r) + depths(r)),
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
         energy_volume=energy,
-        steps=dense.steps(path),
+        steps=last,
+        least_edge_error=float(EDGE_OF_A_STEP * abs(after - before)),
     )

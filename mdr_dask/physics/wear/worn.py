@@ -32,7 +32,7 @@ class Settings(NamedTuple):
     ----------
     safety, edges, volumes : float
         Error over the distance from rougher solutions; of the radii of scar and stick zone, which are the least
-        determined quantities; of volumes, in which errors cancel.
+        determined quantities; of volumes in partial slip, in which errors cancel.
     second : float
         Share of the distance from the second one, which counts where the first is close by chance.
     reach : int
@@ -136,7 +136,8 @@ class Worn:
         distance = self.slowness * np.max(weighted, axis=0)
         if output in ("contact_radius", "stick_border"):
             return np.asarray(np.maximum(SETTINGS.edges * distance, self.least_edge_error))
-        return np.asarray((SETTINGS.volumes if output in VOLUMES else SETTINGS.safety) * distance)
+        cancels = output in VOLUMES and self.stick_border > 0.0
+        return np.asarray((SETTINGS.volumes if cancels else SETTINGS.safety) * distance)
 
     def _crowd(self, last: float) -> FloatArray:
         """Return places that crowd at the borders of stick and contact."""
