@@ -115,3 +115,11 @@ def test_operations_are_counted_as_they_are_run(benchmark_script):
     (counted,) = benchmark_script("limit.roofs").counts("phase factors").values()
     assert counted["store"] == 2
     assert counted["multiply"] > counted["add"] > 10
+
+
+def test_every_kernel_that_is_held_against_the_processor_can_be_called(benchmark_script):
+    """Counting them takes a minute; a name that is no more is found at once."""
+    for kernel in benchmark_script("limit.kernels").KERNELS:
+        work = kernel.prepare()
+        work.call()
+        assert work.units >= 1

@@ -36,13 +36,21 @@ def whole(tmp_path_factory):
 HARMS = [(kind, list(damage.HARMS)[number % len(damage.HARMS)]) for number, kind in enumerate(damage.KINDS)]
 
 
+OF_SERIES = [("copy of the layout", "truncate"), ("root metadata", "empty"), ("seal", "delete")]
+
+
 @pytest.mark.parametrize(
-    ("kind", "harm"), [*HARMS, ("values", "swap with a sibling"), ("ledger", "swap with a sibling")]
+    ("kind", "harm", "series"),
+    [
+        *((kind, harm, damage.KINDS[kind].startswith("far")) for kind, harm in HARMS),
+        *((kind, harm, True) for kind, harm in OF_SERIES),
+        ("values", "swap with a sibling", False),
+        ("ledger", "swap with a sibling", False),
+    ],
 )
-def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm):
+def test_harm_is_named_and_mended(toy, whole, tmp_path, kind, harm, series):
     """Every kind of file once; ``python -m benchmarks runner damage 700`` tries every harm to each, many times."""
     draw = random.Random(f"{kind} {harm}")
-    series = damage.KINDS[kind].startswith("far")
     trial = damage.try_harm(toy, *whole[series], tmp_path / "harmed.zarr", kind, harm, draw)
     assert trial.changed
     assert trial.faults == []

@@ -151,8 +151,8 @@ def search_after_jump() -> Work:
 
     line, loads, deborah = PreparedLine.of(periodic_line(*_nodes(4))), np.array([0.3]), np.array([[0.02, 0.024]])
     ends = ends_on(line, loads, deborah)
-    course = jumps.Course(np.geomspace(1e-4, 8, 30), np.pi * POINTS, 6.0)
-    case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, course)
+    asked = jumps.Transient(np.geomspace(1e-4, 8, 30), np.pi * POINTS, 6.0)
+    case = jumps._Relaxation.of(line, loads[0], deborah[0], ends, 0, asked)
     marching, found, work = case.begun(next(case.limits(case.depth)), 3000)
     finish = Finish(case.depth[1], case.after, 1e-3 * abs(case.depth[1] - case.depth[0]), 1e-3)
     now = march_depth(marching, case.pace, finish, found, work)[0] // 2
@@ -244,7 +244,8 @@ def breakthrough() -> Work:
     from mdr_dask.physics.lubrication import breakthrough as layers
     from mdr_dask.physics.lubrication import clusters
 
-    line = 0.2e-6 * _nodes(2)[0]
+    waves = 10_000
+    line = 0.2e-6 * roughness.line(roughness.amplitudes(waves, 0.7), roughness.phases(1, 0, waves), 20 * waves, 0)
     strength = float(layers.layer_strength(1e6, 115.385e9, 5e-9))
     above = clusters.excursions(line, 2e-7)
 

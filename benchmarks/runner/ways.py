@@ -267,4 +267,7 @@ def main(act: str, folder: str, lines: str, what: str) -> None:
 if __name__ == "__main__":
     from benchmarks.runner import ways  # so that workers find what is pickled
 
-    ways.main(*sys.argv[1:])
+    if sys.argv[1:]:
+        ways.main(*sys.argv[1:])
+    else:
+        print("\n".join(ways.WAYS))

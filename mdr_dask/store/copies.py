@@ -130,11 +130,11 @@ def _is_readable(url: str, series: str) -> bool:
         return False
 
 
-def root_of(copies: list[Copy]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return members and attributes of the root's metadata, put together from the copies of all groups."""
+def root_of(copies: list[Copy], others: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return members and attributes of the root's metadata, put together from copies, and others where none is left."""
     latest = max(copies, key=lambda copy: len(copy.study["history"]))
     root = next((copy.own for copy in copies if not copy.series), {})
-    members: dict[str, Any] = {}
+    members = dict(others)
     for copy in copies:
         members |= copy.members
     return members, {**latest.study, **root, **signpost(members)}

@@ -51,11 +51,10 @@ def _mend_layout(url: str, found: Inspection) -> None:
     for copy in copies:
         write_stages(url, [{name: copy.files[name] for name, _, _ in unsound_files(url, copy)}])
     if copies and "zarr.json" in named:
-        members, attributes = root_of(copies)
         kept = {}
         if len(copies) < len(found.groups):
             kept = (read_json(url, "zarr.json") or {}).get("consolidated_metadata", {}).get("metadata", {})
-        write_stages(url, [{"zarr.json": group_document({**kept, **members}, attributes)}])
+        write_stages(url, [{"zarr.json": group_document(*root_of(copies, kept))}])
     for group in found.groups:
         write_stages(url, [{name: group.documents[name] for name in group.bad_documents}])
         if group.copy is None and group.is_laid_out:

@@ -231,15 +231,15 @@ def unsound_files(url: str, copy: Copy) -> Iterator[tuple[str, str, bytes | None
 
 def is_root_sound(root: dict[str, Any], copies: list[Copy]) -> bool:
     """Say whether the root's metadata are those of the copies, or of a layout that was not finished after it."""
-    members, attributes = root_of(copies)
     try:
-        if len(root["attributes"]["history"]) < len(attributes["history"]):
-            return bool(root["attributes"] | {"history": []}) and "metadata" in root["consolidated_metadata"]
         held = root["consolidated_metadata"]["metadata"]
+        members, attributes = root_of(copies, held)
+        if len(root["attributes"]["history"]) < len(attributes["history"]):
+            return bool(root["attributes"] | {"history": []})
         mine = json.loads(json.dumps(members))
         stated = json.loads(json.dumps(attributes))
         before = {name: value for name, value in stated.items() if name != "comment"}  # as development versions wrote
         same = all(held.get(name) == document for name, document in mine.items())
         return same and root["attributes"] in (stated, before)
-    except (KeyError, TypeError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         return False

@@ -168,7 +168,7 @@ def inspect(url: str) -> Inspection:
     copies = [group.copy for group in found.groups if group.copy]
     if copies and root and not is_root_sound(root, copies):
         found.findings.append(Finding("damaged", "zarr.json", "not what was laid out"))
-    elif copies and root and len(root["attributes"]["history"]) < len(root_of(copies)[1]["history"]):
+    elif copies and root and len(root["attributes"]["history"]) < len(root_of(copies, {})[1]["history"]):
         found.notes.append("a run was stopped while it laid the study out; the next one goes on")
     known = {"zarr.json"}
     for group in found.groups:
