@@ -58,9 +58,14 @@ def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str
 
 
 def alone(
-    model: Model[Any], parameters: Parameters, realisation: int, outputs: tuple[str, ...], seed: int
+    model: Model[Any],
+    parameters: Parameters,
+    realisation: int,
+    outputs: tuple[str, ...],
+    seed: int,
+    accuracy: float | None = None,
 ) -> dict[str, np.ndarray] | None:
     """Return the outputs of one case in one realisation, or None if it is not done."""
-    found = model.compute(Block(parameters, {}, 1, (realisation,), seed, outputs))
+    found = model.compute(Block(parameters, {}, 1, (realisation,), seed, outputs, accuracy))
     done = found.status[0, 0] == Status.DONE
     return {name: value[0, 0] for name, value in found.values.items()} if done else None

@@ -174,11 +174,11 @@ REST
     },
     {
         a: (
-            f"points: {points}",
-            "realisations: {at_least: 10, at_most: 60, until: {breakthrough_probability: "
+            "points: auto",
+            f"accuracy: {a:g}\nrealisations: {{at_least: 10, at_most: 60, until: {{breakthrough_probability: "
             f"{{relative: {a:g}, absolute: {a / 4:g}}}}}}}\n",
         )
-        for a, points in {0.1: 250_000, 0.05: 500_000, 0.02: 500_000}.items()
+        for a in (0.1, 0.05, 0.02)
     },
     ("points: 3000000", "realisations: 40\nerrors: false\n"),
     (("points: 220000", "realisations: 4\n"), ("points: 220000", "realisations: 8\n")),

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from benchmarks.mixed import honesty
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
+from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.mixed_lubrication.operation import operation_of
@@ -196,13 +197,56 @@ def test_errors_of_a_turn_come_from_every_fourth_point(force, parts):
     assert found["contact_resistance_error"] == pytest.approx(2e-7 / (length - off) - 2e-7 / length, rel=1e-3)
 
 
-@pytest.mark.parametrize("points", [50_000, 100_000])
-def test_errors_of_turns_hold(points):
+@pytest.mark.parametrize("number", [50_000, 100_000])
+def test_errors_of_turns_hold(number):
     """Three in thirty of random rollers, layers, edge rules and creeps may lie beyond, none threefold."""
-    errors, stated = honesty.judged(15, 77, points)
+    errors, stated = honesty.judged(15, 77, number)
     assert np.mean(errors <= stated) >= 0.9
     assert np.max(errors / stated) < 3
     assert np.median(stated / errors) < 7
+
+
+def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
+    """Four films on two layers, two turns each, against four times the most points that the accuracy may choose."""
+    layers, films = (each.ravel() for each in np.meshgrid([5e-9, 2e-8], [3e-7, 4e-7, 5e-7, 6e-7]))
+    columns = {"layer_thickness": layers, "film_thickness": films}
+    rollers = {"points": "auto", "shortest_wavelength": 2e-6, "columns": columns, "realisations": (0, 1)}
+    asked = dataclasses.replace(block(["breakthrough_probability"], **rollers), accuracy=0.1)
+    begun = points.first(operation_of(asked.case(0), 0.1), 0.1).source.points
+    truth = MODEL.compute(block(["breakthrough_probability"], **rollers | {"points": 16 * begun})).values
+    found = MODEL.compute(asked)
+    value, stated = (found.values[f"breakthrough_probability{end}"] for end in ("", "_error"))
+    errors = abs(value - truth["breakthrough_probability"])
+    assert np.mean(errors <= stated) >= 0.9
+    met = stated <= 0.1 * value
+    assert np.mean(met) >= 0.7
+    assert np.all(errors[met] <= 0.1 * value[met])
+    assert {at for at, note in found.messages.items() if "was asked for" in note} == set(
+        zip(*np.nonzero(~met), strict=True)
+    )
+
+
+def test_a_case_is_on_the_points_of_its_layer_and_accuracy_whatever_its_neighbours():
+    """Bitwise as on so many points asked for, with all the outputs or one; other layers, other points."""
+    columns = {"layer_thickness": np.array([1e-9, 3e-9, 8e-9]), "film_thickness": np.array([4e-7, 3e-7, 7e-7])}
+    rollers = {"points": "auto", "shortest_wavelength": 4e-6}
+    chosen = set()
+    for accuracy in (0.1, 0.005):
+        asked = dataclasses.replace(block(columns=columns, **rollers), accuracy=accuracy)
+        together, one = MODEL.compute(asked), dataclasses.replace(asked, outputs=("contact_length",))
+        for index in range(3):
+            begun = points.first(operation_of(asked.case(index), accuracy), accuracy).source.points
+            found = together.values["contact_length"][index, 0]
+            assert MODEL.compute(one.part(index, 0)).values["contact_length"] == found
+            ladder = [
+                MODEL.compute(block(**rollers | {"points": begun * times} | {k: v[index] for k, v in columns.items()}))
+                for times in (1, 2, 4)
+            ]
+            on = [level.values["contact_length"][0, 0] == found for level in ladder]
+            assert any(on)
+            chosen.add((begun, on.index(True)))
+    assert len({begun for begun, _ in chosen}) > 3
+    assert len({times for _, times in chosen}) > 1
 
 
 @pytest.mark.parametrize("creep", [0.0, 0.05])
@@ -454,6 +498,8 @@ def test_trace_under_slip_agrees_with_its_mean(slip):
             "expected the longest wavelength above the shortest",
         ),
         ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two spacings"),
+        ({"points": "auto"}, "expected a shortest_wavelength in metres where points are auto, got auto for both"),
+        ({"points": "auto", "shortest_wavelength": 1e-9}, "expected a shortest_wavelength of at least 1.571e-09 m"),
         ({"rms_roughness": None}, "expected rms_roughness, or surface_1 and surface_2"),
         ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
     ],
@@ -525,6 +571,8 @@ def test_time_estimate_grows_with_cases_points_and_creep():
     small = MODEL.seconds(block())
     assert MODEL.seconds(block(columns={"normal_force": np.full(50, 100.0)})) > small
     assert MODEL.seconds(block(points=200_000)) > small
+    rough = block(points="auto", shortest_wavelength=1e-5)
+    assert MODEL.seconds(dataclasses.replace(rough, accuracy=0.001)) > MODEL.seconds(rough) > 0
     assert MODEL.seconds(block(slide_roll_ratio=0.1)) > small
     many, none = (
         MODEL.seconds(block(columns={"hurst": each})) for each in (np.linspace(0.6, 0.8, 50), np.full(50, 0.7))

@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import (
     Block,
@@ -29,6 +30,8 @@ from mdr_dask.physics.lubrication.oil import OILS, Oil
 Positive = Annotated[float, Field(gt=0)]
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
+#: Points of a line at most; and the fewest spacings of its shortest wave where the accuracy chooses the points.
+MOST_POINTS, LEAST_PER_WAVE = 10**7, 2.5
 #: Places of the profiles in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
@@ -57,7 +60,11 @@ class MixedLubrication(Parameters):
         "m", "rms height of each roller; needed unless surfaces are given", usual="0.2 um", default=None
     )
     hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
-    points: int = quantity("1", "points of each line around the roller", default=1_000_000, ge=64, le=10**7)
+    points: Annotated[int, Field(ge=64, le=MOST_POINTS)] | Literal["auto"] = quantity(
+        "1",
+        "points of each line around the roller; auto meets the accuracy, with a shortest_wavelength of its own",
+        default=1_000_000,
+    )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
         "wavelength above which there is no roughness; auto is 2a at cutoff_force. Of measured lines only the "
@@ -135,11 +142,14 @@ class MixedLubrication(Parameters):
         one, two = self.surface_1, self.surface_2
         if one is not None and two is not None and one.profile is not None and two.profile is not None:
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
-        shortest = self.shortest_wavelength
+        shortest, points = self.shortest_wavelength, self.points
         if shortest == "auto":
-            shortest = 10 * self.perimeter / self.points
+            assert points != "auto"
+            shortest = 10 * self.perimeter / points
         modes = int(self.perimeter / shortest * (1 + 1e-12))
-        waves = self.points, self.perimeter / self.longest(), modes
+        if points == "auto":
+            points = int(np.ceil(LEAST_PER_WAVE * modes))
+        waves = points, self.perimeter / self.longest(), modes
         if one is not None and two is not None:
             return OfSurfaces(*waves, one, two, self.perimeter)
         assert self.hurst is not None
@@ -154,6 +164,7 @@ class MixedLubrication(Parameters):
     def problem(self) -> str:
         """Say why the case cannot be computed, in one sentence; an empty string if it can."""
         problem = self._problem_of_surfaces()
+        problem = problem or self._problem_of_points()
         if problem:
             return problem
         outside = self.oil_data().outside(self.temperature)
@@ -177,6 +188,22 @@ class MixedLubrication(Parameters):
         if one.profile is None and self.rms_roughness is not None:
             return "the surfaces take the place of rms_roughness: leave out one or the other"
         return "" if self.hurst is None else "the surfaces take the place of hurst: leave out one or the other"
+
+    def _problem_of_points(self) -> str:
+        if self.points != "auto" or (self.surface_1 is not None and self.surface_1.profile is not None):
+            return ""
+        if self.shortest_wavelength == "auto":
+            return (
+                "expected a shortest_wavelength in metres where points are auto, got auto for both; give one, or a "
+                "number of points"
+            )
+        least = LEAST_PER_WAVE * self.perimeter / MOST_POINTS
+        if self.shortest_wavelength < least:
+            return (
+                f"expected a shortest_wavelength of at least {least:.4g} m, {LEAST_PER_WAVE} spacings of {MOST_POINTS} "
+                f"points, got {self.shortest_wavelength:.4g} m"
+            )
+        return ""
 
     def _problem_of_width(self, source: Source) -> str:
         length = source.points * source.spacing(self.perimeter)
@@ -250,13 +277,24 @@ OF_LINES = {
 
 def seconds(block: Block[MixedLubrication]) -> float:
     """Estimate the time of a block from its lines, points, cases, creep, drawn places and solutions of the film."""
-    millions = np.asarray(block.column("points"), dtype=np.float64) / 1e6
+    millions = _expected_points(block) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
     case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
     films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
     keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
     lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
     return films + len(block.realisations) * float(0.06 * sum(lines.values()) + np.sum(millions * case))
+
+
+def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
+    """Return the points of every case; where the accuracy chooses them, those of a usual layer."""
+    per_wave = max(LEAST_PER_WAVE, float(np.sqrt(2 / (block.accuracy or 0.01))))
+    columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
+    expected = np.empty(block.cases)
+    for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
+        waves = 0.0 if shortest == "auto" else 2 * np.pi * radius / shortest  # none where the lines are measured
+        expected[case] = per_wave * waves if points == "auto" else points
+    return expected
 
 
 MODEL = Model(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -65,6 +65,11 @@ class Operation:
         """Spacing of the points over the length ``slope/s`` of the pieces, cut off by an edge, that break the layer."""
         return self.spacing * self.strength / self.source.slope(self.case.perimeter)
 
+    def on(self, source: Source) -> Operation:
+        """Return the same case on the points of another source of the same lines."""
+        spacing = source.spacing(self.case.perimeter)
+        return replace(self, source=source, spacing=spacing, window=_window(self.contact, spacing, source))
+
     @property
     def rms(self) -> float:
         """Rms height of both lines together in m."""
@@ -102,13 +107,17 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
         film_error=error,
         scale=scale,
         spacing=spacing,
-        window=breakthrough.window_points(float(contact.half_width), spacing, source.points),
+        window=_window(contact, spacing, source),
         strength=float(
             breakthrough.layer_strength(case.layer_shear_strength, case.contact_modulus, case.layer_thickness)
         )
         / scale,
         warning="; ".join(note for note in (warning, film_formulas.thick_film(shared.film / _radius(case))) if note),
     )
+
+
+def _window(contact: HertzLine, spacing: float, source: Source) -> int:
+    return breakthrough.window_points(float(contact.half_width), spacing, source.points)
 
 
 def _radius(case: MixedLubrication) -> float:

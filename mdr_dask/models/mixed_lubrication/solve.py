@@ -10,10 +10,20 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
-from mdr_dask.models.mixed_lubrication.turn import SETTINGS, Turn, creeping, profiles, rolling, trace, turn_values
+from mdr_dask.models.mixed_lubrication.turn import (
+    SETTINGS,
+    Turn,
+    creeping,
+    profiles,
+    rolling,
+    trace,
+    turn_errors,
+    turn_values,
+)
 from mdr_dask.physics.lubrication.clusters import Excursions, excursions
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
@@ -47,7 +57,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
             _refuse(result, index, Status.FAILED, problem)
             continue
         try:
-            operation = operation_of(case, block.accuracy)
+            operation = points.first(operation_of(case, block.accuracy), block.accuracy)
         except NoFilmError as error:
             _refuse(result, index, Status.NOT_CONVERGED, str(error))
             continue
@@ -116,10 +126,14 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest."""
+    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest.
+
+    Those that miss the accuracy, where it chooses the points, follow on finer lines.
+    """
     drawn = block.seed, block.realisations[position]
     lines = cache(partial(source.lines, *drawn))
     above: Excursions | None = None
+    again: dict[Source, list[tuple[int, Operation]]] = {}
     for index, operation in members:
         solve: Callable[..., Turn]
         if operation.case.slide_roll_ratio == 0:
@@ -129,13 +143,22 @@ def _realise(
         else:
             solve = partial(creeping, operation, lines())
         turn = solve()
-        found = turn_values(operation, turn, partial(solve, coarser=SETTINGS.coarser), block.outputs)
+        errors = cache(partial(turn_errors, operation, turn, partial(solve, coarser=SETTINGS.coarser)))
+        finer = points.finer(operation, turn, errors, block.accuracy)
+        if finer is not None:
+            again.setdefault(finer.source, []).append((index, finer))
+            continue
+        found = turn_values(operation, turn, errors, block.outputs)
         _store(result, block, index, position, found)
-        _note(result, index, position, _missed(block, found, "; raise points"))
+        _note(
+            result, index, position, _missed(block, found, "" if operation.case.points == "auto" else "; raise points")
+        )
         if "contact_length_trace" in block.outputs:
             _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
         if _PROFILES & set(block.outputs):
             _store(result, block, index, position, profiles(operation, turn, lines()))
+    for finer_source, members_again in again.items():
+        _realise(result, block, finer_source, members_again, position)
 
 
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:

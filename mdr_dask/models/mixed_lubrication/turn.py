@@ -135,10 +135,19 @@ def _parts(operation: Operation) -> int:
     return max(1, min(SETTINGS.parts, operation.source.points // (2 * operation.window)))
 
 
+def turn_errors(operation: Operation, turn: Turn, coarser: Callable[[], Turn]) -> FloatArray:
+    """Return the errors of probability and number of points in contact, from the turn of a coarser line."""
+    if operation.coarseness < SETTINGS.resolved:
+        return turn.errors(coarser())
+    return np.array(
+        [max(turn.probability, 1 - turn.probability), max(turn.points, operation.window - turn.points)], dtype=float
+    )
+
+
 def turn_values(
-    operation: Operation, turn: Turn, coarser: Callable[[], Turn], wanted: Collection[str]
+    operation: Operation, turn: Turn, errors: Callable[[], FloatArray], wanted: Collection[str]
 ) -> dict[str, float]:
-    """Return the scalar outputs of a realisation that are wanted, and errors from the turn of a coarser line."""
+    """Return the scalar outputs of a realisation that are wanted, and their errors from those of `turn_errors`."""
     resistivity = operation.case.resistivity
     length = turn.points * operation.spacing
     found: dict[str, Callable[[], float]] = {
@@ -150,11 +159,7 @@ def turn_values(
     }
     values = {name: value() for name, value in found.items() if name in wanted}
     if {f"{name}_error" for name in values} & set(wanted):
-        if operation.coarseness < SETTINGS.resolved:
-            of_probability, of_points = turn.errors(coarser()).tolist()
-        else:
-            of_probability = max(turn.probability, 1 - turn.probability)
-            of_points = max(turn.points, operation.window - turn.points)
+        of_probability, of_points = errors().tolist()
         off = of_points * operation.spacing
         values |= {
             "breakthrough_probability_error": of_probability,
