@@ -231,7 +231,7 @@ def test_a_case_is_on_the_points_of_its_layer_and_accuracy_whatever_its_neighbou
     columns = {"layer_thickness": np.array([1e-9, 3e-9, 8e-9]), "film_thickness": np.array([4e-7, 3e-7, 7e-7])}
     rollers = {"points": "auto", "shortest_wavelength": 4e-6}
     chosen = set()
-    for accuracy in (0.1, 0.005):
+    for accuracy in (0.5, 0.02):
         asked = dataclasses.replace(block(columns=columns, **rollers), accuracy=accuracy)
         together, one = MODEL.compute(asked), dataclasses.replace(asked, outputs=("contact_length",))
         for index in range(3):
@@ -245,7 +245,7 @@ def test_a_case_is_on_the_points_of_its_layer_and_accuracy_whatever_its_neighbou
             on = [level.values["contact_length"][0, 0] == found for level in ladder]
             assert any(on)
             chosen.add((begun, on.index(True)))
-    assert len({begun for begun, _ in chosen}) > 3
+    assert len({begun for begun, _ in chosen}) > 2
     assert len({times for _, times in chosen}) > 1
 
 
