@@ -2,7 +2,7 @@
 
 Each goes through the runner into a store on disk, on one thread: with fixed grids and numbers of lines, and told no
 more than what is wanted. The error is rms over cases, each over its truth, which a finer setting and other lines give.
-Ten seeds are ten points.
+Ten seeds are ten points. Where nothing is random, accuracy is promised for every case: the error is the largest.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Study:
                     for (method, setting), each in settings.items():
                         found, seconds = self.run(folder, scene, each, seed)
                         errors = (found - truth) / np.maximum(np.abs(truth), self.least)
-                        error = float(np.sqrt(np.mean(errors**2)))
+                        error = float(np.sqrt(np.mean(errors**2)) if self.seeds > 1 else np.max(np.abs(errors)))
                         yield Point(solver, scene, method, setting, seconds, error)
 
 
@@ -223,7 +223,10 @@ REST
         "hard: n = 8": {"BODY": "{shape: power, exponent: 8}", "HELD": "depth"},
     },
     {("fast rule", ""): ("wear_rule: fast", "")}
-    | {("exact rule", f"to {a:g} of the depth that wears"): (f"accuracy: {a:g}", "") for a in (0.1, 0.01, 1e-3, 1e-4)},
+    | {
+        ("exact rule", f"to {a:g} of the depth that wears"): (f"accuracy: {a:g}", "")
+        for a in (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5)
+    },
     {a: ("", f"accuracy: {a:g}\n") for a in (0.1, 0.01, 1e-3, 1e-4)},
     ("accuracy: 1e-5", ""),
     (("accuracy: 0.1", ""), ("accuracy: 1e-4", "")),

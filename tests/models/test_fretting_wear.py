@@ -282,3 +282,20 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
             assert all("1.0e-08 was asked for" in text for text in result.messages.values())
         alone = MODEL.compute(Block(parameters, {"cycles": columns["cycles"][1:]}, 1, (0,), 1, names, accuracy))
         assert alone.values["wear_volume"][0, 0] == result.values["wear_volume"][1, 0]
+
+
+@pytest.mark.parametrize(("hold", "accuracy"), [("depth", 1e-3), ("force", 1e-4)])
+def test_an_accuracy_is_met_by_the_first_solution_and_its_two_rougher_ones(monkeypatch, hold, accuracy):
+    """It took six marches at constant depth and nine under constant force: volumes stated ten times their error."""
+    marches = []
+    monkeypatch.setattr(
+        "mdr_dask.physics.wear.exact._first_of", lambda solve, ways: marches.append(1) or solve(ways[0])
+    )
+    parameters, columns = FrettingWear(stick_radius=0.8, hold=hold), {"cycles": np.array([0.5, 2.0, 8.0])}
+    names = ("wear_volume", "wear_volume_error")
+    result = MODEL.compute(Block(parameters, columns, 3, (0,), 1, names, accuracy))
+    truth = exact(PowerProfile(2.0), 0.8, columns["cycles"], 3e-5, constant_force=hold == "force", errors=False)
+    volumes, errors = (result.values[name][:, 0] for name in names)
+    assert len(marches) == 3 + 1  # one of the truth
+    assert np.all(errors <= accuracy * volumes)
+    assert np.all(np.abs(volumes - [worn.wear_volume for worn in truth]) <= errors)

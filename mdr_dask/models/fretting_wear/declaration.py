@@ -164,8 +164,13 @@ class FrettingWear(Parameters):
         "1", "wear coefficient k of the law V = k F u / hardness", usual="1e-4", ge=0, default=None
     )
     xi: float = quantity("1", "factor of the fast rule; docs/wear.md has its error", gt=0, default=0.8)
-    accuracy: float = quantity(
-        "1", "error of the exact profile wanted, over the depth eta d0 that can wear", ge=1e-5, le=1e-1, default=1e-3
+    accuracy: float | None = quantity(
+        "1",
+        "error of the exact profile wanted, over the depth eta d0 that can wear; 1e-3 if not given, or what the "
+        "campaign's accuracy needs",
+        ge=1e-5,
+        le=1e-1,
+        default=None,
     )
     cells: int = quantity("1", "cells of the grid of histories", ge=20, le=2000, default=200)
     friction_scatter: float = quantity("1", "relative scatter of friction (log-normal)", ge=0, le=2, default=0.0)

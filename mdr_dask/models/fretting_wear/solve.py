@@ -34,7 +34,9 @@ _CLOSED_FORMS = ("contact_radius", "wear_volume", "normal_force", "stick_border"
 _RENAMED = {"contact_force": "normal_force"}
 #: Accuracies that are tried in turn where the campaign asks for a relative one: down to the finest, each half of the
 #: last at most, and less the more was missed, as errors fall with it; somewhat less, for they may fall more slowly.
-_FINEST, _FINER, _ENOUGH = 1e-5, 0.5, 0.7
+_USUAL, _FINEST, _FINER, _ENOUGH = 1e-3, 1e-5, 0.5, 0.7
+#: The accuracy that cases begin at over that of the campaign: to begin again costs more than to begin finer.
+_BEGIN = {"depth": 0.2, "force": 0.6}
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -50,7 +52,7 @@ class Task:
     level: float
     rule: str
     hold: str
-    accuracy: float
+    accuracy: float | None
     cells: int
     blocks: tuple[tuple[float, float, float], ...]
 
@@ -88,7 +90,7 @@ def seconds(block: Block[FrettingWear]) -> float:
         return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
-    finer = (1e-3 / parameters.accuracy) ** 0.6
+    finer = (_USUAL / _first_accuracy(parameters.accuracy, block.accuracy, parameters.hold)) ** 0.6
     each = {"limit": 1e-3, "fast": 1e-3, "exact": 0.03 * finer}[parameters.wear_rule]
     if parameters.hold == "force":
         each = {"limit": 0.3 * finer, "fast": 0.03, "exact": 0.5 * finer}[parameters.wear_rule]
@@ -297,15 +299,21 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
         float(numbers.level[place]),
         "sliding" if parameters.path is not None else parameters.wear_rule,
         parameters.hold,
-        parameters.accuracy if followed else 0.0,
+        parameters.accuracy if followed else None,
         parameters.cells if blocks else 0,
         blocks,
     )
 
 
+def _first_accuracy(given: float | None, asked: float | None, hold: str) -> float:
+    """Return the accuracy that a case begins at: the finer of that given and what the campaign's probably needs."""
+    needed = _USUAL if given is None and asked is None else np.inf if asked is None else _BEGIN[hold] * asked
+    return max(min(needed, np.inf if given is None else given), _FINEST)
+
+
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
     """Solve a task for all its (N, xi), more finely for those that miss the accuracy asked; say which still do."""
-    accuracy, left = max(min(task.accuracy, demand.accuracy or np.inf), _FINEST), list(range(len(wanted)))
+    accuracy, left = _first_accuracy(task.accuracy, demand.accuracy, task.hold), list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
         contacts = _solved(task, [wanted[number] for number in left], accuracy, errors=demand.errors)

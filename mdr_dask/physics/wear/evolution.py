@@ -253,6 +253,11 @@ class Dense:
         """Return the number of steps up to the one that passed a time."""
         return int(np.searchsorted(self.times, time))
 
+    def around(self, time: float) -> tuple[Any, Any]:
+        """Return the moments that the step which passed a time led from and to."""
+        last = self.steps(time)
+        return self.history[max(last - 1, 0)], self.history[last]
+
     def near(self, time: float) -> tuple[Sequence[Any], FloatArray]:
         """Return the moment at or after a time with up to three before it, and their weights."""
         last = self.steps(time)
@@ -331,6 +336,8 @@ class _Newton:
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(SETTINGS.most_iterations):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
+            if not np.all(np.isfinite(residual)):
+                return None
             if renew:
                 self._renew(unknowns, theta, known, residual)
             if self.factors is None:

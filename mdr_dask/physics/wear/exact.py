@@ -24,14 +24,13 @@ from mdr_dask.physics.wear.forced import (
     least_edge_error,
 )
 from mdr_dask.physics.wear.rules import limit, limit_radius
-from mdr_dask.physics.wear.slip import GrossSlip, PartialSlip, partial_slip
+from mdr_dask.physics.wear.slip import FixedBorder, GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
 #: Accuracy above which solutions are no coarser, and how much wider steps may be at constant depth from 1e-3 on.
 COARSEST, WIDEST = 1e-2, 2.0
-#: In gross slip: where the power of a body at its axis is told, how many times as many halvings the sharpest takes, and
-#: the error of the contact radius over the way that it moves in a step.
-NEAR_AXIS, SHARPEST, EDGE_OF_A_STEP = 1e-5, 8.0, 0.2
+#: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
+NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Found = TypeVar("Found")
 Solver = Callable[[Profile, float, Sequence[float], Resolution], dict[float, Worn]]
 
@@ -97,7 +96,7 @@ def exact(
             one,
             rougher=tuple(other[amount] for other in rougher),
             slowness=resolution.slowness,
-            least_edge_error=max(least, one.least_edge_error),
+            least_edge_error=least,
         )
         for amount, one in found.items()
     }
@@ -210,7 +209,14 @@ def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: fl
         pressure=contact_pressure(profile, scar, a, 1.0, c),
         energy_volume=energy,
         steps=dense.steps(time),
+        edge_step=_edge_step(problem, dense, time),
     )
+
+
+def _edge_step(problem: FixedBorder, dense: Dense, time: float) -> float:
+    """Return how far the edge moved in the step that passed a time."""
+    before, after = (problem.radii(moment.unknowns)[-1] for moment in dense.around(time))
+    return float(abs(after - before))
 
 
 def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
@@ -249,8 +255,6 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
     profile, panels = problem.profile, problem.panels
     unknowns, gathered = (dense.unknowns(path), dense.gathered(path)) if path > 0.0 else (problem.start().unknowns, 0.0)
     worn = np.zeros(panels.nodes.size) + gathered
-    last = dense.steps(path)
-    before, after = (np.sqrt(problem.width(dense.history[k].unknowns)) for k in (max(last - 1, 0), last))
     (image, depth), width, radii = problem.image(unknowns), problem.width(unknowns), problem.radii(unknowns)
 
     def inside(values: FloatArray, beyond: float) -> Callable[[FloatArray], FloatArray]:
@@ -273,6 +277,6 @@ def _slid_contact(problem: GrossSlip, dense: Dense, path: float, energy: float) 
         image=lambda x: np.asarray(profile.image(np.abs(x)) + changes(np.abs(x))),
         pressure=inside(problem.rate(unknowns), 0.0),
         energy_volume=energy,
-        steps=last,
-        least_edge_error=float(EDGE_OF_A_STEP * abs(after - before)),
+        steps=dense.steps(path),
+        edge_step=_edge_step(problem, dense, path),
     )

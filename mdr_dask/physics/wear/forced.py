@@ -36,7 +36,7 @@ class Settings(NamedTuple):
     torn : float
         The image is torn where y falls below minus this: the border stands from the moment before.
     coarsest : float
-        Accuracy beyond which steps do not follow the border.
+        Accuracy beyond which steps do not follow the border: more of them fail, so that less accuracy takes longer.
     rougher : tuple of float
         How much wider the accuracy of the two rougher solutions is.
     thinned : int
@@ -53,7 +53,7 @@ class Settings(NamedTuple):
     finer: int = 5
     latest_jump: float = 1e3
     torn: float = 1e-2
-    coarsest: float = 1e-3
+    coarsest: float = 3e-4
     rougher: tuple[float, float] = (4.0, 8.0)
     thinned: int = 1
     slowness: float = 2.0
@@ -97,7 +97,8 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
 def forced_resolution(accuracy: float) -> Resolution:
     """Return the resolution for an accuracy under constant force: the border asks for more than the edge."""
     finest = min(accuracy, SETTINGS.coarsest)
-    return Resolution(finest, thinned=SETTINGS.thinned, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
+    order = 4 if finest > 2e-4 else 5 if finest > 3e-5 else 6
+    return Resolution(finest, thinned=SETTINGS.thinned, order=order, rough=SETTINGS.rougher, slowness=SETTINGS.slowness)
 
 
 def border_moves(stick_radius: float, accuracy: float) -> bool:
@@ -211,7 +212,7 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
     profile, panels, eta, c = problem.profile, problem.panels, problem.eta, problem.virgin.inner_radius
     unknowns = dense.unknowns(time)
     y, (place, width, deeper) = problem.image(unknowns), problem.place(unknowns)
-    before = dense.history[max(dense.steps(time) - 1, 0)]
+    before, after = dense.around(time)
     path = onward(before.path, problem.place(unknowns))
     moment = replace(before, time=time, unknowns=unknowns, gathered=dense.gathered(time), path=path)
     frozen, slope = _frozen(problem, path), panels.slope @ y
@@ -260,7 +261,13 @@ def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, step
         pressure=contact_pressure(profile, scar, a, depth, border),
         energy_volume=energy,
         steps=steps,
+        edge_step=abs(_edge(problem, after) - _edge(problem, before)),
     )
+
+
+def _edge(problem: ForcedSlip, moment: Pressed) -> float:
+    place = problem.place(moment.unknowns)
+    return problem.radius(place.border + place.width)
 
 
 def _breaks(c: float, border: float) -> tuple[float, ...]:

