@@ -20,7 +20,7 @@ def test_the_rise_of_a_power_is_that_of_its_formula_down_to_the_centre(exponent,
 
 @pytest.mark.parametrize("gap", [-0.3, -0.019, 0.003, 0.015, 0.4])
 def test_the_rise_of_a_table_is_the_difference_of_its_image(gap):
-    """Over short distances it is the integral of the slope by eight values, which kinks of the table make wrong by 1e-4."""
+    """Over short distances it is the integral of the slope by eight values; kinks of a table make it wrong by 1e-4."""
     rise = getattr(image_rise, "py_func", image_rise)
     radius = np.linspace(0, 2, 400)
     profile = from_table(radius, radius**2 + 0.3 * np.sin(2 * radius) ** 2, 1.0)
