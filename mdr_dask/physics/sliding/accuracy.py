@@ -135,10 +135,11 @@ class Ladder:
         if self.line.body is not None:
             return self._swept(accuracy, 2)
         nodes = self._nodes(full_contact.SEEN)
-        steady, errors = in_full_contact(self.line, (), nodes, self.deborah, self.loads)
-        left = steady.status != Outcome.CONVERGED
-        if np.all(left):
+        closed = in_full_contact(self.line, (), nodes, self.deborah, self.loads)
+        if closed is None:
             return self._partly(accuracy, nodes)
+        steady, errors = closed
+        left = steady.status != Outcome.CONVERGED
         if np.any(left):
             found, found_errors = self.only(left)._partly(accuracy, nodes)
             steady, errors = steady.replaced(left, found), errors.replaced(left, found_errors)
@@ -258,10 +259,10 @@ def in_full_contact(
     nodes: tuple[FloatArray, FloatArray],
     deborah: FloatArray,
     loads: FloatArray,
-) -> tuple[Steady, Errors]:
-    """Return steady states and errors of what is in full contact with a plane, NaN of what is not."""
-    steady = full_contact.full_contact(line.roughness, arms, nodes, deborah, loads)
-    return steady, Errors(*full_contact.ROUNDING * np.abs(_columns(steady)))
+) -> tuple[Steady, Errors] | None:
+    """Return steady states and errors of what is in full contact with a plane, NaN of what is not; None without any."""
+    steady = full_contact.steady_full_contact(line.roughness, arms, nodes, deborah, loads)
+    return None if steady is None else (steady, Errors(*full_contact.ROUNDING * _columns(steady)))
 
 
 def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:

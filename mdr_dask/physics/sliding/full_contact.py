@@ -22,14 +22,14 @@ DEEP = 4.0  # load over the rms of the pressure of the waves, below which contac
 ROUNDING = 1e-12  # relative error of sums over a spectrum
 
 
-def full_contact(
+def steady_full_contact(
     waves: Waves,
     arms: Sequence[tuple[float, float]],
     nodes: tuple[FloatArray, FloatArray],
     deborah: FloatArray,
     loads: FloatArray,
-) -> Steady:
-    """Return the steady states of the cases in full contact; the others are NaN, with `Outcome.INVALID`.
+) -> Steady | None:
+    """Return the steady states of cases in full contact, NaN with `Outcome.INVALID` of the others; None without any.
 
     Parameters
     ----------
@@ -47,28 +47,31 @@ def full_contact(
     Examples
     --------
     >>> wave = Waves(np.array([0.5 + 0j]), 2)
-    >>> found = full_contact(wave, [], (wave.heights(4), wave.slopes(4)), np.array([0.1]), np.array([5.0]))
+    >>> found = steady_full_contact(wave, [], (wave.heights(4), wave.slopes(4)), np.array([0.1]), np.array([5.0]))
     >>> print((found.drag / 0.1).round(4), found.depth)  # De <h'^2>
     [19.7392] [5.]
     """
-    coefficients, steady = waves.coefficients, unsolved(loads.size)
-    wave = 2 * np.pi * np.arange(1, coefficients.size + 1)
-    power = 2 * (coefficients.real**2 + coefficients.imag**2)
-    relaxing = sum((stiffness * (1 - 1 / (1 + 1j * wave * time)) for stiffness, time in arms), np.zeros(1))
-    elastic, lost, stretch = float(power.sum()), 0.0, float(power @ wave**2)
+    height, slope = nodes
+    pressure = height
     if arms:
-        elastic, lost = float(power @ np.abs(1 + relaxing) ** 2), float(power @ (wave * relaxing.imag))
+        wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
+        relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in arms), np.zeros(1))
+        pressure = height + series(waves.coefficients * relaxing, height.size)
+    # sums over the nodes are those over the spectrum
+    elastic = pressure @ pressure / height.size
+    if not np.max(loads, initial=0.0) > DEEP * np.sqrt(elastic):
+        return None
+    lost, stretch = (pressure @ slope / height.size if arms else 0.0), slope @ slope / height.size
     with np.errstate(over="ignore", invalid="ignore"):
         drag = lost + deborah * stretch
         moves = np.isfinite(deborah) & (deborah >= 0 if arms else deborah > 0)
         full = moves & np.isfinite(loads) & (loads > DEEP * np.sqrt(elastic + deborah * (lost + drag)))
-    if not np.any(full):
-        return steady
-    height, slope = nodes
-    pressure = height + series(coefficients * relaxing, height.size) if arms else height
     speeds, which = np.unique(deborah[full], return_inverse=True)
     highest = np.array([np.max(np.abs(pressure + speed * slope)) for speed in speeds])
-    full[full] = highest[which] < loads[full] * np.cos(np.pi * wave.size / height.size)
+    full[full] = highest[which] < loads[full] * np.cos(np.pi * waves.coefficients.size / height.size)
+    if not np.any(full):
+        return None
+    steady = unsolved(loads.size)
     steady.status[full] = Outcome.CONVERGED
     drag, depth, slopes = (np.where(full, column, np.nan) for column in (drag, loads, np.sqrt(stretch)))
     return Steady(drag, depth, np.where(full, 1.0, np.nan), slopes, steady.status)

@@ -102,7 +102,8 @@ def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray
     if line.body is None and aim.oversampling == "auto":
         nodes = line.points * SEEN
         pairs = tuple(zip(arms.moduli, arms.deborah, strict=True))
-        steady, errors = in_full_contact(line, pairs, (line.heights(nodes), line.slopes(nodes)), deborah, loads)
+        on_nodes = line.heights(nodes), line.slopes(nodes)
+        steady, errors = in_full_contact(line, pairs, on_nodes, deborah, loads) or (steady, errors)
     left = (
         (steady.status != Outcome.CONVERGED) & np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
     )
