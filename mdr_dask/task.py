@@ -285,7 +285,6 @@ def _describe(block: Block[Any], case: int) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=1)
-@lru_cache(maxsize=1)
 def kind() -> str:
     """Return what the last digits of numbers may depend on: the processor, and what computes on it."""
     from importlib.metadata import version

@@ -138,6 +138,10 @@ def test_rows_of_a_table_are_selected_as_those_of_a_store(tmp_path, capsys):
     )
     printed = capsys.readouterr().out.splitlines()
     assert [line.split(",")[0] for line in printed[1:]] == ["0.001", "0.01"]
+    path.write_text(path.read_text().replace("temperature", "temperature [K]", 1))
+    selected = ["--select", "temperature=26.85 degC", "--select", "velocity=0..0.05", "--csv"]
+    assert main(["master-curve", str(path), *selected]) == 0
+    assert capsys.readouterr().out.splitlines() == printed
     assert main(["master-curve", str(path), "--select", "humidity=1"]) == 2
     assert "(known: force, velocity, temperature, mu)" in capsys.readouterr().err
     assert main(["master-curve", str(path), "--series", "one"]) == 2

@@ -4,6 +4,7 @@ import json
 import time
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 import zarr
@@ -11,6 +12,7 @@ import zarr
 from mdr_dask import cli
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
+from mdr_dask.cli.results import Reading
 from mdr_dask.errors import CampaignError, StoreError
 from mdr_dask.store import datasets
 
@@ -74,6 +76,20 @@ def test_a_damaged_axis_is_named_and_not_read(filled, harm, capsys):
         datasets(str(filled))
     assert main(["show", str(filled)]) == 2
     assert "damaged" in capsys.readouterr().err
+
+
+def test_what_zarr_says_of_a_chunk_names_the_store():
+    """Whatever else a command is asked."""
+
+    @click.command(cls=Reading)
+    @click.option("--series")
+    @click.argument("store")
+    def look(series, store):
+        zarr.codecs.BytesCodec(endian="sideways")
+
+    look.params.sort(key=lambda one: one.name != "store")
+    with pytest.raises(StoreError, match=r"^rig\.zarr: damaged, a chunk cannot be read: .*sideways"):
+        look.main(["rig.zarr", "--series", "one"], standalone_mode=False)
 
 
 def test_messages_speak_to_the_user_and_not_to_the_terminal(filled, capsys):

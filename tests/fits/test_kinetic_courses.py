@@ -55,6 +55,7 @@ def test_a_course_by_the_closed_law(lines):
     assert judged(found, "yes") >= LEAST
     # law less course at the start is the error of the jump: none
     assert coverage(found, "start_error", 0.0) >= LEAST
+    assert found["rms_error_of_rate"].max() < 0.1
 
 
 @LINES

@@ -7,7 +7,7 @@ import pytest
 
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError
-from mdr_dask.fits.velocity_steps import Trace, of_table, rate_and_state
+from mdr_dask.fits.velocity_steps import Trace, _fitted, of_table, rate_and_state
 
 TRUE = {"direct_effect": 0.011, "evolution_effect": 0.016, "velocity_dependence": -0.005}
 TIME = np.arange(150) * 0.5
@@ -76,3 +76,17 @@ def test_a_table_in_a_shell(tmp_path, capsys):
 def test_bad_traces_are_named(text, message):
     with pytest.raises(DataError, match=message):
         of_table(text, "steps.csv")
+
+
+def test_the_density_of_a_slip_length_is_that_of_all_constants_and_scatters():
+    """Constants and scatter integrated out one by one, the scatter numerically over its logarithm."""
+    state = friction(1e-5, 0.0, np.random.default_rng(0))[::15]
+    trace = Trace(TIME[::15], VELOCITY[::15], state + 1e-3 * np.sin(7.0 * np.arange(state.size)))
+    linear = _fitted(trace, np.array([3e-6, 1e-5, 3e-5, 1e-4]))
+    rows = trace.friction.size
+    whole = []
+    for spread, squares in zip(linear.spreads, linear.squares, strict=True):
+        scatter = np.sqrt(squares) * np.geomspace(1e-2, 1e3, 20001)
+        density = scatter ** (3 - rows) * np.exp(-squares / (2 * scatter**2))
+        whole.append(np.log(np.sqrt(np.linalg.det(spread)) * np.trapezoid(density, np.log(scatter))))
+    np.testing.assert_allclose(linear.density(rows), np.array(whole) - max(whole), atol=1e-6)

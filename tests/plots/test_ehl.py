@@ -115,3 +115,15 @@ def test_regime_map_names_all_regimes_and_places_the_films_in_them() -> None:
     ratio = np.asarray(dots.get_array())
     assert np.all((ratio > 0.7) & (ratio < 2))
     assert np.asarray(dots.get_offsets()).shape == (4, 2)
+
+
+def test_a_map_of_fully_flooded_films_leaves_out_the_starved_and_says_so() -> None:
+    outputs = ("central_film", "minimum_film")
+    loads = series(outputs, {"load_parameter": np.array([1e-5, 1e-4])})
+    starved = series(outputs, {"load_parameter": np.array([1e-5, 1e-4]), "inlet": np.array([-4.0, -1.5])})
+    sliding = series(outputs, {"slide_roll_ratio": np.array([0.01, 0.1])})
+    figure = DRAW["film_formula"]({"loads": loads, "starved": starved, "sliding": sliding})
+    drawn = {str(line.get_label()).split(",")[0] for axes in figure.axes for line in axes.lines[:-1]}
+    assert drawn == {"loads"}
+    told = " ".join(text.get_text() for text in figure.texts).replace("\n", " ")
+    assert "series starved, sliding, which do not vary W, U or G alone" in told

@@ -30,6 +30,7 @@ HOLD = [
     ("velocity>3km/h", [0, 1, 1]),
     ("velocity == 1", [0, 1, 0]),
     ("velocity == 1.000001 m/s", [0, 1, 0]),
+    ("velocity == 1.0001 m/s", [0, 0, 0]),
     ("not velocity > 0.9", [1, 0, 0]),
     ("velocity < 0.6 or velocity > 1.5 m/s", [1, 0, 1]),
     ("0.4 < velocity*2 < 3", [1, 1, 0]),

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding import full_contact, vectorised
 from mdr_dask.physics.sliding import steady as sliding
-from mdr_dask.physics.sliding import vectorised
 from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import Shape
@@ -33,7 +33,7 @@ class Settings(NamedTuple):
     hardly: int = 2  # nodes in contact that see a peak by its curvature only
     of_a_peak: float = 0.1  # the error of that, times the oversampling squared
     restart: int = 4  # oversampling of the cubic cells that take over
-    sampled: int = 2  # oversampling of a line that cases go along from node to node
+    sampled: int = full_contact.SEEN  # oversampling of a line that cases go along from node to node
     refinements: tuple[int, ...] = (2, 4, 8, 16, 32, 64, 128, 256, 512)  # of its cells, where they are touched
     quickest: float = 1e-4  # accuracy that needs more than going from node to node
     # from node to node, for every column: of the last change between grids, of the one before it over that, and of the
@@ -132,9 +132,24 @@ class Ladder:
         """Solve every case on the coarsest grid on which the errors of all columns wanted meet a relative accuracy."""
         if self.scheme != "hermite":
             return self._swept(accuracy, 1)
+        if self.line.body is not None:
+            return self._swept(accuracy, 2)
+        nodes = self._nodes(full_contact.SEEN)
+        closed = in_full_contact(self.line, (), nodes, self.deborah, self.loads)
+        if closed is None:
+            return self._partly(accuracy, nodes)
+        steady, errors = closed
+        left = steady.status != Outcome.CONVERGED
+        if np.any(left):
+            found, found_errors = self.only(left)._partly(accuracy, nodes)
+            steady, errors = steady.replaced(left, found), errors.replaced(left, found_errors)
+        return steady, errors
+
+    def _partly(self, accuracy: float, nodes: tuple[FloatArray, FloatArray]) -> tuple[Steady, Errors]:
+        """Solve cases on a plane that lift off somewhere, from node to node where that is cheaper."""
         if not goes_from_node_to_node(self.line.body, accuracy):
             return self._swept(accuracy, 2)
-        steady, errors = self._sampled(accuracy)
+        steady, errors = self._sampled(accuracy, nodes)
         missing = ~self._met(steady, errors, accuracy)
         if np.any(missing):
             found, found_errors = self.only(missing)._swept(accuracy, SETTINGS.restart)
@@ -169,15 +184,14 @@ class Ladder:
         guesses = None if near is None else near.depth
         return sliding.steady_sliding(line, self.deborah, self.loads, guesses, close)
 
-    def _sampled(self, accuracy: float) -> tuple[Steady, Errors]:
+    def _sampled(self, accuracy: float, nodes: tuple[FloatArray, FloatArray]) -> tuple[Steady, Errors]:
         """Solve cases from node to node; the errors are infinite where that gives nothing."""
         settings, points = SETTINGS, self.line.points
         values, errors = np.full((2, len(COLUMNS), self.loads.size), np.nan)
         good = valid(self.deborah, self.loads)
         left = np.flatnonzero(good)
-        height, slope = self._nodes(settings.sampled)
         cases = Cases(self.deborah[left], self.loads[left])
-        line, coarse, fine = vectorised.begin(height, slope, *cases, settings.roughly * accuracy)
+        line, coarse, fine = vectorised.begin(*nodes, *cases, settings.roughly * accuracy)
         before, refinement = np.zeros((len(COLUMNS), left.size)), 1
         wanted = [COLUMNS.index(name) for name in self.columns]
         by_chance = bool(set(wanted) & set(RELATIVE))
@@ -237,6 +251,18 @@ class Ladder:
             errors = SETTINGS.safety * _changes(_columns(steady), _columns(other))
             errors[COLUMNS.index("drag")] = np.maximum(SETTINGS.safety * drag, least) * steady.drag
         return Errors(*errors)
+
+
+def in_full_contact(
+    line: RoughLine,
+    arms: tuple[tuple[float, float], ...],
+    nodes: tuple[FloatArray, FloatArray],
+    deborah: FloatArray,
+    loads: FloatArray,
+) -> tuple[Steady, Errors] | None:
+    """Return steady states and errors of what is in full contact with a plane, NaN of what is not; None without any."""
+    steady = full_contact.steady_full_contact(line.roughness, arms, nodes, deborah, loads)
+    return None if steady is None else (steady, Errors(*full_contact.ROUNDING * _columns(steady)))
 
 
 def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, relative
+from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, in_full_contact, relative
 from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
+from mdr_dask.physics.sliding.full_contact import SEEN
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
@@ -98,11 +99,19 @@ def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray
     from mdr_dask.physics.solids import prony
 
     steady, errors = unsolved(loads.size), Errors.unknown(loads.size)
+    if line.body is None and aim.oversampling == "auto":
+        nodes = line.points * SEEN
+        pairs = tuple(zip(arms.moduli, arms.deborah, strict=True))
+        on_nodes = line.heights(nodes), line.slopes(nodes)
+        steady, errors = in_full_contact(line, pairs, on_nodes, deborah, loads) or (steady, errors)
+    left = (
+        (steady.status != Outcome.CONVERGED) & np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
+    )
     finer = max(0, int(np.log2(ROUGHLY / aim.accuracy) / 3))
     first = min(COARSEST * 2**finer, FINEST) if aim.oversampling == "auto" else aim.oversampling
     turned = line.from_summit()
     straight = cache(lambda oversampling: turned.straight(-(-line.points * oversampling // CELLS) * CELLS))
-    for k in np.flatnonzero(np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)):
+    for k in np.flatnonzero(left):
         ladder = ViscoelasticLadder(prony(1.0, arms.moduli, arms.deborah, deborah[k]), float(loads[k]))
         oversampling = first
         while True:

@@ -1,0 +1,77 @@
+"""Full contact of any linear solid with a plane's roughness: where nothing lifts off, every wave is pressed alone.
+
+The foundation follows the line, u = d + h, and every wave c_k of it asks for the pressure G*(q_k v) c_k (thesis eq.
+3.21 for the Kelvin solid). So the drag is a sum over the spectrum, whatever the phases. It holds where the pressure is
+positive everywhere, which is shown on nodes: between m nodes a sum of waves of up to k periods is at most
+1 / cos(pi k / m) times its largest value on them (Ehlich and Zeller, 1964).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding.cases import Steady, unsolved
+from mdr_dask.physics.surfaces.waves import Waves, series
+
+SEEN = 2  # nodes for every Nyquist point, so that what lies between them is known to 41 %
+DEEP = 4.0  # load over the rms of the pressure of the waves, below which contact is hardly ever that full
+ROUNDING = 1e-12  # relative error of sums over a spectrum
+
+
+def steady_full_contact(
+    waves: Waves,
+    arms: Sequence[tuple[float, float]],
+    nodes: tuple[FloatArray, FloatArray],
+    deborah: FloatArray,
+    loads: FloatArray,
+) -> Steady | None:
+    """Return the steady states of cases in full contact, NaN with `Outcome.INVALID` of the others; None without any.
+
+    Parameters
+    ----------
+    waves : Waves
+        The line, of length 1.
+    arms : sequence of (float, float)
+        G_m / G_inf and tau_m v / L of the relaxing arms; none of a Kelvin solid.
+    nodes : pair of array, shape (nodes,)
+        Heights and slopes of the line on a grid of more than two nodes for the shortest wave.
+    deborah : array, shape (cases,)
+        eta v / (G_inf L) of the dashpot.
+    loads : array, shape (cases,)
+        F_N / (4 G_inf L), in the unit of height: the mean displacement.
+
+    Examples
+    --------
+    >>> wave = Waves(np.array([0.5 + 0j]), 2)
+    >>> found = steady_full_contact(wave, [], (wave.heights(4), wave.slopes(4)), np.array([0.1]), np.array([5.0]))
+    >>> print((found.drag / 0.1).round(4), found.depth)  # De <h'^2>
+    [19.7392] [5.]
+    """
+    height, slope = nodes
+    pressure = height
+    if arms:
+        wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
+        relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in arms), np.zeros(1))
+        pressure = height + series(waves.coefficients * relaxing, height.size)
+    # sums over the nodes are those over the spectrum
+    elastic = pressure @ pressure / height.size
+    if not np.max(loads, initial=0.0) > DEEP * np.sqrt(elastic):
+        return None
+    lost, stretch = (pressure @ slope / height.size if arms else 0.0), slope @ slope / height.size
+    with np.errstate(over="ignore", invalid="ignore"):
+        drag = lost + deborah * stretch
+        moves = np.isfinite(deborah) & (deborah >= 0 if arms else deborah > 0)
+        full = moves & np.isfinite(loads) & (loads > DEEP * np.sqrt(elastic + deborah * (lost + drag)))
+    speeds, which = np.unique(deborah[full], return_inverse=True)
+    highest = np.array([np.max(np.abs(pressure + speed * slope)) for speed in speeds])
+    full[full] = highest[which] < loads[full] * np.cos(np.pi * waves.coefficients.size / height.size)
+    if not np.any(full):
+        return None
+    steady = unsolved(loads.size)
+    steady.status[full] = Outcome.CONVERGED
+    drag, depth, slopes = (np.where(full, column, np.nan) for column in (drag, loads, np.sqrt(stretch)))
+    return Steady(drag, depth, np.where(full, 1.0, np.nan), slopes, steady.status)
