@@ -29,6 +29,7 @@ class Settings(NamedTuple):
     finest: int = 64  # oversampling beyond which a case is given up
     safety: float = 3.0  # of the difference between two grids of cubic cells
     close: float = 0.005  # relative change of the depth between grids that is taken from the tangent
+    near: float = 0.05  # accuracy of what straight cells and steps on a grid are held against first
     rounding: float = 1e-8  # bound of the error of the search for the depth, and of rounding
     hardly: int = 2  # nodes in contact that see a peak by its curvature only
     of_a_peak: float = 0.1  # the error of that, times the oversampling squared
@@ -124,9 +125,25 @@ class Ladder:
         return self._solve((self.line.heights(self.line.points * oversampling), slopes))
 
     def with_errors(self, oversampling: int) -> tuple[Steady, Errors]:
-        """Solve the cases on one grid and estimate their errors."""
+        """Solve the cases on one grid and estimate their errors.
+
+        Straight cells and steps are held against cubic cells to some accuracy first: that costs less than an exact
+        sweep, and where they are further away than what it is in doubt by, it is enough.
+        """
         steady = self.on_grid(oversampling)
-        return steady, self._errors(steady, self._nodes(2 * oversampling))
+        if self.scheme == "hermite" or self.line.body is not None:
+            return steady, self._errors(steady, self._nodes(2 * oversampling))
+        other, doubts = replace(self, scheme="hermite").to_accuracy(SETTINGS.near)
+        far, doubt = _changes(_columns(steady), _columns(other)), np.array(doubts)
+        with np.errstate(all="ignore"):
+            larger = np.fmax(_columns(steady) / _columns(other), 1.0)  # errors are told over what is found
+        errors = Errors(*((far + SETTINGS.safety * doubt) * larger))
+        wanted = [COLUMNS.index(name) for name in self.columns]
+        left = ~np.all((doubt <= far)[wanted], axis=0)
+        if np.any(left):
+            some = self.only(left)
+            errors = errors.replaced(left, some._errors(steady.only(left), self._nodes(2 * oversampling)))
+        return steady, errors
 
     def to_accuracy(self, accuracy: float) -> tuple[Steady, Errors]:
         """Solve every case on the coarsest grid on which the errors of all columns wanted meet a relative accuracy."""
