@@ -102,10 +102,9 @@ def judge(found, exact, doubts=0.0):
     """
     (friction, estimates), exact = np.array(found).T, np.array(exact)
     known = np.isfinite(friction) & np.isfinite(exact) & (exact != 0)
-    errors = np.maximum(np.abs(friction / exact - 1) - doubts, 0.0)[known]
-    estimates = estimates[known]
+    errors, estimates, doubts = np.abs(friction / exact - 1)[known], estimates[known], (0.0 * exact + doubts)[known]
     over = np.median((estimates / np.maximum(errors, 1e-12))[errors > ROUNDING]) if np.any(errors > ROUNDING) else 1.0
-    return float(np.mean(errors <= estimates + ROUNDING)), float(over), int(known.sum())
+    return float(np.mean(errors <= estimates + doubts + ROUNDING)), float(over), int(known.sum())
 
 
 def indenters(cases, seed, accuracies=(0.05, 0.01, 0.002)):
