@@ -105,6 +105,24 @@ def test_the_time_left_goes_by_the_last_minute(url, monkeypatch):
     assert follower.progress["sentence"] == told.replace("60 s", seconds(60.0))
 
 
+def test_a_page_that_takes_long_is_made_less_often(study, url, monkeypatch):
+    now, made = [1000.0], iter("abc")
+
+    def page_in_three_seconds(*_, **__):
+        now[0] += 3.0
+        return next(made)
+
+    monkeypatch.setattr(serving.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(serving, "page", page_in_three_seconds)
+    follower = serving.Follower([url])
+    follower.look()
+    study(1.0, 2.0, 3.0)
+    for now[0], page, edition in ((1008.9, b"a", 1), (1009.1, b"b", 2)):  # twice the three seconds after 1003
+        follower.look()
+        assert (follower.page, follower.edition) == (page, edition)
+        assert follower.progress["settled"] == 18  # what is counted does not wait
+
+
 def test_what_cannot_be_served_is_refused(capsys, tmp_path):
     assert main(["serve", str(tmp_path / "nothing.zarr")]) == 2
     assert "no store here" in capsys.readouterr().err

@@ -5,8 +5,11 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from mdr_dask.errors import DataError, FitError
+from mdr_dask.physics.superposition import factors
 from mdr_dask.physics.superposition.laws import fit_arrhenius, fit_power, fit_wlf
+from mdr_dask.physics.superposition.least_squares import changes_of
 from mdr_dask.physics.superposition.master_curve import rereference, superpose
+from mdr_dask.physics.superposition.problem import ShiftProblem
 
 
 def sigmoid(x):
@@ -50,6 +53,30 @@ SHAPES = {
     "power": lambda x: 0.3 * x,
     "plateau": lambda x: -0.2 * np.logaddexp(0, -3 * x),
 }
+
+
+@pytest.mark.parametrize(("shape", "seed", "rise"), [("sigmoid", 3, 0.1), ("bump", 2, 0.02), ("plateau", 3, 0.1)])
+def test_rounds_with_vertical_shifts_end_when_no_shift_moves_any_more(shape, seed, rise, monkeypatch):
+    """From horizontal shifts alone they move by ten errors and more; where rounds end, the next one moves nothing."""
+    moved = []
+
+    def watched(*arguments):
+        found = changes_of(*arguments)
+        moved.append(np.max(np.abs(found[0]) / np.sqrt(np.diag(found[1]))))
+        return found
+
+    _, curves, *_ = family(seed, noise=1e-3, rise=rise, curves=6, shape=SHAPES[shape])
+    problem, _ = ShiftProblem.of(curves).from_own_origin()
+    level = factors.find_horizontal(problem)
+    priors = problem.priors(level.common.mean)
+    monkeypatch.setattr(factors, "changes_of", watched)
+    found, _ = factors._linear(problem, level, priors)
+    assert moved[0] > 10
+    assert min(moved[:-1]) >= factors.SETTINGS.settled > moved[-1]
+    again, _ = factors._linear(problem, found, priors)
+    error = np.sqrt(np.diag(found.covariance))
+    changes = np.r_[(again.shifts.across - found.shifts.across)[1:], (again.shifts.along - found.shifts.along)[1:]]
+    assert np.all(np.abs(changes) < 0.1 * error)
 
 
 def inside_their_bars(shape, noise, vertical, seeds, curves=10):
