@@ -189,9 +189,9 @@ asking does. A user does not know the cheapest one beforehand. Then the largest 
 
 Like cases are other lines, depths, speeds, exponents and amounts of wear about the one named. A campaign asks for a
 standard error, so that nine of ten seeds lie within 1.6 times that. It takes ten lines: fewer do not know their own
-scatter. The rows of campaigns of mixed lubrication are older: their points followed a rule, and not yet the accuracy
-([evidence](evidence/mixed-lubrication.md)). The fast rule of wear is left out: its error is that of its equation, and
-no setting lowers it.
+scatter. Mixed lubrication is dear: its stated errors are several times the true ones
+([evidence](evidence/mixed-lubrication.md)), and every case has to meet the accuracy. The fast rule of wear is left out:
+its error is that of its equation, and no setting lowers it.
 
 | solver | case | accuracy: times the cheapest | error over accuracy, most |
 |---|---|---|---|
