@@ -30,7 +30,10 @@ def rounds(replication: Replication) -> Iterator[int]:
 
 
 def needs_more(
-    values: Mapping[str, NDArray[np.float64]], status: NDArray[np.int8], until: Mapping[str, Tolerance]
+    values: Mapping[str, NDArray[np.float64]],
+    status: NDArray[np.int8],
+    until: Mapping[str, Tolerance],
+    scatter: Mapping[str, NDArray[np.float64]] | None = None,
 ) -> NDArray[np.bool_]:
     """Say which cases need another round.
 
@@ -42,21 +45,32 @@ def needs_more(
         The ledger; only cases that are done count.
     until : mapping of str to Tolerance
         Largest standard error of the mean, by output.
+    scatter : mapping of str to array, shape (..., realisations), optional
+        The standard errors that single realisations know of themselves, of outputs that have them.
 
     Returns
     -------
     bool array, shape (...)
-        True where the standard error of some output is above its tolerance or not known well yet (`FEWEST`); a case
-        that never succeeds is not tried for ever.
+        True where the standard error of some output is above its tolerance or not known well yet: from fewer than
+        `FEWEST` it counts only with what they know of themselves. A case that never succeeds is not tried for ever.
     """
     done = status == Status.DONE
     count = done.sum(axis=-1)
     wide = np.zeros(count.shape, dtype=bool)
-    trusted = np.where(count < FEWEST, NEGLIGIBLE, 1.0)
     for name, tolerance in until.items():
         mean, error = mean_and_error(values[name], done)
-        wide |= ~(error <= trusted * np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean)))
+        allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
+        known = count >= FEWEST
+        if scatter and name in scatter:
+            known |= _error_from_within(scatter[name], done) <= allowed
+        wide |= ~(error <= np.where(known, 1.0, NEGLIGIBLE) * allowed)
     return np.asarray(wide & (count > 0))
+
+
+def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Return the standard error of the mean of independent realisations, from that of each of them."""
+    count = np.maximum(done.sum(axis=-1), 1)
+    return np.asarray(np.sqrt((np.where(done, scatter, 0.0) ** 2).sum(axis=-1)) / count)
 
 
 def mean_and_error(

@@ -78,3 +78,27 @@ def test_the_interval_of_an_adaptive_ensemble_covers_the_truth(at_least, toleran
     covered = coverage(at_least, tolerance, values)
     scatter = np.sqrt(0.94 * 0.06 / CAMPAIGNS)
     assert 0.94 - 3 * scatter <= covered <= 0.95 + 4 * scatter
+
+
+def test_few_results_are_enough_where_each_knows_its_own_scatter():
+    """Four turns that differ by 1 %, each of which knows that: their mean is known to 0.5 %; if a line only thinks so,
+    or they differ by more than they know of, they are not."""
+    four = np.array([0.99, 1.01, 1.0, 1.0])
+    values = {"y": np.array([four, four, 1 + 30 * (four - 1), four])}
+    status = np.full((4, 4), Status.DONE, dtype=np.int8)
+    until = {"y": Tolerance(relative=0.006)}
+    scatter = {"y": np.array([[0.01] * 4, [0.02] * 4, [0.01] * 4, [np.nan] * 4])}
+    assert needs_more(values, status, until, scatter).tolist() == [False, True, True, True]
+    assert needs_more(values, status, until).tolist() == [True] * 4
+    status[1] = [Status.DONE, Status.FAILED, Status.FAILED, Status.FAILED]
+    assert needs_more(values, status, until, scatter).tolist() == [False, True, True, True]
+
+
+def test_the_scatter_within_realisations_is_of_the_mean():
+    """The standard error of n realisations is that of one over the root of n."""
+    status = np.full((2, 9), Status.DONE, dtype=np.int8)
+    values = {"y": np.ones((2, 9))}
+    values["y"][:, 0] += 0.009  # scatters, so that it does not count as all the same
+    for asked, more in ((0.0101, [False, False]), (0.0099, [True, False])):
+        scatter = {"y": np.array([[0.03] * 9, [0.029] * 9])}
+        assert needs_more(values, status, {"y": Tolerance(relative=asked)}, scatter).tolist() == more

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask import store
+from mdr_dask import models, store
 from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
@@ -353,9 +353,15 @@ def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ..
 
 
 def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
-    until = template.campaign.replication.until
-    values = {name: store.values(url, template.series.name, name)[..., :count] for name in until}
-    return needs_more(values, store.ledger(url, template.series.name, template.shape)[..., :count], until)
+    until, name = template.campaign.replication.until, template.series.name
+    model = models.load(template.campaign.model)
+    scatter = {output: model.output(output).scatter for output in until}
+    known = {output: own for output, own in scatter.items() if own in template.campaign.outputs}
+    values, within = (
+        {output: store.values(url, name, array)[..., :count] for output, array in arrays.items()}
+        for arrays in (dict(zip(until, until, strict=True)), known)
+    )
+    return needs_more(values, store.ledger(url, name, template.shape)[..., :count], until, within)
 
 
 def _begin_round(progress: Progress, groups: list[Cells]) -> Progress:

@@ -207,6 +207,9 @@ class Output:
         campaign says ``errors: false``.
     comment : str
         What it does not tell, for its attribute ``comment`` in the store.
+    scatter : str
+        The output with its standard error as one realisation alone knows it, from parts of itself; it comes along with
+        errors.
     """
 
     name: str
@@ -216,6 +219,7 @@ class Output:
     default: bool = True
     has_error: bool = False
     comment: str = ""
+    scatter: str = ""
 
     @property
     def error(self) -> Output:
@@ -403,8 +407,10 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return names of outputs, each followed by that of its companion where it has one."""
+        """Return names of outputs with their scatter, each followed by that of its companion where it has one."""
         companions = self.companions
+        asked = {*names, *(self.output(name).scatter for name in names)}
+        kept = [output.name for output in self.outputs if output.name in asked]
         return tuple(
-            each for name in names for each in ((name, companions[name].name) if name in companions else (name,))
+            each for name in kept for each in ((name, companions[name].name) if name in companions else (name,))
         )

@@ -211,3 +211,15 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
     assert "film ratio" in told["loaded"]
     assert "apart by the given film would carry" in told["loaded"]
     assert "film formula Pan-Hamrock (central): W = " in told["line"]
+
+
+@pytest.mark.parametrize(("errors", "turns"), [("true", 4), ("false", 12)])
+def test_turns_that_know_their_own_scatter_end_a_campaign_early(errors, turns):
+    """Four turns whose parts tell a standard error below the tolerance are enough; without that, ten must scatter."""
+    until = "\nrealisations: {at_least: 4, at_most: 40, until: {breakthrough_probability: {absolute: 0.1}}}"
+    dataset = results(MIXED + f"errors: {errors}\n", ("\nseed: 5", f"\nseed: 5{until}"))
+    probability = dataset.breakthrough_probability
+    assert probability.sizes["realisation"] == turns
+    assert 0 < float(probability.mean()) < 1
+    assert ("turn_error" in dataset) == (errors == "true")
+    assert float(probability.std(ddof=1)) / np.sqrt(turns) < 0.1

@@ -222,12 +222,18 @@ class MixedLubrication(Parameters):
 
 
 OUTPUTS = (
-    Output("breakthrough_probability", "1", "share of time with the boundary layer broken anywhere", has_error=True),
+    Output(
+        "breakthrough_probability",
+        "1",
+        "share of time with the boundary layer broken anywhere",
+        has_error=True,
+        scatter="turn_error",
+    ),
     Output("contact_length", "m", "mean length in intimate contact", has_error=True, comment=NO_AREA),
     Output("film", "m", "film thickness h0", has_error=True),
     Output("film_ratio", "1", "film thickness over combined rms height", has_error=True),
     Output("asperity_load_share", "1", "share of the load on asperities, the rest is on the film", has_error=True),
-    Output("turn_error", "1", "standard error of the probability of one turn, from its batches", default=False),
+    Output("turn_error", "1", "standard error of the probability of one turn, from parts of it", default=False),
     Output(
         "contact_conductance",
         "S",

@@ -80,6 +80,11 @@ class Turn:
         """Mean number of points in intimate contact."""
         return int(self._counts[1].sum()) / self.contact_points.size
 
+    @property
+    def scatter(self) -> float:
+        """Standard error of the probability, from that of the parts; NaN of a single part."""
+        return float(self._means()[0].std(ddof=1) / np.sqrt(self.parts)) if self.parts > 1 else np.nan
+
     def errors(self, coarse: Turn) -> FloatArray:
         """Return the errors of probability and number of points in contact, from the turn of a coarser line."""
         changes = self._means() - coarse._means() * [[1], [SETTINGS.coarser]]
@@ -153,7 +158,7 @@ def turn_values(
     found: dict[str, Callable[[], float]] = {
         "breakthrough_probability": lambda: turn.probability,
         "contact_length": lambda: length,
-        "turn_error": lambda: breakthrough.probability_interval(turn.contact_points > 0, turn.apart).error,
+        "turn_error": lambda: turn.scatter,
         "contact_conductance": lambda: length / resistivity,
         "contact_resistance": lambda: float(breakthrough.contact_resistance(resistivity, length)),
     }

@@ -253,21 +253,3 @@ def test_creep_moves_the_lines_apart_by_the_slide_roll_ratio():
     first, second = bt.creep_positions(np.arange(0, 1000, 10), 1000, 0.2)
     assert first.size == 100
     assert (first[1] - first[0], second[1] - second[0]) == (11, 9)
-
-
-def test_interval_of_a_turn_covers_the_truth():
-    """Independent turns: about 95 % of the intervals hold the mean of all; 60 turns scatter by 3 points."""
-    truth, intervals = [], []
-    for seed in range(60):
-        line, _, _ = rough_line(40_000, 80, 4000, 0.7, seed)
-        trace = bt.contact_points(clusters_of(line, 1.2, 1.0, 1e-3), 120) > 0
-        truth.append(trace.mean())
-        intervals.append(bt.probability_interval(trace, 120))
-    held = sum(i.low <= np.mean(truth) <= i.high for i in intervals) / 60
-    assert held > 0.95 - 4 * 0.03
-
-
-def test_a_short_trace_has_a_mean_but_no_interval():
-    mean, *rest = bt.probability_interval(np.arange(100) < 25, 20)
-    assert mean == 0.25
-    assert np.isnan(rest).all()
