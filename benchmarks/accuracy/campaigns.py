@@ -169,18 +169,18 @@ REST
     {"easy: 80 C": {"HEAT": "80 degC"}, "typical: 60 C": {"HEAT": "60 degC"}, "hard: 40 C": {"HEAT": "40 degC"}},
     {
         (f"{points} points", f"{lines} lines"): (f"points: {points}", f"realisations: {lines}\n")
-        for points in (250_000, 500_000, 1_000_000)
+        for points in (250_000, 300_000, 500_000)
         for lines in (4, 10)
     },
     {
         a: (
             "points: auto",
-            f"accuracy: {a:g}\nrealisations: {{at_least: 10, at_most: 60, until: {{breakthrough_probability: "
+            f"accuracy: {a:g}\nrealisations: {{at_least: 4, at_most: 60, until: {{breakthrough_probability: "
             f"{{relative: {a:g}, absolute: {a / 4:g}}}}}}}\n",
         )
         for a in (0.1, 0.05, 0.02)
     },
-    ("points: 3000000", "realisations: 40\nerrors: false\n"),
+    ("points: 1000000", "realisations: 100\nerrors: false\n"),
     (("points: 220000", "realisations: 4\n"), ("points: 220000", "realisations: 8\n")),
     LIKE,
     0.25,

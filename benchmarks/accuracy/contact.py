@@ -162,22 +162,18 @@ def histories(short: bool) -> Iterator[Point]:
 
 
 def rollers(short: bool) -> Iterator[Point]:
-    """Yield the probability of breakthrough on coarser grids of one turn; window by window shares no sum."""
+    """Yield the probability of breakthrough of one turn on more and more points, by splines and as in the thesis."""
     from benchmarks.mixed import work_precision as own
 
-    million = 10**5 if short else 10**6
-    finest = own.lines(4 * million) if not short else own.lines(4 * 10**5)
-    for case, (window, level) in list(own.CASES.items())[-1 if short else 0 :]:
-        exact_one = own.sliding(finest, round(window * finest[0].size / 10**6), level)
-        for coarser in (8, 4, 2) if not short else (2,):
-            pair = [line[::coarser].copy() for line in finest]
-            here = round(window * pair[0].size / 10**6)
-            for method in (own.sliding, own.every_window) if pair[0].size <= 10**6 else (own.sliding,):
-                method(pair, here, level)
-                probability, seconds = timed(method, pair, here, level)
-                name = {"sliding": "sliding sums", "every_window": "window by window"}[method.__name__]
-                error = max(abs(probability - exact_one), 1e-6)
-                yield Point("mixed lubrication", case, name, f"{pair[0].size} points", seconds, error)
+    names = {own.splines: "splines", own.points_of_windows: "point by point, window by window (thesis)"}
+    for case, contact in list(own.CASES.items())[-1 if short else 0 :]:
+        truth = own.splines(2 * own.MILLION, *contact)
+        for points in (220_000,) if short else (220_000, 250_000, 300_000, 400_000, 500_000, own.MILLION):
+            for method, name in names.items():
+                method(points, *contact)
+                probability, seconds = timed(method, points, *contact)
+                error = max(abs(probability - truth), 1e-6)
+                yield Point("mixed lubrication", case, name, f"{points} points", seconds, error)
 
 
 def revolution(short: bool) -> Iterator[Point]:

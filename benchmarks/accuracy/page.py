@@ -52,8 +52,8 @@ ABOUT = {
         "grids ([films](evidence/ehl.md))."
     ),
     "mixed lubrication": (
-        "Error of the probability of breakthrough in one turn. Reference: the same turn on four million "
-        "points; window by window shares no sum with the sliding sums "
+        "Error of the probability of breakthrough in one turn, transform included. Reference: splines of the same turn "
+        "on two million points; the thesis's sums over points tend to the same "
         "([mixed lubrication](evidence/mixed-lubrication.md))."
     ),
     "measured lines": (
@@ -189,8 +189,7 @@ asking does. A user does not know the cheapest one beforehand. Then the largest 
 
 Like cases are other lines, depths, speeds, exponents and amounts of wear about the one named. A campaign asks for a
 standard error, so that nine of ten seeds lie within 1.6 times that. It takes ten lines: fewer do not know their own
-scatter. Mixed lubrication is dear: its stated errors are several times the true ones
-([evidence](evidence/mixed-lubrication.md)), and every case has to meet the accuracy. The fast rule of wear is left out:
+scatter, but turns of rollers do. The fast rule of wear is left out:
 its error is that of its equation, and no setting lowers it.
 
 | solver | case | accuracy: times the cheapest | error over accuracy, most |
@@ -201,8 +200,7 @@ HONESTY = """## Whether stated errors hold
 
 Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms. The columns: the share
 whose error is below the stated one, and the median of stated over error. The judgements are
-[a table](evidence/honesty.csv). Shares of 20 cases are known to ten per cent. Stated errors of the
-breakthrough are six to twenty times too large at a million points ([evidence](evidence/mixed-lubrication.md)).
+[a table](evidence/honesty.csv). Shares of 20 cases are known to ten per cent.
 
 | solver | cases | number | held | stated over error |
 |---|---|---|---|---|

@@ -240,17 +240,16 @@ def film_equations() -> Work:
 
 
 def breakthrough() -> Work:
-    """Clusters of a line and the contact points of every window."""
+    """Clusters of a line and the contact lengths of every window."""
     from mdr_dask.physics.lubrication import breakthrough as layers
     from mdr_dask.physics.lubrication import clusters
 
     waves = 10_000
-    line = 0.2e-6 * roughness.line(roughness.amplitudes(waves, 0.7), roughness.phases(1, 0, waves), 20 * waves, 0)
+    line = 0.2e-6 * roughness.line(roughness.amplitudes(waves, 0.7), roughness.phases(1, 0, waves), 3 * waves, 0)
     strength = float(layers.layer_strength(1e6, 115.385e9, 5e-9))
-    above = clusters.excursions(line, 2e-7)
 
     def call() -> object:
-        return layers.contact_points(clusters.find_clusters(above, 2e-7, 3e-7, strength), 47)
+        return layers.contact_lengths(clusters.find_clusters(line, 2e-7, 1e-6, strength), 14.1)
 
     return Work(call, line.size)
 

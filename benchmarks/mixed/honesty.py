@@ -41,7 +41,7 @@ def rollers(points, random):
 def judged(number, seed, points, accuracy=None):
     """Return errors and stated errors of both outputs, shape (2, cases, 2), of cases that touch at times.
 
-    Where an accuracy chooses the points, errors are over the value; of rare contact over that of contact in 1 %.
+    Where an accuracy chooses the points, errors are over the value; of rare contact over that of contact in 10 %.
     """
     random, rows = np.random.default_rng(seed), []
     names = MODEL.with_companions(OUTPUTS)
@@ -58,7 +58,7 @@ def judged(number, seed, points, accuracy=None):
             MODEL, case.model_copy(update={"points": min(finest, declaration.MOST_POINTS)}), realisation, OUTPUTS, seed
         )
         if found and truth and 0 < truth[OUTPUTS[0]] < 1:
-            rare = max(1.0, 0.01 / max(found[OUTPUTS[0]], 1e-9))
+            rare = max(1.0, 0.1 / max(found[OUTPUTS[0]], 1e-9))
             over = [max(found[name], 1e-12) * rare if accuracy else 1.0 for name in OUTPUTS]
             errors = [abs(found[name] - truth[name]) / by for name, by in zip(OUTPUTS, over, strict=True)]
             rows.append((errors, [found[f"{name}_error"] / by for name, by in zip(OUTPUTS, over, strict=True)]))

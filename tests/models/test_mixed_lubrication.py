@@ -162,39 +162,39 @@ def test_creep_keeps_the_probability_of_the_rig():
     assert still.mean() == pytest.approx(0.717, abs=0.04)
 
 
-def windows_one_by_one(case, step):
-    """Return whether the contact of each window is intimate, and its length in points of the fine line."""
+def windows_one_by_one(case, other):
+    """Return whether the contact of each window is intimate, and its length in m, on one spline or the other."""
     operation = operation_of(case)
-    first, second = (line[::step].copy() for line in operation.source.lines(2013, 0))
-    pair = breakthrough.Pair(first, second, operation.level, step * operation.spacing, operation.strength)
-    every = np.arange(first.size)
-    found = step * breakthrough.judge_windows(pair, -(-operation.window // step), (every, every), case.edge_rule)
-    return np.array([found > 0, found], dtype=float)
+    pair = operation.pair(operation.source.lines(2013, 0, other))
+    every = np.arange(operation.source.points)
+    found = breakthrough.judge_windows(pair, operation.width / operation.spacing, (every, every), case.edge_rule)
+    return np.array([found > 0, found * operation.spacing / breakthrough.PARTS], dtype=float)
 
 
-@pytest.mark.parametrize(("force", "parts"), [(100.0, 16), (3.6e5, 3)])
-def test_errors_of_a_turn_come_from_every_fourth_point(force, parts):
-    """The change to every fourth point and its scatter over the turn; three parts know no scatter."""
+@pytest.mark.parametrize(("force", "parts", "compared"), [(100.0, 16, 4), (3.6e5, 3, 3)])
+def test_errors_of_a_turn_come_from_other_splines_of_its_waves(force, parts, compared):
+    """From the change in its first quarter and its scatter there, which three parts do not know; from steps in time,
+    each end of a contact known to one; and from clusters next to breaking: 18 windows a wave of one point."""
     asked = block(shortest_wavelength=1e-5, normal_force=force)
     found = MODEL.compute(asked).values
-    fine, coarse = (windows_one_by_one(asked.parameters, step) for step in (1, 4))
-    means = [
-        np.array([part.mean(axis=1) for part in np.split(turn, np.arange(1, parts) * turn.shape[1] // parts, axis=1)])
-        for turn in (fine, coarse)
-    ]
+    turns = [windows_one_by_one(asked.parameters, other) for other in (False, True)]
+    means = [np.array([part.mean(axis=1) for part in np.array_split(turn, parts, axis=1)][:compared]) for turn in turns]
     changes = means[0] - means[1]
     change = abs(changes.mean(axis=0))
-    of_probability, of_points = change
     if parts > 3:
-        together = fine[1].mean() / fine[0].mean()
-        scatter = changes.std(axis=0, ddof=1) / np.sqrt(parts)
-        of_probability, of_points = (0.1 + 1 / together) * change + 1.5 * scatter
-        of_probability, of_points = np.array([of_probability, of_points]) + 1.5 / together**2 * fine.mean(axis=1)
-    off, length = of_points * 2 * np.pi * 1e-3 / 20_000, found["contact_length"][0, 0]
-    assert found["breakthrough_probability_error"] == pytest.approx(of_probability, rel=1e-3)
-    assert found["contact_length_error"] == pytest.approx(off, rel=1e-3)
-    assert found["contact_conductance_error"] == pytest.approx(off / 2e-7, rel=1e-3)
-    assert found["contact_resistance_error"] == pytest.approx(2e-7 / (length - off) - 2e-7 / length, rel=1e-3)
+        change = change + 1.5 * changes.std(axis=0, ddof=1) / np.sqrt(compared)
+    (contact, length), width = turns[0], found["contact_half_width"][0, 0] * 2
+    ends = np.count_nonzero(contact != np.roll(contact, 1))
+    perimeter, per_wave = 2 * np.pi * 1e-3, 20_000 / int(2 * np.pi * 1e-3 / 1e-5)
+    unseen = 2 * np.sqrt(ends / 12) / 20_000 + 18 / per_wave**1.5 * width / perimeter
+    of_probability, off = change + unseen * np.array([1, length.sum() / contact.sum()])
+    length = length.mean()
+    assert found["breakthrough_probability_error"] == pytest.approx(of_probability, rel=0.02)
+    assert found["contact_length_error"] == pytest.approx(off, rel=0.02)
+    off = found["contact_length_error"][0, 0]
+    assert found["contact_length"] == pytest.approx(length, rel=1e-12)
+    assert found["contact_conductance_error"] == pytest.approx(off / 2e-7, rel=1e-9)
+    assert found["contact_resistance_error"] == pytest.approx(2e-7 / (length - off) - 2e-7 / length, rel=1e-6)
 
 
 @pytest.mark.parametrize("number", [50_000, 100_000])
@@ -203,7 +203,7 @@ def test_errors_of_turns_hold(number):
     errors, stated = honesty.judged(15, 77, number)
     assert np.mean(errors <= stated) >= 0.9
     assert np.max(errors / stated) < 3
-    assert np.median(stated / errors) < 7
+    assert np.median(stated / errors) < 15
 
 
 def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
@@ -231,40 +231,41 @@ def test_a_case_is_on_the_points_of_its_layer_and_accuracy_whatever_its_neighbou
     columns = {"layer_thickness": np.array([1e-9, 3e-9, 8e-9]), "film_thickness": np.array([4e-7, 3e-7, 7e-7])}
     rollers = {"points": "auto", "shortest_wavelength": 4e-6}
     chosen = set()
-    for accuracy in (0.5, 0.02):
+    for accuracy in (0.5, 0.005):
         asked = dataclasses.replace(block(columns=columns, **rollers), accuracy=accuracy)
         together, one = MODEL.compute(asked), dataclasses.replace(asked, outputs=("contact_length",))
         for index in range(3):
-            begun = points.first(operation_of(asked.case(index), accuracy), accuracy).source.points
+            operation = operation_of(asked.case(index), accuracy)
             found = together.values["contact_length"][index, 0]
             assert MODEL.compute(one.part(index, 0)).values["contact_length"] == found
-            ladder = [
-                MODEL.compute(block(**rollers | {"points": begun * times} | {k: v[index] for k, v in columns.items()}))
-                for times in (1, 2, 4)
-            ]
-            on = [level.values["contact_length"][0, 0] == found for level in ladder]
+            steps = {points.first(operation, each).source.points for each in accuracy * np.geomspace(1, 1e-4, 40)}
+            ladder = sorted(steps)
+            own = {name: column[index] for name, column in columns.items()}
+            levels = [MODEL.compute(block(**rollers | {"points": each} | own)) for each in ladder]
+            on = [level.values["contact_length"][0, 0] == found for level in levels]
             assert any(on)
-            chosen.add((begun, on.index(True)))
+            chosen.add((ladder[0], on.index(True)))
     assert len({begun for begun, _ in chosen}) > 2
     assert len({times for _, times in chosen}) > 1
 
 
 @pytest.mark.parametrize("creep", [0.0, 0.05])
-def test_where_lines_overlap_and_nothing_breaks_the_error_is_that_of_a_point(creep):
+def test_where_lines_overlap_and_nothing_breaks_the_error_is_that_of_a_cluster(creep):
+    """Another line might have judged one otherwise: 18 windows of 53 points a wave of one point; here it has 645."""
     asked = {"longest_wavelength": 1e-3, "shortest_wavelength": 2e-4, "edge_rule": "inside", "slide_roll_ratio": creep}
     found, apart = (MODEL.compute(block(film_thickness=film, **asked)).values for film in (4e-7, 4e-6))
     assert found["breakthrough_probability"] == apart["breakthrough_probability"] == 0.0
     assert apart["breakthrough_probability_error"] == apart["contact_length_error"] == 0.0
-    assert found["breakthrough_probability_error"] == pytest.approx(53 / 20_000, rel=0.1)  # one window of 53 points
+    assert found["breakthrough_probability_error"] == pytest.approx(18 / 645**1.5 * 53 / 20_000, rel=0.1)
 
 
-def test_errors_of_points_that_resolve_nothing_are_all_that_a_value_can_be_wrong_by():
-    """Around 0.31 m, 20 000 points are 16 um apart, and the pieces that break shorter than half of that."""
-    rollers = {"roller_radius": 0.05, "layer_thickness": 1e-9, "shortest_wavelength": 5e-5}
-    found = MODEL.compute(block(**rollers)).values
-    width = found["contact_half_width"] * 2
-    assert found["breakthrough_probability_error"] == 1 - found["breakthrough_probability"] > 0.99
-    assert found["contact_length_error"] + found["contact_length"] == pytest.approx(width, rel=0.05)
+def test_pieces_shorter_than_the_spacing_are_judged_right():
+    """Around 0.31 m, 20 000 points are 16 um apart, 15 times the longest pieces that break; 1 280 000 resolve them."""
+    rollers = {"roller_radius": 0.05, "layer_thickness": 1e-10, "shortest_wavelength": 5e-5}
+    coarse, fine = (MODEL.compute(block(points=points, **rollers)).values for points in (20_000, 1_280_000))
+    for name in ("breakthrough_probability", "contact_length"):
+        assert 0 < abs(coarse[name] - fine[name]) < 0.05 * fine[name]
+        assert abs(coarse[name] - fine[name]) <= coarse[f"{name}_error"] + fine[f"{name}_error"]
 
 
 def test_errors_of_the_film_are_those_of_its_solution():
@@ -392,8 +393,8 @@ def test_the_film_is_never_thinner_for_its_asperities(formula):
     assert rough["film"][0] > 1.05 * smooth["film"][0]
 
 
-def test_at_the_thesis_s_points_sharing_the_load_changes_less_than_the_errors():
-    """800 N, 100 rpm: the film by less than 0.7 %, the probability by less than the error of its grid."""
+def test_at_the_thesis_s_points_sharing_the_load_changes_little():
+    """800 N, 100 rpm: the film by less than 0.7 %, the probability by less than 0.3 points, downwards."""
     temperatures = np.array([313.15, 333.15, 353.15])
     outputs = ["breakthrough_probability", "film", "asperity_load_share"]
     turns = range(4)
@@ -401,8 +402,8 @@ def test_at_the_thesis_s_points_sharing_the_load_changes_less_than_the_errors():
     alone = MODEL.compute(block(["film"], columns={"temperature": temperatures}, **RIG | {"rms_roughness": 1e-12}))
     columns = {"temperature": temperatures, "film_thickness": alone.values["film"][:, 0]}
     given = MODEL.compute(block(outputs, turns, columns=columns, **RIG | {"film_thickness": 1e-6})).values
-    change = np.mean(shared["breakthrough_probability"] - given["breakthrough_probability"], axis=1)
-    assert np.all(np.abs(change) <= np.mean(shared["breakthrough_probability_error"], axis=1))
+    change = np.mean(given["breakthrough_probability"] - shared["breakthrough_probability"], axis=1)
+    assert np.all((change >= 0) & (change < 0.003))
     assert np.all(np.abs(shared["film"] / given["film"] - 1) < 0.007)
     assert np.all(shared["asperity_load_share"] < 0.03)
     assert shared["asperity_load_share"][0, 0] < 1e-4
@@ -498,7 +499,6 @@ def test_trace_under_slip_agrees_with_its_mean(slip):
             "expected the longest wavelength above the shortest",
         ),
         ({"shortest_wavelength": 1e-7}, "expected a shortest wavelength of at least two spacings"),
-        ({"points": "auto"}, "expected a shortest_wavelength in metres where points are auto, got auto for both"),
         ({"points": "auto", "shortest_wavelength": 1e-9}, "expected a shortest_wavelength of at least 1.571e-09 m"),
         ({"rms_roughness": None}, "expected rms_roughness, or surface_1 and surface_2"),
         ({"slide_roll_ratio": 3.0}, "Input should be less than or equal to 2"),
@@ -567,6 +567,16 @@ def test_bad_profiles_give_one_error(tmp_path):
     assert "wider than the line" in refused(**files | {"normal_force": 1e7})
 
 
+@pytest.mark.parametrize("radius", [0.05, 0.01])
+def test_without_points_or_shortest_wavelength_there_are_as_many_waves_as_on_a_million_points(radius):
+    given = {"roller_radius": radius, "cutoff_force": 200.0}
+    chosen, million = (MODEL.parameters(**SMALL | given | {"points": number}) for number in ("auto", 10**6))
+    assert MODEL.parameters(**{k: v for k, v in (SMALL | given).items() if k != "points"}).points == "auto"
+    assert chosen.source().modes == million.source().modes == 100_000
+    assert chosen.source().points == 250_000
+    assert points.first(operation_of(chosen, 0.001), 0.001).source.points > 400_000
+
+
 def test_time_estimate_grows_with_cases_points_and_creep():
     small = MODEL.seconds(block())
     assert MODEL.seconds(block(columns={"normal_force": np.full(50, 100.0)})) > small
@@ -577,7 +587,7 @@ def test_time_estimate_grows_with_cases_points_and_creep():
     many, none = (
         MODEL.seconds(block(columns={"hurst": each})) for each in (np.linspace(0.6, 0.8, 50), np.full(50, 0.7))
     )
-    assert many > 1.5 * none
+    assert many > 1.1 * none
 
 
 def test_extremes_of_all_parameters_give_numbers_or_a_sentence():

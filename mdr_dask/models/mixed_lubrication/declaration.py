@@ -32,6 +32,8 @@ Positive = Annotated[float, Field(gt=0)]
 STEEL = 210e9 / (2 * (1 - 0.3**2))
 #: Points of a line at most; and the fewest spacings of its shortest wave where the accuracy chooses the points.
 MOST_POINTS, LEAST_PER_WAVE = 10**7, 2.5
+#: Shortest waves around a roller, where neither they nor the points are given.
+WAVES = 100_000
 #: Places of the profiles in half widths of the contact.
 POSITIONS = np.linspace(-1.5, 1.5, 1501)
 
@@ -62,8 +64,8 @@ class MixedLubrication(Parameters):
     hurst: float | None = quantity("1", "Hurst exponent H of the roughness", default=0.7, ge=0, le=1)
     points: Annotated[int, Field(ge=64, le=MOST_POINTS)] | Literal["auto"] = quantity(
         "1",
-        "points of each line around the roller; auto meets the accuracy, with a shortest_wavelength of its own",
-        default=1_000_000,
+        "points of each line around the roller; auto has those that the accuracy needs",
+        default="auto",
     )
     longest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
@@ -77,7 +79,8 @@ class MixedLubrication(Parameters):
     )
     shortest_wavelength: Positive | Literal["auto"] = quantity(
         "m",
-        "wavelength below which there is no roughness; auto is ten spacings of the points",
+        "wavelength below which there is no roughness; auto is ten spacings of points that are given, else the "
+        "perimeter over 100 000",
         usual="3 um",
         default="auto",
     )
@@ -144,8 +147,7 @@ class MixedLubrication(Parameters):
             return Measured(one.profile, two.profile, self.rms_roughness is not None)
         shortest, points = self.shortest_wavelength, self.points
         if shortest == "auto":
-            assert points != "auto"
-            shortest = 10 * self.perimeter / points
+            shortest = self.perimeter / (WAVES if points == "auto" else points / 10)
         modes = int(self.perimeter / shortest * (1 + 1e-12))
         if points == "auto":
             points = int(np.ceil(LEAST_PER_WAVE * modes))
@@ -193,10 +195,7 @@ class MixedLubrication(Parameters):
         if self.points != "auto" or (self.surface_1 is not None and self.surface_1.profile is not None):
             return ""
         if self.shortest_wavelength == "auto":
-            return (
-                "expected a shortest_wavelength in metres where points are auto, got auto for both; give one, or a "
-                "number of points"
-            )
+            return ""
         least = LEAST_PER_WAVE * self.perimeter / MOST_POINTS
         if self.shortest_wavelength < least:
             return (
@@ -285,27 +284,28 @@ def seconds(block: Block[MixedLubrication]) -> float:
     """Estimate the time of a block from its lines, points, cases, creep, drawn places and solutions of the film."""
     millions = _expected_points(block) / 1e6
     creep = np.asarray(block.column("slide_roll_ratio"), dtype=np.float64) != 0
-    case = np.where(creep, 0.035, 0.0045) + (0.05 if DRAWN & set(block.outputs) else 0.0)
+    of_case = np.where(creep, 0.012 + 0.06 * millions, 0.0025 + 0.011 * millions)
+    of_case += 0.05 * millions if DRAWN & set(block.outputs) else 0.0
     films = 0.06 * float(np.sum(block.column("film_formula") == "ehl"))
     keys = [path for path in block.columns if path.partition(".")[0] in OF_LINES]
     lines = {tuple(str(block.columns[key][k]) for key in keys): millions[k] for k in range(block.cases)}
-    return films + len(block.realisations) * float(0.06 * sum(lines.values()) + np.sum(millions * case))
+    return films + len(block.realisations) * float(0.04 * sum(lines.values()) + np.sum(of_case))
 
 
 def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
     """Return the points of every case; where the accuracy chooses them, those of a usual layer."""
-    per_wave = max(LEAST_PER_WAVE, float(np.sqrt(2 / (block.accuracy or 0.01))))
+    per_wave = LEAST_PER_WAVE * max(1.0, float(0.033 / (block.accuracy or 0.01)) ** 0.28)
     columns = (block.column(name) for name in ("points", "shortest_wavelength", "roller_radius"))
     expected = np.empty(block.cases)
     for case, (points, shortest, radius) in enumerate(zip(*columns, strict=True)):
-        waves = 0.0 if shortest == "auto" else 2 * np.pi * radius / shortest  # none where the lines are measured
+        waves = WAVES if shortest == "auto" else 2 * np.pi * radius / shortest
         expected[case] = per_wave * waves if points == "auto" else points
     return expected
 
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=6,
+    version=7,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,

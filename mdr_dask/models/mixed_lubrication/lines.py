@@ -21,6 +21,11 @@ class _Random:
     longest: float  # harmonic number of the longest wavelength
     modes: int  # harmonic number of the shortest wavelength
 
+    @property
+    def per_wave(self) -> float:
+        """Points of the shortest wave."""
+        return self.points / self.modes
+
     def spacing(self, perimeter: float) -> float:
         """Return the distance of the points in m on a roller of a perimeter in m."""
         return perimeter / self.points
@@ -47,18 +52,23 @@ class _Random:
         """Return the rms slope of both lines together, over their unit of height, around a perimeter in m."""
         return _slope(self) / perimeter
 
-    def lines(self, seed: int, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return both lines; one stream feeds them in turn, so that a shorter cut-off keeps the longer waves."""
-        from mdr_dask.physics.surfaces.waves import series
+    def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Return the splines closest to both lines, or through their nodes, which differ from them by more.
+
+        One stream feeds both lines in turn, so that a shorter cut-off keeps the longer waves.
+        """
+        from mdr_dask.physics.surfaces.splines import closest, through
 
         first, second = self._waves(seed, realisation)
-        return series(first, self.points), series(second, self.points)
+        spline = through if other else closest
+        return spline(first, self.points), spline(second, self.points)
 
-    def together(self, seed: int, realisation: int) -> FloatArray:
-        """Return the sum of both lines, all that pure rolling asks for."""
-        from mdr_dask.physics.surfaces.waves import series
+    def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
+        """Return the spline of the sum of both lines, all that pure rolling asks for."""
+        from mdr_dask.physics.surfaces.splines import closest, through
 
-        return series(np.add(*self._waves(seed, realisation)), self.points)
+        spline = through if other else closest
+        return spline(np.add(*self._waves(seed, realisation)), self.points)
 
     def _waves(self, seed: int, realisation: int) -> tuple[NDArray[np.complex128], ...]:
         """Return the Fourier coefficients of both lines."""
@@ -142,6 +152,11 @@ class Measured:
         """Number of points of the shorter file; the longer one is cut."""
         return min(line_of(file).height.size for file in (self.file_1, self.file_2))
 
+    @property
+    def per_wave(self) -> float:
+        """Points of the shortest wave: any number, the lines are what their points tell."""
+        return np.inf
+
     def spacing(self, _: float) -> float:
         """Return the distance of the points in m, as in the files, whatever the perimeter."""
         return line_of(self.file_1).spacing
@@ -157,20 +172,28 @@ class Measured:
         """Return the rms height of both lines together, in m unless scaled."""
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
-    def lines(self, seed: int, realisation: int) -> tuple[FloatArray, FloatArray]:
-        """Return both lines, the second one turned by a random number of points."""
+    def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Return the splines through both lines, the second one turned by a random number of points.
+
+        The other ones go through every second point.
+        """
+        from mdr_dask.physics.surfaces.splines import through_heights
+
         line_1, line_2 = self._pair()
         stream = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,)))
-        return line_1, np.roll(line_2, int(np.random.Generator(stream).integers(line_2.size)))
+        turned = np.roll(line_2, int(np.random.Generator(stream).integers(line_2.size)))
+        step = 2 if other else 1
+        first, second = (through_heights(line[: line.size // step * step : step]) for line in (line_1, turned))
+        return first, second
 
     def slope(self, perimeter: float) -> float:
         """Return the rms slope of both lines together, over their unit of height."""
         squares = sum(np.mean(np.diff(line) ** 2) for line in self._pair())
         return float(np.sqrt(squares)) / self.spacing(perimeter)
 
-    def together(self, seed: int, realisation: int) -> FloatArray:
-        """Return the sum of both lines."""
-        return np.add(*self.lines(seed, realisation))
+    def together(self, seed: int, realisation: int, other: bool = False) -> FloatArray:
+        """Return the spline of the sum of both lines."""
+        return np.add(*self.lines(seed, realisation, other))
 
     def _pair(self) -> tuple[FloatArray, FloatArray]:
         """Return the lines without mean and tilt, so that their ends nearly meet."""

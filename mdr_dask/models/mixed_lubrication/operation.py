@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.mixed_lubrication.declaration import MixedLubrication
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.physics.lubrication import breakthrough, film_formulas, line_contact, oil
@@ -34,7 +35,7 @@ class Operation:
     """What a case is before any roughness: contact, film, and how the layer stands to the unit lines.
 
     `shared` has the film in m; `film_error` is its relative error, and `strength` that of the layer for lines in units
-    of `scale`, the heights of the lines in m.
+    of `scale`, the heights of the lines in m. `width` is that of the contact in m.
     """
 
     case: MixedLubrication
@@ -45,8 +46,7 @@ class Operation:
     shared: SharedLoad
     film_error: float
     scale: float
-    spacing: float
-    window: int
+    width: float
     strength: float
     warning: str
 
@@ -61,14 +61,27 @@ class Operation:
         return self.film / self.scale
 
     @property
+    def spacing(self) -> float:
+        """Distance of the points of the lines in m."""
+        return self.source.spacing(self.case.perimeter)
+
+    @property
+    def length(self) -> float:
+        """Length of the lines in m."""
+        return self.spacing * self.source.points
+
+    @property
     def coarseness(self) -> float:
         """Spacing of the points over the length ``slope/s`` of the pieces, cut off by an edge, that break the layer."""
         return self.spacing * self.strength / self.source.slope(self.case.perimeter)
 
     def on(self, source: Source) -> Operation:
         """Return the same case on the points of another source of the same lines."""
-        spacing = source.spacing(self.case.perimeter)
-        return replace(self, source=source, spacing=spacing, window=_window(self.contact, spacing, source))
+        return replace(self, source=source)
+
+    def pair(self, lines: tuple[FloatArray, FloatArray]) -> breakthrough.Pair:
+        """Return the splines of two lines as they meet in this case."""
+        return breakthrough.Pair(*lines, self.level, self.length / lines[0].size, self.strength)
 
     @property
     def rms(self) -> float:
@@ -91,7 +104,6 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
         correlation = data.correlation if alpha == "oil" else alpha
         alpha = float(oil.pressure_viscosity(correlation, data.kinematic(case.temperature), viscosity))
     contact = case.dry_contact(case.normal_force)
-    spacing = source.spacing(case.perimeter)
     scale = case.rms_roughness or 1.0
     asperities = Asperities(scale * source.combined_rms(), case.longest(), case.contact_modulus)
     accuracy = accuracy or ACCURACY
@@ -106,18 +118,13 @@ def operation_of(case: MixedLubrication, accuracy: float | None = None) -> Opera
         shared=shared,
         film_error=error,
         scale=scale,
-        spacing=spacing,
-        window=_window(contact, spacing, source),
+        width=2 * float(contact.half_width),
         strength=float(
             breakthrough.layer_strength(case.layer_shear_strength, case.contact_modulus, case.layer_thickness)
         )
         / scale,
         warning="; ".join(note for note in (warning, film_formulas.thick_film(shared.film / _radius(case))) if note),
     )
-
-
-def _window(contact: HertzLine, spacing: float, source: Source) -> int:
-    return breakthrough.window_points(float(contact.half_width), spacing, source.points)
 
 
 def _radius(case: MixedLubrication) -> float:

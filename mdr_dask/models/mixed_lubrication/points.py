@@ -23,25 +23,26 @@ class Settings(NamedTuple):
 
     Parameters
     ----------
-    first, order : float
-        The error stated with one spacing a shortest wave, over the coarseness of that spacing, and the power of the
-        spacing that it falls like.
+    first, coarse, order : float
+        The error stated with the fewest points, over a power of the length of the shortest wave in that of the pieces
+        that break, and the power of the spacing that it falls like.
     steps : int
-        First numbers of points in a factor of two: few, so that cases of other layers share lines.
+        Numbers of points in a factor of two: few, so that cases of other layers share lines.
     further : int
         Times the first points that a turn gets at most.
-    once : float
-        Errors over the accuracy up to which twice the points are tried before four times.
+    slowest : float
+        Power of the spacing that errors fall like where single clusters decide.
     rare : float
         Probability below which an accuracy is that of this probability.
     """
 
-    first: float = 15.0
-    order: float = 1.5
+    first: float = 0.2
+    coarse: float = 0.6
+    order: float = 3.6
     steps: int = 4
     further: int = 4
-    once: float = 3.0
-    rare: float = 0.01
+    slowest: float = 2.0
+    rare: float = 0.1
 
 
 SETTINGS = Settings()
@@ -52,40 +53,42 @@ def first(operation: Operation, accuracy: float | None) -> Operation:
     source = operation.source
     if isinstance(source, Measured) or operation.case.points != "auto":
         return operation
-    waves = source.modes
-    of_a_wave = operation.coarseness * source.points / waves
-    per_wave = max(LEAST_PER_WAVE, (SETTINGS.first * of_a_wave / (accuracy or ACCURACY)) ** (1 / SETTINGS.order))
-    steps = np.ceil(SETTINGS.steps * np.log2(per_wave / LEAST_PER_WAVE) - 1e-9)
-    return _on(operation, waves * LEAST_PER_WAVE * 2 ** (steps / SETTINGS.steps))
+    wave = operation.coarseness * source.per_wave
+    stated = SETTINGS.first * wave**SETTINGS.coarse
+    return _on(operation, (stated / (accuracy or ACCURACY)) ** (1 / SETTINGS.order))
 
 
 def finer(
     operation: Operation, turn: Turn, errors: Callable[[], FloatArray], accuracy: float | None
 ) -> Operation | None:
-    """Return the case on more points if its turn misses the accuracy and may have more, None otherwise."""
-    begun = first(operation, accuracy)
-    if begun is operation:
+    """Return the case on more points if its turn misses an accuracy asked for and may have more, else None."""
+    begun, here = first(operation, accuracy).source, operation.source
+    if accuracy is None or isinstance(here, Measured) or operation.case.points != "auto":
         return None
-    most = _on(begun, begun.source.points * SETTINGS.further)
-    if operation.source.points >= most.source.points:
+    most = begun.points * SETTINGS.further
+    if here.points >= min(most, MOST_POINTS):
         return None
-    miss = _relative(turn, errors()) / (accuracy or ACCURACY)
+    of_probability, of_length = errors() / list(judged_by(turn).values())
+    miss = max(of_probability, of_length) / accuracy
     if miss <= 1:
         return None
-    return most if miss > SETTINGS.once else _on(operation, min(operation.source.points * 2, most.source.points))
+    wanted = min(miss ** (1 / SETTINGS.slowest) * here.points, most)
+    return _on(operation, wanted / (LEAST_PER_WAVE * here.modes))
 
 
-def _relative(turn: Turn, errors: FloatArray) -> float:
-    """Return the larger relative error of probability and contact length."""
-    common = min(1.0, turn.probability / SETTINGS.rare)
-    of_points = errors[1] / turn.points * common if turn.points else 0.0
-    return float(max(errors[0] / max(turn.probability, SETTINGS.rare), of_points))
+def judged_by(turn: Turn) -> dict[str, float]:
+    """Return what an accuracy is a part of, by output; of rare contact that of `rare` contact."""
+    probability = max(turn.probability, SETTINGS.rare)
+    length = turn.length * probability / turn.probability if turn.length else np.inf
+    return {"breakthrough_probability": probability, "contact_length": length}
 
 
-def _on(operation: Operation, points: float) -> Operation:
-    """Return a case on at least so many points, of a number that Fourier transforms are fast for."""
+def _on(operation: Operation, times: float) -> Operation:
+    """Return a case on some times the fewest points or a step more, a number that Fourier transforms are fast for."""
     from scipy.fft import next_fast_len
 
     assert not isinstance(operation.source, Measured)
+    steps = np.ceil(SETTINGS.steps * np.log2(max(times, 1.0)) - 1e-6)
+    points = LEAST_PER_WAVE * operation.source.modes * 2 ** (steps / SETTINGS.steps)
     number = min(4 * next_fast_len(int(np.ceil(points / 4 - 1e-9)), real=True), MOST_POINTS)
     return operation.on(replace(operation.source, points=number))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -15,16 +15,13 @@ from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubricatio
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.turn import (
-    SETTINGS,
     Turn,
     creeping,
     profiles,
     rolling,
     trace,
-    turn_errors,
     turn_values,
 )
-from mdr_dask.physics.lubrication.clusters import Excursions, excursions
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
 FILM_RATIO_WARNING = 0.5
@@ -45,8 +42,7 @@ _PROFILES = {"upper_profile", "lower_profile"}
 def compute(block: Block[MixedLubrication]) -> Result:
     """Return the values of a block; one realisation is one turn of the rollers with lines of its own.
 
-    Cases that differ in load, speed, temperature, rms height or layer share the lines of a realisation and, in pure
-    rolling, the search for points above the film: it goes from the thinnest film to the thickest.
+    Cases that differ in load, speed, temperature, rms height or layer share the lines of a realisation.
     """
     result = _empty(block)
     groups: dict[Source, list[tuple[int, Operation]]] = {}
@@ -66,11 +62,10 @@ def compute(block: Block[MixedLubrication]) -> Result:
         _store(result, block, index, slice(None), fixed)
         _warn(result, block, index, operation)
         for position in range(len(block.realisations)):
-            _note(result, index, position, _missed(block, fixed, ""))
+            _note(result, index, position, _missed(block, fixed))
         result.status[index] = Status.DONE
     if _OF_TURN & set(block.outputs):
         for source, members in groups.items():
-            members.sort(key=lambda member: member[1].level)
             for position in range(len(block.realisations)):
                 _realise(result, block, source, members, position)
     return replace(result, solves=sum(map(len, groups.values())) * len(block.realisations))
@@ -105,13 +100,22 @@ def _note(result: Result, index: int, position: int, note: str) -> None:
         result.messages[index, position] = f"{before}; {note}" if before else note
 
 
-def _missed(block: Block[MixedLubrication], found: Mapping[str, float], advice: str) -> str:
-    """Say which outputs asked for miss the accuracy of the campaign and by how much; an empty string if none does."""
+def _missed(
+    block: Block[MixedLubrication],
+    found: Mapping[str, float],
+    advice: str = "",
+    judged_by: Mapping[str, float] | None = None,
+) -> str:
+    """Say which outputs asked for miss the accuracy of the campaign and by how much; an empty string if none does.
+
+    Some are judged by another value than their own.
+    """
     if block.accuracy is None:
         return ""
     missed = []
     for name in block.outputs:
         value, error = found.get(name, 0.0), found.get(f"{name}_error", 0.0)
+        value = (judged_by or {}).get(name, value)
         if np.isfinite(value) and error > block.accuracy * abs(value):
             missed.append(f"{name} {error / abs(value) if value else np.inf:.1e}")
     if not missed:
@@ -126,37 +130,36 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute the cases of one pair of lines in one realisation, from the thinnest film to the thickest.
+    """Compute the cases of one pair of lines in one realisation.
 
     Those that miss the accuracy, where it chooses the points, follow on finer lines.
     """
     drawn = block.seed, block.realisations[position]
-    lines = cache(partial(source.lines, *drawn))
-    above: Excursions | None = None
+    lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
+
+    def solve(operation: Operation, other: bool = False) -> Turn:
+        if operation.case.slide_roll_ratio == 0:
+            return rolling(operation, together(other), compared=other)
+        return creeping(operation, lines(other), compared=other)
+
     again: dict[Source, list[tuple[int, Operation]]] = {}
     for index, operation in members:
-        solve: Callable[..., Turn]
-        if operation.case.slide_roll_ratio == 0:
-            level = operation.level
-            above = excursions(source.together(*drawn), level) if above is None else above.above(level)
-            solve = partial(rolling, operation, above)
-        else:
-            solve = partial(creeping, operation, lines())
-        turn = solve()
-        errors = cache(partial(turn_errors, operation, turn, partial(solve, coarser=SETTINGS.coarser)))
+        turn = solve(operation)
+        errors = cache(lambda turn=turn, operation=operation: turn.errors(solve(operation, other=True)))
         finer = points.finer(operation, turn, errors, block.accuracy)
         if finer is not None:
             again.setdefault(finer.source, []).append((index, finer))
             continue
         found = turn_values(operation, turn, errors, block.outputs)
         _store(result, block, index, position, found)
-        _note(
-            result, index, position, _missed(block, found, "" if operation.case.points == "auto" else "; raise points")
-        )
+        advice = "" if operation.case.points == "auto" else "; raise points"
+        _note(result, index, position, _missed(block, found, advice, points.judged_by(turn)))
         if "contact_length_trace" in block.outputs:
-            _store(result, block, index, position, {"contact_length_trace": trace(operation, turn, lines)})
+            _store(
+                result, block, index, position, {"contact_length_trace": trace(operation, turn, partial(lines, False))}
+            )
         if _PROFILES & set(block.outputs):
-            _store(result, block, index, position, profiles(operation, turn, lines()))
+            _store(result, block, index, position, profiles(operation, turn, lines(False)))
     for finer_source, members_again in again.items():
         _realise(result, block, finer_source, members_again, position)
 

@@ -1,10 +1,10 @@
 """Breakthrough of a boundary layer between two rough lines that roll on a film (thesis section 5.2.2).
 
-The two lines are held apart by the film ``h0``; where the sum of their heights ``z`` exceeds it, they overlap. A run
-of overlapping points is a cluster, of length ``D = n dx`` and force ``F = E* dx sum(z - h0)`` (eq. 5.5). It breaks the
-layer if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is if ``sum(z - h0) > s n^3 dx^2`` with the layer strength
-``s = pi tau0/(12 E* h_c)``, the only place where tau0, E* and h_c appear. Lines are closed (periodic); the contact is
-a window of ``window`` points that starts at each position in turn.
+The two lines are held apart by the film ``h0``; where the sum of their heights ``z`` exceeds it, they overlap. What
+overlaps in one piece is a cluster, of length ``D`` and force ``F = E* int (z - h0) dx`` (eq. 5.5). It breaks the layer
+if ``pi tau0 D^3/(12 F) < h_c`` (eq. 5.6), that is if ``int (z - h0) dx > s D^3`` with the layer strength
+``s = pi tau0/(12 E* h_c)``, the only place where tau0, E* and h_c appear. Lines are closed (periodic) cubic splines, on
+which all this is exact; the contact is a window that begins at each node in turn.
 """
 
 from __future__ import annotations
@@ -16,13 +16,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, kernel
-from mdr_dask.physics.lubrication.clusters import Clusters
+from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
+from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
 #: What becomes of a cluster that the window's edge cuts: judged and counted by its part inside (``part``, what comes of
 #: testing every window by itself), judged whole and counted with its part inside (``clip``), judged and counted whole
 #: (``whole``), or left out (``inside``).
 EDGE_RULES: tuple[str, ...] = ("part", "clip", "whole", "inside")
 _PART, _CLIP, _WHOLE, _INSIDE = range(4)
+#: Parts of a spacing that lengths in contact are counted in.
+PARTS = 64
 
 
 def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: ArrayLike) -> FloatArray:
@@ -40,103 +43,131 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
     return np.asarray(np.pi * np.asarray(shear_strength) / (12 * np.asarray(E_star) * np.asarray(thickness)))
 
 
-def window_points(half_width: float, spacing: float, points: int) -> int:
-    """Return the number of points in the contact window ``[-a, a]``, at least one.
-
-    Raises
-    ------
-    ValueError
-        If the window is wider than the line.
-    """
-    window = max(1, round(2 * half_width / spacing))
-    if window > points:
-        raise ValueError(
-            f"the contact is wider than the line: expected 2a of at most {points * spacing:.4g} m, "
-            f"got {2 * half_width:.4g} m"
-        )
-    return window
+@compiled
+def _counted(length: float) -> int:
+    """Return a length in spacings as whole parts of a spacing, at least one."""
+    return max(1, int(length * PARTS + 0.5))
 
 
 @compiled
-def _block(jumps: NDArray[np.int32], begin: int, count: int, value: int) -> None:
-    """Add `value` to `count` positions of the circle from `begin` on, as jumps."""
+def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
+    """Add a number to `count` positions of the circle from `begin` on, as jumps."""
     points = jumps.size - 1
-    begin %= points
+    while begin < 0:
+        begin += points
+    while begin >= points:
+        begin -= points
     end = begin + count
-    jumps[begin] += value
+    jumps[begin] += number
     if end > points:
-        jumps[0] += value
+        jumps[0] += number
         end -= points
-    jumps[end] -= value
+    jumps[end] -= number
 
 
-@kernel
-def _add_parts(
-    overlap: FloatArray, limit: float, window: int, start: int, always: bool, judged: bool, jumps: NDArray[np.int32]
-) -> None:
-    """Add what the window's edges leave of a cluster: heads, middles (where it is longer than the window), tails.
-
-    A part counts if it breaks by itself where parts are `judged`, else if the cluster does (`always`).
-    """
-    n = overlap.size
-    whole_line = n == jumps.size - 1
-    part = 0 if whole_line else min(n - 1, window)
-    total = 0.0
-    for j in range(1, part + 1):
-        total += overlap[j - 1]
-        if total > limit * float(j) ** 3 if judged else always:
-            _block(jumps, start - window + j, 1, j)
-    total = overlap[:window].sum()
-    for j in range(n if whole_line else n - window - 1):
-        total += overlap[(j + window) % n] - overlap[j]
-        if total > limit * float(window) ** 3 if judged else always:
-            _block(jumps, start + j + 1, 1, window)
-    total = 0.0
-    for j in range(1, part + 1):
-        total += overlap[n - j]
-        if total > limit * float(j) ** 3 if judged else always:
-            _block(jumps, start + n - j, 1, j)
-
-
-@kernel
-def _collect(clusters: Clusters, window: int, rule: int, jumps: NDArray[np.int32]) -> None:
-    """Gather the jumps of the trace cluster by cluster, then sum them up in place."""
-    limit, overlap = clusters.limit, clusters.overlap
+@compiled
+def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
+    """Add a number to one position of the circle, at most once around off, as jumps."""
     points = jumps.size - 1
-    offset = 0
+    at = at + points if at < 0 else at - points if at >= points else at
+    jumps[at] += number
+    jumps[at + 1] -= number
+
+
+@compiled
+def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
+    """Add what the window's edges leave of a cluster: its head and its tail.
+
+    A part counts if it breaks by itself where parts are `judged`, else if the cluster does. One longer than `reach`
+    does not break, whatever its shape.
+    """
+    overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
+    start, end, total = clusters.start[c], clusters.end[c], clusters.total[c]
+    always = total > limit * (end - start) ** 3
+    longest = min(window, reach) if judged else window
+    width = int(window)
+    beyond = window - width  # of the window's right edge over the node before it
+    first, second, third, fourth = shares(beyond)
+    node = int(start)
+    until_node = -integral(piece(overlap, node), start - node)
+    while node < end:
+        k = node if node < points else node - points
+        head, tail = node + beyond - start, end - node
+        force = first * overlap[k] + second * overlap[k + 1] + third * overlap[k + 2] + fourth * overlap[k + 3]
+        breaks = until_node + force > limit * head * head * head if judged else always
+        if breaks and 0 < head < end - start and head <= longest:
+            _add(jumps, node - width, _counted(head))
+        breaks = total - until_node > limit * tail * tail * tail if judged else always
+        if breaks and node > start and tail <= longest:
+            _add(jumps, k, _counted(tail))
+        until_node += whole_piece(overlap, k)
+        node += 1
+
+
+@compiled
+def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
+    """Add the windows that lie within a cluster, which they cut on both sides."""
+    overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
+    start, end = clusters.start[c], clusters.end[c]
+    always = clusters.total[c] > limit * (end - start) ** 3
+    first, last = (0, points - 1) if clusters.closed else (int(start) + 1, int(np.ceil(end - window)) - 1)
+    width = int(window)
+    beyond = window - width
+    force = 0.0
+    for k in range(first, first + width if last >= first else first):
+        force += whole_piece(overlap, k % points)
+    for node in range(first, last + 1):
+        edge = (node + width) % points
+        inside = force + integral(piece(overlap, edge), beyond)
+        if inside > limit * window**3 if judged else always:
+            _block(jumps, node, 1, _counted(window))
+        force += whole_piece(overlap, edge) - whole_piece(overlap, node % points)
+
+
+@kernel
+def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
+    """Gather the jumps of the trace cluster by cluster, then sum them up in place."""
+    points = jumps.size - 1
+    reach = np.sqrt(clusters.overlap.max() / clusters.limit) if clusters.limit > 0 else np.inf
     for c in range(clusters.start.size):
-        s, n = clusters.start[c], clusters.length[c]
-        broken = clusters.total[c] > limit * float(n) ** 3
+        start, end = clusters.start[c], clusters.end[c]
+        length = end - start
+        broken = clusters.total[c] > clusters.limit * length**3
         if rule == _WHOLE and broken:
-            _block(jumps, s - window + 1, min(n + window - 1, points), n)
-        elif rule != _WHOLE and broken and n <= window and n < points:
-            _block(jumps, s + n - window, window - n + 1, n)
+            first = int(np.ceil(start - window))
+            _block(jumps, first, min(int(np.ceil(end)) - first, points), _counted(length))
+        elif rule != _WHOLE and broken and not clusters.closed:
+            first = int(np.ceil(end - window))
+            if first <= start:
+                _block(jumps, first, int(start) - first + 1, _counted(length))
         if rule == _PART or (rule == _CLIP and broken):
-            _add_parts(overlap[offset : offset + n], limit, window, s, broken, rule == _PART, jumps)
-        offset += n
+            if not clusters.closed:
+                _add_cuts(clusters, c, window, rule == _PART, reach, jumps)
+            if clusters.closed or length > window:
+                _add_middles(clusters, c, window, rule == _PART, jumps)
     height = 0
     for p in range(points):
         height += jumps[p]
         jumps[p] = height
 
 
-def contact_points(clusters: Clusters, window: int, rule: str = "part") -> NDArray[np.int32]:
-    """Return the number of points in intimate contact for the window at every position, in O(points).
+def contact_lengths(clusters: Clusters, window: float, rule: str = "part") -> NDArray[np.int32]:
+    """Return the length in intimate contact of the window that begins at every node, in O(points).
 
     Parameters
     ----------
     clusters : Clusters
-        Classified once for the whole line.
-    window : int
-        Points in the window.
+        Found once for the whole line.
+    window : float
+        Width of the window in spacings, at most that of the line.
     rule : str
         One of `EDGE_RULES`.
 
     Returns
     -------
     int array, shape (points,)
-        Entry p belongs to the window over points p to p + window - 1. The share of entries above zero is the
-        breakthrough probability; their mean times dx is the mean contact length.
+        In `PARTS` of a spacing, so that sums are exact and nothing but contact is above zero. The share of such entries
+        is the breakthrough probability.
     """
     trace = np.zeros(clusters.points + 1, dtype=np.int32)
     if clusters.start.size:
@@ -150,11 +181,11 @@ class Pair(NamedTuple):
     Parameters
     ----------
     line_1, line_2 : array, shape (points,)
-        Heights of the two closed lines in m.
+        Splines of the heights of the two closed lines in m, see `surfaces.splines`.
     level : float
         Film thickness h0 in m.
     spacing : float
-        Distance dx of the points in m.
+        Distance dx of the nodes in m.
     strength : float
         From `layer_strength`, in 1/m.
     """
@@ -167,84 +198,102 @@ class Pair(NamedTuple):
 
 
 @compiled
-def _beyond(pair: Pair, p: int, q: int, step: int, most: int) -> tuple[int, float]:
-    """Follow a run of overlapping points beyond the window, from (p, q) on; return number and sum of overlaps."""
-    points = pair.line_1.size
-    n = 0
-    total = 0.0
-    while n < most:
-        overlap = pair.line_1[(p + n * step) % points] + pair.line_2[(q + n * step) % points] - pair.level
-        if overlap <= 0.0:
-            break
-        total += overlap
-        n += 1
-    return n, total
-
-
-@compiled
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
-    """Fill the overlaps of the window that stands at (p, q)."""
+    """Fill the spline of the overlap from nodes (p, q) on."""
     points = pair.line_1.size
     for k in range(overlap.size):
-        overlap[k] = pair.line_1[p] + pair.line_2[q] - pair.level
-        p = p + 1 if p + 1 < points else 0
-        q = q + 1 if q + 1 < points else 0
+        overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
 
 
 @compiled
-def _windows(
-    pair: Pair, positions: tuple[IntArray, IntArray], rule: int, overlap: FloatArray, contact: IntArray
-) -> None:
-    """Judge each window by itself; ``rule`` is the index in EDGE_RULES, ``overlap`` the workspace of a window."""
-    points, window = pair.line_1.size, overlap.size
+def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
+    """Follow a cluster beyond the edge of a window, to the right from 0 on where `most` is positive, so far at most.
+
+    Returns length and force there.
+    """
+    overlap, found = work[:4], work[4:]
+    way = 1 if most > 0 else -1
+    at, force = edge, 0.0
+    k = int(edge) if way > 0 else int(np.ceil(edge)) - 1
+    ended = most == 0
+    while not ended:
+        _fill(pair, position[0] + k, position[1] + k, overlap)
+        count = zeros(overlap, 0, found, 0)
+        stop = float(k + max(way, 0))
+        for number in range(count):
+            place = k + found[number if way > 0 else count - 1 - number]
+            if not ended and (place - at) * way > 0:
+                stop, ended = place, True
+        if (stop - edge - most) * way >= 0:
+            stop, ended = edge + most, True
+        of = piece(overlap, 0)
+        force += way * (integral(of, stop - k) - integral(of, at - k))
+        at = stop
+        k += way
+    return abs(at - edge), force
+
+
+@compiled
+def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
+    """Return the length in intimate contact of one window; `work` has room for its overlap and what crosses it."""
+    points, pieces = pair.line_1.size, int(np.ceil(window))
+    overlap, found, beyond = work[: pieces + 3], work[pieces + 3 : 4 * pieces + 3], work[4 * pieces + 3 :]
     limit = pair.strength * pair.spacing**2
+    _fill(pair, position[0], position[1], overlap)
+    count = crossings(overlap, found)
+    inside = overlap[0] + 4 * overlap[1] + overlap[2] > 0
+    contact = 0
+    begin = 0.0
+    for number in range(count + 1):
+        end = min(found[number], window) if number < count else window
+        if inside and begin < window:
+            length = part = end - begin
+            force = total(overlap, begin, end)
+            whole = begin > 0 and end < window
+            if not whole and rule != _PART:
+                if begin == 0:
+                    more, extra = _reach(pair, position, 0.0, length - points, beyond)
+                    length, force = length + more, force + extra
+                if end == window:
+                    more, extra = _reach(pair, position, window, points - length, beyond)
+                    length, force = length + more, force + extra
+            if force > limit * length**3 and (rule != _INSIDE or whole):
+                contact += _counted(part if rule == _CLIP else length)
+        begin = end
+        inside = not inside
+    return contact
+
+
+@kernel
+def _windows(
+    pair: Pair, positions: tuple[IntArray, IntArray], window: float, rule: int, work: FloatArray, contact: IntArray
+) -> None:
     for w in range(contact.size):
-        p, q = positions[0][w], positions[1][w]
-        _fill(pair, p, q, overlap)
-        k = 0
-        while k < window:
-            if overlap[k] <= 0.0:
-                k += 1
-                continue
-            begin = k
-            total = 0.0
-            while k < window and overlap[k] > 0.0:
-                total += overlap[k]
-                k += 1
-            n = inside = k - begin
-            if begin == 0 and rule != _PART:
-                more, extra = _beyond(pair, p - 1, q - 1, -1, points - n)
-                n, total = n + more, total + extra
-            if k == window and rule != _PART:
-                more, extra = _beyond(pair, p + k, q + k, 1, points - n)
-                n, total = n + more, total + extra
-            if total > limit * float(n) ** 3 and (rule != _INSIDE or n == inside):
-                contact[w] += inside if rule == _CLIP else n
+        contact[w] = _judge(pair, (positions[0][w], positions[1][w]), window, rule, work)
 
 
-def judge_windows(
-    pair: Pair, window: int, positions: tuple[IntArray, IntArray], rule: str = "part"
-) -> NDArray[np.int64]:
+def judge_windows(pair: Pair, window: float, positions: tuple[IntArray, IntArray], rule: str = "part") -> IntArray:
     """Judge windows one by one: the reference for pure rolling, and the way of rolling with creep.
 
     Parameters
     ----------
     pair : Pair
-    window : int
-        Points in the window.
+    window : float
+        Width of the window in spacings, at most that of the line.
     positions : tuple of two int arrays, shape (n,)
-        Point of each line at the window's first place; see `creep_positions`.
+        Node of each line at the window's left edge; see `creep_positions`.
     rule : str
         One of `EDGE_RULES`.
 
     Returns
     -------
     int array, shape (n,)
-        Points in intimate contact of each window.
+        Length in intimate contact of each window in `PARTS` of a spacing.
     """
     contact = np.zeros(positions[0].size, dtype=np.int64)
     if pair.line_1.max() + pair.line_2.max() > pair.level:
-        _windows(pair, positions, EDGE_RULES.index(rule), np.empty(window), contact)
+        work = np.empty(4 * int(np.ceil(window)) + 10)
+        _windows(pair, positions, window, EDGE_RULES.index(rule), work, contact)
     return contact
 
 
@@ -271,32 +320,50 @@ def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tup
 
 
 @compiled
-def _occupied(contact_points: NDArray[np.int32] | IntArray, windows: IntArray, points: IntArray) -> None:
-    """Count windows in contact and their points in contact, part by part."""
+def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths: IntArray, ends: IntArray) -> None:
+    """Count windows in contact, their lengths in contact, and where contact begins or ends, part by part."""
     parts = windows.size
+    before = contact[-1] > 0
     for part in range(parts):
-        for k in range(part * contact_points.size // parts, (part + 1) * contact_points.size // parts):
-            windows[part] += contact_points[k] > 0
-            points[part] += contact_points[k]
+        for k in range(part * contact.size // parts, (part + 1) * contact.size // parts):
+            here = contact[k] > 0
+            windows[part] += here
+            lengths[part] += contact[k]
+            ends[part] += here != before
+            before = here
 
 
-def occupied(contact_points: NDArray[np.int32] | IntArray, parts: int = 1) -> tuple[IntArray, IntArray]:
-    """Return the number of windows in contact, and the sum of their points in contact, of equal parts of a turn.
+class Occupied(NamedTuple):
+    """What equal parts of a turn meet, each of shape (parts,).
 
     Parameters
     ----------
-    contact_points : int array, shape (positions,)
-        Of the windows, in the order of time.
+    windows : int array
+        Number of windows in contact.
+    lengths : int array
+        Sum of their lengths in contact, as they were counted.
+    ends : int array
+        How often contact begins or ends.
+    """
+
+    windows: IntArray
+    lengths: IntArray
+    ends: IntArray
+
+
+def occupied(contact: NDArray[np.int32] | IntArray, parts: int = 1) -> Occupied:
+    """Return what equal parts of a turn meet.
+
+    Parameters
+    ----------
+    contact : int array, shape (positions,)
+        Lengths in contact of the windows, in the order of time.
     parts : int
         Part k begins at position ``k positions // parts``.
-
-    Returns
-    -------
-    two int arrays, shape (parts,)
     """
-    windows, points = np.zeros(parts, dtype=np.int64), np.zeros(parts, dtype=np.int64)
-    _occupied(contact_points, windows, points)
-    return windows, points
+    found = Occupied(*np.zeros((3, parts), dtype=np.int64))
+    _occupied(contact, *found)
+    return found
 
 
 def contact_resistance(resistivity: ArrayLike, contact_length: ArrayLike) -> FloatArray:

@@ -1,0 +1,169 @@
+"""A closed line as a cubic spline: what lies between its nodes, from one coefficient a node.
+
+With coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
+t from 0 to 1 and the numbers of `piece`. It never leaves the range of the four coefficients that make it (de Boor, *A
+Practical Guide to Splines*, 1978, chapter IX).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.surfaces.waves import series
+
+Piece = tuple[float, float, float, float]
+
+
+def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
+    """Return the spline that is closest to a line of waves in the mean square.
+
+    Parameters
+    ----------
+    waves : complex array, shape (modes,)
+        Half the complex amplitude of each wave, as of `waves.Waves`.
+    nodes : int
+        At least two for the shortest wave.
+
+    Returns
+    -------
+    array, shape (nodes,)
+        Coefficients in the unit of the waves. Each wave is divided by the sum over all its images of the squared
+        transform of the B-spline, and multiplied by that transform (Unser, IEEE Signal Process. Mag. 16 (1999) 22).
+    """
+    return series(waves * _closest(waves.size, nodes), nodes)
+
+
+def through(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
+    """Return the spline that goes through a line of waves at its nodes; arguments and result as of `closest`."""
+    return series(waves * _through(waves.size, nodes), nodes)
+
+
+def through_heights(height: FloatArray) -> FloatArray:
+    """Return the spline, shape (nodes,), that goes through the heights, shape (nodes,), of a closed line."""
+    phase = 2 * np.pi * np.arange(height.size // 2 + 1) / height.size
+    return np.asarray(fft.irfft(fft.rfft(height) / _at_nodes(phase), height.size), dtype=np.float64)
+
+
+def heights(spline: FloatArray) -> FloatArray:
+    """Return the heights of a spline at its nodes, shape (nodes,)."""
+    return np.asarray((np.roll(spline, 1) + 4 * spline + np.roll(spline, -1)) / 6)
+
+
+@lru_cache(maxsize=8)
+def _closest(modes: int, nodes: int) -> FloatArray:
+    """Return the factors of the waves in the closest spline."""
+    phase = _phases(modes, nodes)
+    cosine = np.cos(phase)
+    transform = np.sinc(phase / (2 * np.pi)) ** 4
+    images = (2416 + 2382 * cosine + 240 * (2 * cosine**2 - 1) + 2 * (4 * cosine**3 - 3 * cosine)) / 5040
+    return np.asarray(transform / images)
+
+
+@lru_cache(maxsize=8)
+def _through(modes: int, nodes: int) -> FloatArray:
+    """Return the factors of the waves in the spline through their nodes."""
+    return 1 / _at_nodes(_phases(modes, nodes))
+
+
+def _phases(modes: int, nodes: int) -> FloatArray:
+    """Return by how much the phase of each wave grows from node to node."""
+    return 2 * np.pi * np.arange(1, modes + 1) / nodes
+
+
+def _at_nodes(phase: FloatArray) -> FloatArray:
+    """Return the transform of the B-spline's values at the nodes, 1/6, 4/6 and 1/6."""
+    return np.asarray((2 + np.cos(phase)) / 3)
+
+
+@compiled
+def piece(spline: FloatArray, k: int) -> Piece:
+    """Return the polynomial between the second and the third of four coefficients, the first of them at place k."""
+    c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
+    return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
+
+
+@compiled
+def value(of: Piece, t: float) -> float:
+    """Return the height of a piece at t."""
+    return of[0] + t * (of[1] + t * (of[2] + t * of[3]))
+
+
+@compiled
+def integral(of: Piece, t: float) -> float:
+    """Return the integral of a piece from 0 to t."""
+    return t * (of[0] + t * (of[1] / 2 + t * (of[2] / 3 + t * of[3] / 4)))
+
+
+@compiled
+def shares(t: float) -> Piece:
+    """Return what each of four coefficients adds to the integral of their piece from 0 to t."""
+    square = t * t
+    second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
+    return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
+
+
+@compiled
+def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
+    """Append the places, from k to k + 1, where a piece changes between above zero and not; return the new count.
+
+    There are three at most, and none where all four coefficients are above zero or none is.
+    """
+    of = piece(spline, k)
+    end = (spline[k + 1] + 4 * spline[k + 2] + spline[k + 3]) / 6  # as the next piece has it
+    t_before, before = 0.0, of[0]
+    first, second = _extremes(of)
+    for number in range(3):
+        t = first if number == 0 else second if number == 1 else 1.0
+        if t <= t_before:
+            continue
+        here = end if number == 2 else value(of, t)
+        if (here > 0) != (before > 0):
+            found[count] = k + _zero(of, t_before, before, t, here)
+            count += 1
+        t_before, before = t, here
+    return count
+
+
+@compiled
+def _extremes(of: Piece) -> tuple[float, float]:
+    """Return where a piece has its extremes, in order, 0 in place of one outside 0..1."""
+    a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
+    root = b * b - a * c
+    if root <= 0:
+        return 0.0, 0.0
+    larger = -(b + np.copysign(np.sqrt(root), b))
+    one = c / larger if larger != 0 else 0.0
+    other = larger / a if a != 0 else 0.0
+    one = one if 0 < one < 1 else 0.0
+    other = other if 0 < other < 1 else 0.0
+    return min(one, other), max(one, other)
+
+
+@compiled
+def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
+    """Return the zero of a piece that is monotonic from `low` to `high`, where its signs differ: Newton, bracketed."""
+    t = low + (high - low) * at_low / (at_low - at_high)
+    for _ in range(STEPS):
+        here = value(of, t)
+        if (here > 0) == (at_low > 0):
+            low = t
+        else:
+            high = t
+        slope = of[1] + t * (2 * of[2] + t * 3 * of[3])
+        following = t - here / slope if slope != 0 else low
+        if not low < following < high:
+            following = (low + high) / 2
+        if abs(following - t) <= CLOSE:
+            return following
+        t = following
+    return t
+
+
+#: A step of Newton's so short leaves an error of its square; so many halvings find any zero.
+CLOSE, STEPS = 1e-7, 60
