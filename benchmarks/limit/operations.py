@@ -68,14 +68,16 @@ class _Counting(ast.NodeTransformer):
         return node
 
     def _note(self, kind: str, times: int, *values: ast.expr) -> ast.expr:
-        return ast.Call(ast.Name("_counted", ast.Load()), [ast.Constant(kind), ast.Constant(times), *values], [])
+        return ast.Call(
+            ast.Name("_operation_counted", ast.Load()), [ast.Constant(kind), ast.Constant(times), *values], []
+        )
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
         if not self.inside:
             return node
         if isinstance(node.op, ast.Pow):
-            return ast.Call(ast.Name("_power", ast.Load()), [node.left, node.right], [])
+            return ast.Call(ast.Name("_power_counted", ast.Load()), [node.left, node.right], [])
         kind = OPERATIONS.get(type(node.op))
         return self._note(kind, 1, node) if kind else node
 
@@ -89,7 +91,9 @@ class _Counting(ast.NodeTransformer):
         compares = COMPARES.get(type(node.ops[0]))
         if not self.inside or len(node.ops) > 1 or compares is None:
             return node
-        return ast.Call(ast.Name("_compare", ast.Load()), [ast.Constant(compares), node.left, *node.comparators], [])
+        return ast.Call(
+            ast.Name("_compare_counted", ast.Load()), [ast.Constant(compares), node.left, *node.comparators], []
+        )
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
@@ -135,5 +139,5 @@ class _Finder(PathFinder):
 
 def count_kernels() -> None:
     """Let every kernel that is imported from now on count its operations in `COUNTS`."""
-    vars(builtins).update(_counted=counted, _power=power, _compare=compare)
+    vars(builtins).update(_operation_counted=counted, _power_counted=power, _compare_counted=compare)
     sys.meta_path.insert(0, _Finder)
