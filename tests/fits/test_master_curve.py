@@ -117,6 +117,9 @@ def test_bootstrap_is_kept_and_referenced_anew():
     assert np.all(moved["draws"].sel(velocity=velocity) == 0)
     assert moved["shift_factor_bootstrap"].sel(velocity=velocity) == 0
     assert np.all(moved["shift_factor_bootstrap"].drop_sel(velocity=velocity) > 0)
+    for each in (curve, moved):  # half of what the middle 68.27 % of the draws, those of one standard error, span
+        ends = each["draws"].quantile([0.15865, 0.84135], "draw")
+        np.testing.assert_allclose(each["shift_factor_bootstrap"], ends.diff("quantile").squeeze() / 2, rtol=1e-9)
 
 
 def test_a_reference_between_velocities_follows_their_logarithm():

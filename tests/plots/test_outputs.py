@@ -127,6 +127,9 @@ def test_a_map_has_the_values_of_the_store_and_crosses_out_what_failed(stores):
     np.testing.assert_allclose(edges[1:-1] ** 2, data["velocity"][1:] * data["velocity"][:-1].values)
     half = float(((value[2] - value[1]) / 2).max())
     assert f"at most ±{half:.2g}" in figure.get_suptitle()
+    (mesh,) = drawn({"": data.isel(normal_force=[1])}, MU, ("velocity", "normal_force")).axes[0].collections
+    force = float(data["normal_force"][1])
+    np.testing.assert_allclose(mesh.get_coordinates()[:, 0, 1], [force / 2, 1.5 * force])
     drawn({"": stores["sampled"]}, MU, ("velocity", "hurst"))
     drawn({"": stores["grid"]}, MU, ("velocity", "normal_force"), panels="hurst")
 
