@@ -68,9 +68,15 @@ class Settings(NamedTuple):
         it meets the accuracy. Else it is laid once more, from its own end.
     floor : float
         Least share of an error that is trusted in a film, :class:`Trust`.
-    viscous, sharpest : float
-        Added to that share at a spacing of one for each logarithm of the viscosity at Hertz' pressure, and at most: the
-        sharper the spike, the more is left of the square of the spacing, by its square.
+    sharpest : float
+        Greatest logarithm of the viscosity at Hertz' pressure that counts: the pressure has a spike, the sharper the
+        more viscous the oil.
+    spike : float
+        Added to that share for each such logarithm, times the square of the spacing: what the spike leaves of the
+        square of the spacing goes like the fourth power.
+    narrow, thick : float
+        Added to it for each such logarithm, whatever the spacing, where M is below `thick` (half of it there): the
+        spike stands in the narrowest place.
     cut : float
         Added to that share for a film that ends a whole cell from the nearest node: where in its cell it ends makes
         the minimum film scatter.
@@ -90,10 +96,12 @@ class Settings(NamedTuple):
     adapted_nodes: int = 121
     adaptations: int = 2
     nodes: tuple[int, ...] = (41, 81, 161, 227, 321, 454, 641, 906, 1281)
-    laid_again: float = 0.05
+    laid_again: float = 0.2
     floor: float = 0.01
-    viscous: float = 0.15
-    sharpest: float = 8.0
+    sharpest: float = 50.0
+    spike: float = 0.15
+    narrow: float = 0.004
+    thick: float = 30.0
     cut: float = 0.1
     spiked: float = 0.13
 
@@ -379,10 +387,11 @@ def _error(case: LineContact, solved: list[GridSolution]) -> float:
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
-    viscosity = float(log_viscosities(np.ones(1), case.liquid)[0])
-    spike = min(SETTINGS.viscous * viscosity, SETTINGS.sharpest) * solved[-1].spacing ** 2
-    central = _tends_to(solved, lambda grid: grid.central_film, SETTINGS.floor + spike)
-    minimum = _tends_to(solved, lambda grid: grid.minimum[1], SETTINGS.floor + spike)
+    viscosity = min(float(log_viscosities(np.ones(1), case.liquid)[0]), SETTINGS.sharpest)
+    narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
+    share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
+    central = _tends_to(solved, lambda grid: grid.central_film, share)
+    minimum = _tends_to(solved, lambda grid: grid.minimum[1], share)
     return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
 
 

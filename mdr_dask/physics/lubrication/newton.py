@@ -49,7 +49,7 @@ class Grid(NamedTuple):
         weights = np.zeros_like(nodes)
         weights[:-1] += np.diff(nodes) / 2
         weights[1:] += np.diff(nodes) / 2
-        return cls(nodes, weights, influence_matrix(nodes, nodes))
+        return cls(nodes, weights, influence_matrix(nodes))
 
 
 class Pace(NamedTuple):

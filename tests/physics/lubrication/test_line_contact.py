@@ -113,7 +113,7 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
 def test_flow_is_the_same_everywhere() -> None:
     """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
     case = LineContact(8.0, 4.0)
-    found = solve_film(case, accuracy=1e-5)
+    found = solve_film(case, accuracy=1e-6)
     x = found.finest.nodes[(found.finest.nodes > -3) & (found.finest.nodes < found.finest.rupture - 0.02)]
     middle = (x[1:] + x[:-1]) / 2
     reduced = -np.exp(-case.liquid.alpha * found.finest.pressure_between(x)) / case.liquid.alpha
