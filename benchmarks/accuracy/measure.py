@@ -1,12 +1,15 @@
 """Measure every solver, or some: ``python -m benchmarks accuracy measure [SOLVER...]``, into a table of the evidence.
 
-Times are least processor times of this process. Names are those of `SOLVERS`; what is not measured keeps its rows.
+Times are least processor times of this process, with linear algebra on one thread. Names are those of `SOLVERS`; what
+is not measured keeps its rows.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+
+from threadpoolctl import threadpool_limits
 
 from benchmarks.accuracy import campaigns, contact, sliding, surfaces
 from benchmarks.accuracy.points import Point, gathered, write
@@ -32,6 +35,7 @@ def main(*names: str) -> None:
     unknown = set(names) - set(SOLVERS)
     if unknown:
         sys.exit(f"no solver {', '.join(sorted(unknown))}; known: {', '.join(SOLVERS)}")
+    threadpool_limits(limits=1, user_api="blas")  # as in a worker: threads that wait for each other spin
     for name in names or SOLVERS:
         points = gathered(SOLVERS[name](False))
         write(points)

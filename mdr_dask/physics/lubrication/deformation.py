@@ -21,12 +21,11 @@ def _second_integral(x: float) -> float:
 
 
 @compiled
-def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
-    """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
-    left = _second_integral(point - nodes[0])
-    left_slope = 0.0
+def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
+    """Turn second integrals of ``ln|x|`` at the nodes into integrals over hat functions there; zero at both ends."""
+    left, left_slope = row[0], 0.0
     for j in range(nodes.size - 1):
-        right = _second_integral(point - nodes[j + 1])
+        right = row[j + 1]
         slope = (right - left) / (nodes[j + 1] - nodes[j])
         row[j] = slope - left_slope
         left, left_slope = right, slope
@@ -34,29 +33,38 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
     row[-1] = 0.0
 
 
+@compiled
+def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
+    """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
+    for j in range(nodes.size):
+        row[j] = _second_integral(point - nodes[j])
+    _over_hats(nodes, row)
+
+
 @kernel
-def influence_matrix(points: FloatArray, nodes: FloatArray) -> FloatArray:
-    """Return the matrix that turns nodal pressures into deformations relative to that of ``X = 0``.
+def influence_matrix(nodes: FloatArray) -> FloatArray:
+    """Return the matrix that turns nodal pressures into deformations at the nodes, relative to that of ``X = 0``.
 
     Parameters
     ----------
-    points : array, shape (m,)
-        Where the deformation is wanted, in half widths.
     nodes : array, shape (n,)
-        Ascending nodes of the pressure, which is linear between them and zero at both ends.
+        Ascending nodes of the pressure, in half widths; it is linear between them and zero at both ends.
 
     Returns
     -------
-    array, shape (m, n)
+    array, shape (n, n)
         ``D`` with ``delta_i - delta(0) = sum_j D_ij P_j = -(1/pi) int P (ln|X_i - X| - ln|X|) dX`` (thesis eq. B.19).
     """
-    matrix = np.empty((points.size, nodes.size))
-    origin = np.empty(nodes.size)
+    n = nodes.size
+    matrix, origin = np.empty((n, n)), np.empty(n)
     _influence_row(0.0, nodes, origin)
-    for i in range(points.size):
+    for i in range(n):
+        for j in range(i + 1):  # a logarithm serves both
+            matrix[i, j] = matrix[j, i] = _second_integral(nodes[i] - nodes[j])
+    for i in range(n):
         row = matrix[i]
-        _influence_row(points[i], nodes, row)
-        for j in range(nodes.size):
+        _over_hats(nodes, row)
+        for j in range(n):
             row[j] = (origin[j] - row[j]) / pi
     return matrix
 

@@ -23,7 +23,7 @@ class Trust(NamedTuple):
     floor : float
         Least error over what the second order moved a value.
     moved : float
-        Least error over what the finest grid changed an extrapolated value by.
+        Least error over what the second order would leave of the change of an extrapolated value by the finest grid.
     slowest : float
         Least ratio of successive changes, on halved spacings, that bounds the error of a value not extrapolated.
     """
@@ -32,7 +32,7 @@ class Trust(NamedTuple):
     highest_order: float = 2.6
     third: float = 1.25
     floor: float = 0.03
-    moved: float = 0.6
+    moved: float = 0.8
     slowest: float = 1.2
 
 
@@ -107,5 +107,5 @@ def extrapolate(
     error = np.where(is_trusted, trusted, elsewhere)
     if len(values) > 3:
         before_finest = extrapolate(values[:-1], spacing[:-1], least, trust).value
-        error = np.fmax(error, trust.moved * np.abs(value - before_finest))
+        error = np.fmax(error, trust.moved / (h[1] ** 2 - 1) * np.abs(value - before_finest))
     return Limit(value, np.where(np.isnan(error) & ~np.isnan(fine), np.inf, error), order)

@@ -18,7 +18,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution
-from mdr_dask.physics.lubrication.limits import TRUST, Limit, extrapolate
+from mdr_dask.physics.lubrication.limits import Limit, extrapolate
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
@@ -66,15 +66,22 @@ class Settings(NamedTuple):
     laid_again : float
         Greatest distance of a film's end from the nearest node, in cells, with which a grid is kept as it is, unless
         it meets the accuracy. Else it is laid once more, from its own end.
+    floor : float
+        Least share of an error that is trusted in a film, :class:`Trust`.
+    sharpest : float
+        Greatest logarithm of the viscosity at Hertz' pressure that counts: the pressure has a spike, the sharper the
+        more viscous the oil.
+    spike : float
+        Added to that share for each such logarithm, times the square of the spacing: what the spike leaves of the
+        square of the spacing goes like the fourth power.
+    narrow, thick : float
+        Added to it for each such logarithm, whatever the spacing, where M is below `thick` (half of it there): the
+        spike stands in the narrowest place.
     cut : float
-        Added to the least share of an error that is trusted, :class:`Trust`, for a film that ends a whole cell from the
-        nearest node: where in its cell it ends makes the minimum film scatter.
-    viscous, sharpest : float
-        Added to that share for each logarithm of the viscosity at Hertz' pressure, and at most: the spike grows sharp.
-    seen : float
-        Part of it that stays where a fourth grid shows what the limit moves by.
+        Added to that share for a film that ends a whole cell from the nearest node: where in its cell it ends makes
+        the minimum film scatter.
     spiked : float
-        Added to that share for readings other than films, which pass the spike.
+        That share for readings other than films, which pass the spike, whatever the spacing.
     """
 
     attempts: tuple[Attempt, ...] = (
@@ -90,11 +97,13 @@ class Settings(NamedTuple):
     adaptations: int = 2
     nodes: tuple[int, ...] = (41, 81, 161, 227, 321, 454, 641, 906, 1281)
     laid_again: float = 0.2
-    cut: float = 0.2
-    viscous: float = 0.003
-    sharpest: float = 0.2
-    seen: float = 0.5
-    spiked: float = 0.1
+    floor: float = 0.01
+    sharpest: float = 50.0
+    spike: float = 0.15
+    narrow: float = 0.004
+    thick: float = 30.0
+    cut: float = 0.1
+    spiked: float = 0.13
 
 
 SETTINGS = Settings()
@@ -236,11 +245,11 @@ class LineSolution:
 
 
 def _tends_to(
-    solved: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], scatter: float
+    solved: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], share: float
 ) -> Limit:
-    """Return what a reading of the last grids tends to; `scatter` is added to the least error."""
+    """Return what a reading of the last grids tends to; `share` is the least error's, but for what a cut film adds."""
     last = solved[-4:]
-    least = TRUST.floor + SETTINGS.cut * max(grid.cut for grid in last[-3:]) + scatter
+    least = share + SETTINGS.cut * max(grid.cut for grid in last[-3:])
     return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least)
 
 
@@ -364,8 +373,8 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
         state, error = solved[-1], _error(case, solved)
         if error <= accuracy:
             break
-        if len(ladder) > 1 and len(solved) > 2 and error * (state.nodes.size / ladder[0]) ** 3 > accuracy:
-            ladder.pop(0)  # the estimate goes like the cube of the spacing
+        if len(ladder) > 1 and len(solved) > 2 and error * (state.nodes.size / ladder[0]) ** 4 > accuracy:
+            ladder.pop(0)  # the estimate goes like the fourth power of the spacing
     if len(solved) < 3:
         return _no_solution(case, *failure, steps)
     return _solution(case, solved, steps)
@@ -378,10 +387,11 @@ def _error(case: LineContact, solved: list[GridSolution]) -> float:
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
-    viscosity = float(log_viscosities(np.ones(1), case.liquid)[0])
-    scatter = min(SETTINGS.viscous * viscosity, SETTINGS.sharpest) * (1.0 if len(solved) < 4 else SETTINGS.seen)
-    central = _tends_to(solved, lambda grid: grid.central_film, scatter)
-    minimum = _tends_to(solved, lambda grid: grid.minimum[1], scatter)
+    viscosity = min(float(log_viscosities(np.ones(1), case.liquid)[0]), SETTINGS.sharpest)
+    narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
+    share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
+    central = _tends_to(solved, lambda grid: grid.central_film, share)
+    minimum = _tends_to(solved, lambda grid: grid.minimum[1], share)
     return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
 
 

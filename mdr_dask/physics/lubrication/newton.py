@@ -29,6 +29,8 @@ _QUADRATIC = 1.0 / 3.0
 _FILM_SHARE = 0.8
 #: Least share of a step that is worth taking.
 _LEAST_SHARE = 1e-9
+#: Factors are used again if the last step was at most this share of the one before it, or the first one this large.
+_SHRINKS = 0.1
 
 
 class Grid(NamedTuple):
@@ -47,7 +49,7 @@ class Grid(NamedTuple):
         weights = np.zeros_like(nodes)
         weights[:-1] += np.diff(nodes) / 2
         weights[1:] += np.diff(nodes) / 2
-        return cls(nodes, weights, influence_matrix(nodes, nodes))
+        return cls(nodes, weights, influence_matrix(nodes))
 
 
 class Pace(NamedTuple):
@@ -60,7 +62,8 @@ class Pace(NamedTuple):
     most : int
         Greatest number of steps.
     tolerance : float
-        Relative size of the last step: what is left is of the size of its square.
+        Relative size of the last step: what is left is of the size of its square. A step by the factors of the one
+        before it leaves more, and has to be a hundredth of that.
     """
 
     clip: float
@@ -261,6 +264,16 @@ def _fill_equations(
     A[count, count] = 0.0
 
 
+@kernel
+def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
+    """Fill the right side of those equations where the other pressures are zero already."""
+    for k in range(active.size):
+        b[k] = -R[active[k]]
+    b[active.size] = 0.5 * np.pi
+    for j in range(P.size):
+        b[active.size] -= grid.weights[j] * P[j]
+
+
 @compiled
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
     """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
@@ -287,20 +300,21 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
 
 @kernel
 def _take_step(
-    grid: Grid, pace: Pace, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
-) -> tuple[int, float]:
-    """Change P, H and the film at ``X = 0`` by as much of a Newton step as the film allows; return outcome and film."""
-    share = _step_length(grid, P, H, step, change, pace.clip)
+    grid: Grid, clip: float, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
+) -> tuple[float, float]:
+    """Change P, H and the film at ``X = 0`` by as much of a Newton step as the film allows.
+
+    Return that film, and the relative size of the step: infinite if it was shortened, NaN if no film is left.
+    """
+    share = _step_length(grid, P, H, step, change, clip)
     if not share > _LEAST_SHARE:
-        return Outcome.FILM_COLLAPSED, central
-    settled = np.max(np.abs(step)) < pace.tolerance * np.max(P) and abs(change) < pace.tolerance * central
+        return central, np.nan
+    size = max(np.max(np.abs(step)) / np.max(P), abs(change) / central) if share == 1.0 else np.inf
     for i in range(P.size):
         P[i] = max(0.0, P[i] + share * step[i])
     central += share * change
     _fill_film(grid, P, central, H)
-    if share == 1.0 and settled:
-        return Outcome.CONVERGED, central
-    return (Outcome.UNDER_WAY if central > 0.0 and np.min(H) > 0.0 else Outcome.FILM_COLLAPSED), central
+    return central, size if central > 0.0 and np.min(H) > 0.0 else np.nan
 
 
 def film_on(grid: Grid, P: FloatArray, central: float) -> FloatArray:
@@ -337,26 +351,32 @@ def newton(grid: Grid, liquid: Liquid, K: float, guess: FloatArray, central: flo
     P, H = guess.copy(), film_on(grid, guess, central)
     state, found = np.empty((4, n)), Imbalance(np.empty(n), np.empty((n, 4)), np.empty((n, 4)))
     listed, workspace = np.empty(n, np.int64), np.empty(n * n)
-    outcome, solved = int(Outcome.UNDER_WAY), listed[:0]
+    solved, factors, b = listed[:0], None, np.empty(0)
+    size, before, last = np.inf, 1.0, pace.tolerance
     for steps in range(pace.most + 1):
         balance(grid.nodes, liquid, K, P, H, state, found)
         active = listed[: _fill_active(grid.influence, P, found, listed)]
+        same = np.array_equal(active, solved)
         # a first step may be small by chance; from then on steps shrink like squares
-        if steps > 1 and outcome == Outcome.CONVERGED and np.array_equal(active, solved):
+        if steps > 1 and size < last and same:
             return Iterate(Outcome.CONVERGED, steps, P, central, H)
         if steps == pace.most:
             break
-        solved = active.copy()
-        order = active.size + 1
-        A, b = workspace[: order * order].reshape(order, order), np.empty(order)
-        _fill_equations(grid, P, found, active, A, b)
-        factors = factorise(A)
+        if same and size < _SHRINKS * before:
+            _fill_imbalance(grid, P, found.value, active, b)
+            last = 0.01 * pace.tolerance
+        else:
+            solved, b = active.copy(), np.empty(active.size + 1)
+            A = workspace[: b.size**2].reshape(b.size, b.size)
+            _fill_equations(grid, P, found, active, A, b)
+            factors, last = factorise(A), pace.tolerance
         if factors is None:
             return Iterate(Outcome.SINGULAR, steps + 1, P, central, H)
         solution = factors.solve(b)
         step = -P
         step[active] = solution[:-1]
-        outcome, central = _take_step(grid, pace, P, central, H, step, solution[-1])
-        if outcome == Outcome.FILM_COLLAPSED:
+        before = size if steps else 1.0
+        central, size = _take_step(grid, pace.clip, P, central, H, step, solution[-1])
+        if np.isnan(size):
             return Iterate(Outcome.FILM_COLLAPSED, steps + 1, P, central, H)
     return Iterate(Outcome.TOO_MANY_STEPS, pace.most, P, central, H)

@@ -58,4 +58,16 @@ def test_an_extrapolated_value_that_still_moves_is_known_no_better() -> None:
     values = 7 + 0.5 * h**2 + 0.02 * h**3
     values[0] += 21.0
     assert extrapolate(values[1:], h[1:]).error < 0.2
-    assert extrapolate(values, h).error > 0.5 * abs(extrapolate(values[:3], h[:3]).value - 7) > 0.2
+    assert extrapolate(values, h).error > 0.25 * abs(extrapolate(values[:3], h[:3]).value - 7) > 0.2
+
+
+def test_a_limit_moved_by_a_much_finer_grid_is_known_better() -> None:
+    """The same change of the limit, by a grid of half the spacing and by one of 0.71 of it."""
+    changed = {}
+    for ratio in (2.0, 1.41):
+        h = ratio * np.array([4.0, 2.0, 1.0, 1 / ratio])
+        values = 7 + 0.5 * h**2
+        values[0] += 21.0
+        before = extrapolate(values[:3], h[:3]).value
+        changed[ratio] = float(extrapolate(values, h).error / abs(before - 7))
+    assert changed[2.0] < 0.4 * changed[1.41]

@@ -113,7 +113,7 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
 def test_flow_is_the_same_everywhere() -> None:
     """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
     case = LineContact(8.0, 4.0)
-    found = solve_film(case, accuracy=1e-5)
+    found = solve_film(case, accuracy=1e-6)
     x = found.finest.nodes[(found.finest.nodes > -3) & (found.finest.nodes < found.finest.rupture - 0.02)]
     middle = (x[1:] + x[:-1]) / 2
     reduced = -np.exp(-case.liquid.alpha * found.finest.pressure_between(x)) / case.liquid.alpha
@@ -146,19 +146,36 @@ def _heavy() -> list[tuple[LineContact, float, float]]:
     return cases
 
 
-@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
-def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: float) -> None:
-    """70 random points with M > 200 against grids of 10241 nodes: 95 % within the error, all within the accuracy."""
-    errors, stated = [], []
+@pytest.mark.parametrize(("accuracy", "nodes"), [(1e-2, 180), (1e-3, 240), (1e-4, 520)])
+def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: float, nodes: float) -> None:
+    """70 random points with M > 200 against grids of 10241 nodes: 98 % within the error, 99 % within the accuracy.
+
+    Nor are grids much finer than that takes.
+    """
+    errors, stated, finest = [], [], []
     for case, central, minimum in _heavy():
         assert case.M > 200
         found = solve_film(case, accuracy)
         assert found.error <= accuracy
+        finest.append(found.finest.nodes.size)
         for here, true in ((found.central_film, central), (found.minimum_film, minimum)):
             errors.append(abs(float(here.value) / true - 1))
             stated.append(float(here.error) / true + 5e-6)
-    assert max(errors) <= accuracy
-    assert np.mean(np.array(errors) <= np.array(stated)) >= 0.95
+    assert np.mean(np.array(errors) <= accuracy) >= 0.99
+    assert np.mean(np.array(errors) <= np.array(stated)) >= 0.98
+    assert np.max(np.array(errors) / np.array(stated)) < 3
+    assert np.mean(finest) <= nodes
+
+
+@pytest.mark.parametrize(
+    ("M", "L", "rise", "saturation"), [(7.1047, 32.268, 0.979, 2.774), (2.2246, 40.893, 0.49, 1.39)]
+)
+def test_a_spike_in_the_narrowest_place_is_in_the_error(M: float, L: float, rise: float, saturation: float) -> None:
+    """Grids agree on such minimum films by chance: their last changes told a twentieth to a quarter of the error."""
+    case = LineContact(M, L, density_rise=rise, density_saturation=saturation)
+    found, fine = solve_film(case, 3e-4), solve_film(case, 1e-5)
+    for here, there in ((found.central_film, fine.central_film), (found.minimum_film, fine.minimum_film)):
+        assert abs(here.value - there.value) <= here.error + there.error
 
 
 @pytest.mark.parametrize(
