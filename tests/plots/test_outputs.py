@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from mdr_dask import units
 from mdr_dask.errors import DataError
-from mdr_dask.plots import curves, page, style
+from mdr_dask.plots import curves, drawing, page, style
 from mdr_dask.plots.outputs import View, of_output
 
 V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 6]}\n"
@@ -127,11 +127,14 @@ def test_a_map_has_the_values_of_the_store_and_crosses_out_what_failed(stores):
     np.testing.assert_allclose(edges[1:-1] ** 2, data["velocity"][1:] * data["velocity"][:-1].values)
     half = float(((value[2] - value[1]) / 2).max())
     assert f"at most ±{half:.2g}" in figure.get_suptitle()
-    (mesh,) = drawn({"": data.isel(normal_force=[1])}, MU, ("velocity", "normal_force")).axes[0].collections
-    force = float(data["normal_force"][1])
-    np.testing.assert_allclose(mesh.get_coordinates()[:, 0, 1], [force / 2, 1.5 * force])
     drawn({"": stores["sampled"]}, MU, ("velocity", "hurst"))
     drawn({"": stores["grid"]}, MU, ("velocity", "normal_force"), panels="hurst")
+
+
+def test_cells_of_a_map_end_between_the_values_of_an_axis_and_around_a_single_one():
+    np.testing.assert_allclose(drawing.edges(np.array([2.0, 4.0, 5.0])), [1.0, 3.0, 4.5, 5.5])
+    np.testing.assert_allclose(drawing.edges(np.array([5.0])), [2.5, 7.5])
+    np.testing.assert_allclose(drawing.edges(np.array([0.0])), [-0.5, 0.5])
 
 
 def test_effects_are_means_over_all_that_varies_besides(stores):
