@@ -133,7 +133,7 @@ class Template:
         """Return the model's estimate of a block; those of all realisations but the last few are the same."""
         *cases, last = index
         rest = self.sizes["realisation"] - last * self.chunks["realisation"]
-        part = min(rest / self.chunks["realisation"], 1.0)
+        part = min(rest / self._first_realisations, 1.0)
         return part * self._first_seconds((*cases, 0))
 
     def _first_seconds(self, index: BlockIndex) -> float:
@@ -146,6 +146,10 @@ class Template:
     @cached_property
     def _estimates(self) -> dict[BlockIndex, float]:
         return {}
+
+    @property
+    def _first_realisations(self) -> int:
+        return min(self.chunks["realisation"], self.sizes["realisation"])
 
     def _block(self, region: Mapping[str, slice]) -> Block[Any]:
         case_dims = self.dims[:-1]
@@ -296,7 +300,7 @@ def available_memory() -> float:
 
 
 def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
-    """Fill a block with work: shared axes whole, then realisations, then the other axes."""
+    """Fill a block with work: shared axes whole, then realisations, then the other axes, then those of later rounds."""
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
@@ -306,9 +310,15 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
             math.prod(chunks.values()) > limit or _is_cut(template, model, chunks, dim, 4 * goal)
         ):
             chunks[dim] = math.ceil(chunks[dim] / 2)
+
+    def room() -> int:
+        return int(min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values())))
+
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
-        room = min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values()))
-        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], int(room))))
+        chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], room())))
+    replication = template.campaign.replication
+    if replication.goes_on and chunks == template.sizes:
+        chunks["realisation"] = max(1, min(replication.at_most, room() * template.sizes["realisation"]))
     return {
         **chunks,
         **{dim: min(n, template.sizes[dim]) for dim, n in template.campaign.blocks.items() if dim in template.sizes},
@@ -347,7 +357,8 @@ def _is_whole(axis: Axis, path: str) -> bool:
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
 
-    Where rounds add realisations, parts divide a round, so that every round fills whole blocks.
+    Where rounds add realisations, parts divide a round, so that every round fills whole blocks. Only where one block
+    holds the whole first round, the next ones go on in it.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication
@@ -416,7 +427,7 @@ def _estimate_series(template: Template, model: Model[Any]) -> Estimate:
         blocks=math.prod(template.grid),
         bytes=template.bytes,
         files=template.files,
-        seconds=seconds * realisations / template.chunks["realisation"],
+        seconds=seconds * realisations / min(template.chunks["realisation"], realisations),
         notes=template.notes,
         growth=_growth(template.series),
     )

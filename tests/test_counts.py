@@ -115,13 +115,29 @@ def test_a_round_writes_what_changes_and_reads_no_block(toy, url, monkeypatch):
     monkeypatch.setattr(store, "read_block", lambda *given: read.append(given) or read_block(*given))
     tolerance = {"height": Tolerance(absolute=1.0)}
     study = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 20, tolerance))
-    run(study, url, Resources(threads=1), lambda _: None)
+    run(replace(study, blocks={"realisation": 10}), url, Resources(threads=1), lambda _: None)
     assert 20 < len(toy.COMPUTED) < 40
     assert not read
     layout = Counter(path.relative_to(url).as_posix() for path in written if "/c/" not in str(path))
     coordinates = {name for name, count in layout.items() if name.endswith("/zarr.json") and count > 1}
     assert coordinates == {"height/zarr.json", "status/zarr.json", "realisation/zarr.json"}
     assert Counter(path.relative_to(url).parts[0] for path in written if "/c/" in str(path))["position"] == 1
+
+
+def test_rounds_of_a_cheap_study_go_on_in_one_block(toy, url, tmp_path):
+    """A file of every array, with the numbers of a block a round; nothing is computed twice."""
+    tolerance = {"height": Tolerance(absolute=0.5)}
+    study = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 80, tolerance))
+    found = {}
+    for where, blocks in ((url, {}), (str(tmp_path / "rounds.zarr"), {"realisation": 10})):
+        toy.COMPUTED.clear()
+        progress = run(replace(study, blocks=blocks), where, Resources(threads=1), lambda _: None)
+        chunks = sum(path.is_file() for path in Path(where, "height/c").rglob("*"))
+        found[where] = len(toy.COMPUTED), progress.done, chunks, store.datasets(where)[""]["height"].to_numpy()
+    (computed, done, chunks, heights), (again, also, more, same) = found.values()
+    assert computed == done == again == also > 40
+    assert chunks == 1 < more
+    np.testing.assert_array_equal(heights, same)
 
 
 @pytest.fixture

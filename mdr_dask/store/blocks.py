@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 from zarr.abc.store import Store
 from zarr.core.buffer import Buffer
@@ -22,7 +21,7 @@ from mdr_dask.store.digests import Checked
 from mdr_dask.store.files import bytes_of, group_name, guarded, read_bytes, write_stages
 from mdr_dask.store.locks import Hold, holding
 from mdr_dask.store.records import digest, name_of, sealed
-from mdr_dask.store.study import document
+from mdr_dask.store.study import array_of, document
 
 
 @dataclass(frozen=True)
@@ -113,13 +112,19 @@ def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArra
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
     """Return one output of a group as it stands now, axes in the order of the store."""
+    (held,) = _opened(url, series, Checked(bytes_of(url), url, series), [output]).values()
     with guarded(url, f"reading {output}"):
-        return np.asarray(_open(url, series, Checked(bytes_of(url), url, series))[output][...])
+        return np.asarray(held[...])
 
 
-def _open(url: str, series: str, store: Store) -> Any:
-    document(url, series)
-    return zarr.open_group(store, path=group_name(series) or None, mode="r", use_consolidated=True, zarr_format=3)
+def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> dict[str, Any]:
+    """Return some arrays of a group, or the ledger and all outputs, as its document shows them."""
+    held = document(url, series)
+    if held is None:
+        raise StoreError(f"{url}: gone since it was laid out")
+    shown = held["consolidated_metadata"]["metadata"]
+    wanted = names or ("status", *held["attributes"]["outputs"])
+    return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
 
 
 class Staged(WrapperStore[Store]):
@@ -144,12 +149,8 @@ def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     seen = layout_mark(url)
     if seen != layout:
         raise StoreError(f"{url}: {_other_store(seen)}")
-    document(url, series)
-    with guarded(url, "opening it"):
-        staged = Staged(bytes_of(url))
-        path = group_name(series) or None
-        group = zarr.open_group(staged, path=path, mode="r+", use_consolidated=True, zarr_format=3)
-        return {name: array.with_config({"write_empty_chunks": True}) for name, array in group.arrays()}
+    opened = _opened(url, series, Staged(bytes_of(url)))
+    return {name: array.with_config({"write_empty_chunks": True}) for name, array in opened.items()}
 
 
 def _other_store(seen: str | None) -> str:

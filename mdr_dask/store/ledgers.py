@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +17,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.store.files import guarded, read_many
 from mdr_dask.store.records import digest
 from mdr_dask.store.seals import Chunks, Contents, Seal, read_seal
-from mdr_dask.store.study import document
+from mdr_dask.store.study import array_of, document
 
 
 def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
@@ -88,11 +87,10 @@ class Ledger:
         below = "/0" * (len(chunk) - 1)
         files = {f"c/{i}{below}": buffer.from_bytes(one) for i, one in enumerate(self.different) if one is not None}
         stacked = [len(self.different) * chunk[0], *chunk[1:]]
-        files["zarr.json"] = buffer.from_bytes(json.dumps({**status, "shape": stacked}).encode())
         try:
             with guarded(url, "reading status"):
-                array: Any = zarr.open_array(zarr.storage.MemoryStore(files), mode="r", zarr_format=3)
-                parts = np.asarray(array[...]).reshape(-1, *chunk)[self.which]
+                opened = array_of({**status, "shape": stacked}, zarr.storage.MemoryStore(files))
+                parts = np.asarray(opened[...]).reshape(-1, *chunk)[self.which]
         except StoreError as error:
             raise StoreError(f"{error}; 'mdr-dask verify {url}' names what is damaged") from None
         dims = self.which.ndim

@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import zarr
+from zarr.abc.store import Store
+from zarr.storage import StorePath
+
 from mdr_dask.errors import StoreError
 from mdr_dask.store.copies import groups_laid_out, groups_with
 from mdr_dask.store.expected import faults
@@ -32,6 +36,11 @@ def document(url: str, series: str = "") -> dict[str, Any] | None:
         for fault in faults(found):
             raise StoreError(f"{url}: {name}: {fault}; {_remedy(url)}")
     return found
+
+
+def array_of(shown: Mapping[str, Any], store: Store, path: str = "") -> Any:
+    """Return the array that metadata show; Zarr opens a group with the metadata of all arrays, which takes longer."""
+    return zarr.Array(zarr.AsyncArray(dict[str, Any](shown), StorePath(store, path)))  # type: ignore[call-overload]
 
 
 def _remedy(url: str) -> str:
