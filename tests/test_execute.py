@@ -48,6 +48,7 @@ def test_plain_xarray_reads_a_store_with_units_and_fixed_parameters(toy, url):
     assert dataset.height.dims == ("position", "realisation")
     assert dataset.height.attrs["units"] == dataset.position.attrs["units"] == "m"
     assert float(dataset.noise) == 0.25
+    assert dataset.noise.attrs == {"units": "1", "long_name": "standard deviation over realisations"}
     assert dataset.status.attrs["flag_meanings"].split()[Status.DONE] == "done"
     assert dataset.attrs["campaign"] == "text"
 

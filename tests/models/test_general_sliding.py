@@ -100,6 +100,7 @@ def test_failures_are_said():
     bad = {"prony": {"static_modulus": 1e7, "moduli": (1.0,), "times": (-1.0,)}}
     result = MODEL.compute(block(LINE | LOAD | {"material": bad}, {"velocity": [0.1]}))
     assert "relaxation times must be positive" in result.messages[0, 0]
+    assert result.solves == 0
 
 
 def test_one_body_and_one_line():

@@ -120,6 +120,7 @@ def test_a_spectrum_without_harmonics_is_a_failed_case():
     result = MODEL.compute(make({"velocity": [0.1]}, longest_wavelength=1e-5))
     assert np.all(result.status == Status.FAILED)
     assert "got no harmonic" in result.messages[0, 1]
+    assert result.solves == 0
 
 
 def test_overflowing_numbers_are_a_failed_case():

@@ -131,6 +131,16 @@ def test_a_map_has_the_values_of_the_store_and_crosses_out_what_failed(stores):
     drawn({"": stores["grid"]}, MU, ("velocity", "normal_force"), panels="hurst")
 
 
+def test_the_colours_of_a_map_have_a_name_and_a_unit(stores):
+    for output, label in (
+        (MU, "coefficient of friction"),
+        ("indentation_depth", "penetration of the mean line into the undeformed body [m]"),
+    ):
+        figure = drawn({"": stores["grid"].isel(hurst=0)}, output, ("velocity", "normal_force"))
+        (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
+        assert bar.get_ylabel().replace("\n", " ") == label
+
+
 def test_cells_of_a_map_end_between_the_values_of_an_axis_and_around_a_single_one():
     np.testing.assert_allclose(drawing.edges(np.array([2.0, 4.0, 5.0])), [1.0, 3.0, 4.5, 5.5])
     np.testing.assert_allclose(drawing.edges(np.array([5.0])), [2.5, 7.5])

@@ -27,3 +27,14 @@ def test_the_rise_of_a_table_is_the_difference_of_its_image(gap):
     for start in (0.35, 0.5123, 0.77):
         low, high = profile.image(np.array([start, start + gap]))
         assert rise(profile.pieces(), start, low, gap) == pytest.approx(high - low, rel=2e-4)
+
+
+def test_the_rise_of_a_power_from_the_centre_is_its_image():
+    gap = np.array([0.0, 1e-9, 0.3, 2.0])
+    for exponent in (0.5, 1.0, 2.0, 8.0):
+        profile = PowerProfile(exponent)
+        np.testing.assert_array_equal(profile.rise(gap, 0.0), profile.image(gap))
+        for start in (0.05, 0.4):
+            np.testing.assert_allclose(
+                profile.rise(gap, start), (start + gap) ** exponent - start**exponent, atol=1e-15
+            )
