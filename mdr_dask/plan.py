@@ -18,6 +18,7 @@ from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series, measured
 from mdr_dask.errors import CampaignError
 from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, replaced
+from mdr_dask.models.numbers import numbers_of
 
 #: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
 BLOCK_SECONDS = 1.0
@@ -108,8 +109,9 @@ class Template:
     def files(self) -> int:
         """Number of files of the group when it is done: chunks, coordinates, metadata, and what is told of them."""
         blocks, arrays = math.prod(self.grid), len(self.outputs) + 1
-        coordinates = len(self.series.axes) + 1 + len(self.extra) + _numbers(self.series.parameters.model_dump())
-        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * coordinates + arrays + 3
+        axes = {axis.name for axis in self.series.axes}
+        coordinates = axes | set(self.extra) | (numbers_of(self.series.parameters).keys() - self.sizes.keys())
+        return blocks * arrays + math.ceil(blocks / RECORDS_TOGETHER) + 2 * (len(coordinates) + 1) + arrays + 3
 
     def block_indices(self) -> Iterator[BlockIndex]:
         """Yield every block, first realisations of all cases first: a look at a running store sees all cases."""
@@ -182,12 +184,6 @@ class Template:
             start = round(position * (size - chunks[dim]))
             region[dim] = slice(start, start + chunks[dim])
         return self._block(region)
-
-
-def _numbers(tree: Mapping[str, Any]) -> int:
-    """Count the numbers among parameters, nested ones too."""
-    leaves = (_numbers(value) if isinstance(value, Mapping) else isinstance(value, float) for value in tree.values())
-    return sum(leaves)
 
 
 def _as_array(axis: Axis) -> NDArray[Any]:
@@ -395,7 +391,7 @@ def estimate(campaign: Campaign) -> Estimate:
         blocks=sum(part.blocks for part in parts),
         bytes=sum(part.bytes for part in parts),
         seconds=sum(part.seconds for part in parts),
-        files=1 + sum(part.files for part in parts),
+        files=sum(part.files for part in parts) + any(series.name for series in campaign.series),
         notes=tuple(dict.fromkeys((*(note for part in parts for note in part.notes), *measured.notes(campaign)))),
         compiling=model.compiling,
         growth=sum(part.cases * part.growth for part in parts) / sum(part.cases for part in parts),

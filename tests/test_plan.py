@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from mdr_dask import plan
 from mdr_dask.campaign import Replication, Tolerance, load
 from mdr_dask.errors import CampaignError
+from mdr_dask.execute import Resources, run
 
 SLOW_CASE = 0.05
 
@@ -113,6 +114,17 @@ def test_estimates_add_up(toy, costs, sizes, realisations, cost):
     assert (estimate.cases, estimate.results, estimate.solves) == (math.prod(sizes), results, results)
     assert estimate.bytes == 9 * results
     assert estimate.seconds == pytest.approx(10.0**cost * results, rel=1e-9)
+
+
+@pytest.mark.parametrize("blocks", [{}, {"position": 2, "realisation": 3}, {"position": 1, "realisation": 1}])
+@pytest.mark.parametrize("names", [("",), ("near", "far")])
+def test_as_many_files_are_told_as_a_run_leaves(toy, tmp_path, blocks, names):
+    campaign = study(toy, (6, 2), 6, blocks=blocks)
+    series = tuple(replace(campaign.series[0], name=name) for name in names)
+    campaign = replace(campaign, series=series, outputs=("height", "trace"))
+    url = tmp_path / "study.zarr"
+    run(campaign, str(url), Resources(threads=1), lambda _: None)
+    assert plan.estimate(campaign).files == sum(path.is_file() for path in url.rglob("*"))
 
 
 def test_shared_solutions_are_counted(toy, costs):

@@ -52,6 +52,27 @@ def test_curves_hold_the_mean_over_realisations(forces):
     assert np.sort(drawn, axis=0) == pytest.approx(np.sort(expected.values.reshape(-1, 15), axis=0))
 
 
+def test_the_law_is_drawn_through_every_curve_of_planes_and_no_other(forces, cone):
+    """A curve has its own force and Hurst exponent; the law lies within 45 % of it, up to the plateau."""
+    figure = DRAW["velocity"]({"": forces.isel(normal_force=[6, 9])})
+    table = figure.table()
+    table = table.assign(kind=[what.partition(" ")[0] for what in table["what"]])
+    cases = ["hurst", "normal_force"]
+    of_data = dict(list(table[table.kind == "data"].groupby(cases)))
+    of_laws = dict(list(table[table.kind == "law"].groupby(cases)))
+    assert of_laws.keys() == of_data.keys()
+    assert len(of_laws) == 6
+    for case, law in of_laws.items():
+        data = of_data[case]
+        assert law.x.min() == pytest.approx(data.x.min())
+        assert law.x.max() == pytest.approx(data.x.max())
+        there = np.exp(np.interp(np.log(data.x), np.log(law.x), np.log(law.y)))
+        np.testing.assert_allclose(there[:11], data.y[:11], rtol=0.45)
+    of_a_cone = DRAW["velocity"]({"cone": cone})
+    assert set(of_a_cone.table()["what"]) == {"data"}
+    assert len(of_a_cone.axes[0].get_lines()) > 0
+
+
 def test_every_region_of_the_law_has_its_number(forces):
     """From the lowest velocity on, also where it is below one in the unit shown."""
     one = forces.isel(hurst=1, normal_force=6)

@@ -56,6 +56,18 @@ def test_profiles_draw_exact_dashed_fast_full_and_the_limit_dotted(methods):
     assert styles[:1] + styles[-1:] == ["--", ":"]
 
 
+def test_every_stick_radius_has_its_own_row_of_profiles():
+    sticks = (0.3, 0.5, 0.7, 0.8)
+    data = study("fast", [2.0], sticks=sticks)
+    figure = wear.draw_profiles({"": data})
+    assert len(figure.axes) == 2 * len(sticks)
+    for output, panels in (("worn_profile", figure.axes[::2]), ("worn_image", figure.axes[1::2])):
+        for number, axes in enumerate(panels):
+            drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) == RADIUS.size]
+            worn = data[output].isel(stick_radius=number, cycles=0, realisation=0).values
+            assert any(np.allclose(line, worn) for line in drawn)
+
+
 def test_volume_has_a_band():
     figure = wear.draw_volume({"": study("fast", [0.5, 2.0], realisations=(0, 1, 2))})
     assert len(figure.axes[0].lines) == 2

@@ -323,3 +323,13 @@ def test_any_line_and_any_solid_end_in_a_state_or_a_status(seed, kind, scale, ve
     # scaling: heights and load by the same number leave the contact and multiply the friction by it
     twice = material_on_line(2 * height, 1.0, solid, 10**velocity, 2 * force)
     assert twice.contact_fraction == pytest.approx(state.contact_fraction, rel=1e-3)
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.25, 0.5])
+def test_a_peak_between_two_nodes_is_in_the_error_of_the_depth(shift):
+    """A wave that hardly touches: its depth is that of the peak, which all grids miss by as much."""
+    angle = 2 * np.pi * (np.arange(64) + shift) / 64
+    state = steady_viscoelastic_sliding(periodic_line(np.cos(angle), -2 * np.pi * np.sin(angle)), kelvin(1, 0.01), 1e-9)
+    missed = abs(state.values[viscoelastic.DEPTH] + 1)
+    assert missed == pytest.approx(1 - np.cos(2 * np.pi * shift / 64), rel=0.05)
+    assert 0.95 * missed < state.errors[viscoelastic.DEPTH] < 1.5 * missed
