@@ -35,7 +35,7 @@ def ratios(template: Template, blocks: int) -> tuple[float, list[float]]:
     model = models.load(template.campaign.model)
     indices = [(*index, 0) for index in np.ndindex(template.grid[:-1])]
     seconds = np.array([template.seconds(index) for index in indices])
-    total = float(seconds.sum()) * template.sizes["realisation"] / template.chunks["realisation"]
+    total = float(seconds.sum()) * max(template.sizes["realisation"] / template.chunks["realisation"], 1.0)
     draw = np.random.default_rng(1).choice(len(indices), min(blocks, len(indices)), p=seconds / seconds.sum())
     model.compute(template.block(indices[draw[0]]).part(0, 0))  # compiled and loaded
     found = []

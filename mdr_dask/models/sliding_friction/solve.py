@@ -21,7 +21,9 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say
 NODE_LINE, NODE_SWEPT = 2.5e-8, 1.3e-8  # seconds for every node of a line and of a solution
-STEPPED_LINE, NODE_STEPPED = 8e-8, 9e-9  # the same of the papers' steps
+FIXED = {"backward_euler": 1.0, "piecewise_linear": 2.0, "hermite": 3.5}  # how many times as many
+AUTO = {"backward_euler": (512, 1.0), "piecewise_linear": (4, 25.0), "hermite": (4, 3.5)}  # on which grid, and so on
+STEPPED, STEPPED_LINE, NODE_STEPPED = 2.5e-4, 4e-8, 7e-10  # of the papers' steps: to begin with, a line, a solution
 POINT_LINE, POINT_SAMPLED = 2e-7, 8e-9  # and for every Nyquist point gone along from node to node
 NODE_ARM, NODE_GENERAL, GENERAL = 4e-9, 4.5e-8, 3e-4  # for every node and arm of a general solid, and to begin with
 ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
@@ -173,15 +175,17 @@ def _seconds_of_line(
     if setting.arms is not None:
         grid = 2 * COARSEST if auto else int(oversampling)
         return solves * (GENERAL + (NODE_ARM * (len(setting.arms.moduli) + 1) + NODE_GENERAL) * points * grid)
+    harder = 1 + 2.5 * (1 - getattr(setting.roughness, "hurst", 1.0)) ** 8  # more cases need cubic cells
+    from_node_to_node = float(points * (POINT_LINE + solves * POINT_SAMPLED) * harder)
     if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):
-        harder = 1 + 2.5 * (1 - getattr(setting.roughness, "hurst", 1.0)) ** 8  # more cases need cubic cells
-        return float(points * (POINT_LINE + solves * POINT_SAMPLED) * harder)
-    grid = 4 if auto else int(oversampling)
-    checks = 3.5 if auto or any(f"{output}_error" in block.outputs for output in COLUMNS) else 1
-    nodes = points * grid
+        return from_node_to_node
+    grid, times = AUTO[scheme] if auto else (int(oversampling), FIXED[scheme])
     if scheme == "backward_euler":
-        return float(checks * nodes * (STEPPED_LINE + solves * NODE_STEPPED))
-    return float(checks * (NODE_LINE * nodes + solves * NODE_SWEPT * points * grid**0.25))
+        own = STEPPED + points * grid * (STEPPED_LINE + solves * NODE_STEPPED)
+    else:
+        own = times * points * (NODE_LINE * grid + solves * NODE_SWEPT * grid**0.25)
+    has_errors = not auto and any(f"{output}_error" in block.outputs for output in COLUMNS)
+    return own + has_errors * from_node_to_node
 
 
 def memory(block: Block[SlidingFriction]) -> float:
