@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import j0
@@ -16,22 +18,70 @@ from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.mdr import transforms
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.uniform_grid import uniform_grid
-from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced_rule import fast_forced
-from mdr_dask.physics.wear.rules import fast
+from mdr_dask.physics.wear.history import LoadBlock, history
+from mdr_dask.physics.wear.rules import fast, limit
+from mdr_dask.physics.wear.worn import virgin_load
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.literal_wear import literal
 
 FILMS = Path(__file__).parents[2] / "tests/references/heavy_line_contacts.csv"
 KNOWN = 5e-6  # relative error of those films
-#: Exponent, c / a0, N, and whether the force is held.
+
+
+class Worn(NamedTuple):
+    """A body r^n, its c / a0 (0 is gross slip), amount of wear, and whether the force is held."""
+
+    exponent: float
+    border: float
+    amount: float
+    held: bool = False
+
+    @property
+    def profile(self) -> PowerProfile:
+        return PowerProfile(self.exponent)
+
+    @property
+    def scale(self) -> float:
+        """What can wear, over d0."""
+        return 1 - float(self.profile.image(np.array(self.border)))
+
+    def evolved(self, accuracy: float):
+        return exact(self.profile, self.border, [self.amount], accuracy, constant_force=self.held)[0]
+
+    def otherwise(self, short: bool) -> Iterator[tuple[str, str, Callable]]:
+        """Yield the other rules that serve here: method, setting, and what solves."""
+        profile, border, amount = self.profile, self.border, self.amount
+        kept = {"force": 2 * virgin_load(profile, 1.0)} if self.held else {"depth": 1.0}
+        block = LoadBlock(amount, self.scale if border > 0 else np.inf, **kept)
+        for cells in (40,) if short else (50, 100, 200, 400):
+            yield "blocks of load", f"{cells} cells", partial(_last, profile, block, cells)
+        if border == 0:
+            return
+        fast_rule, limit_rule = (fast_forced, limit_under_force) if self.held else (fast, limit)
+        yield "fast rule, ξ = 0.8", "", partial(fast_rule, profile, border, amount, 0.8)
+        yield "limit rule", "", partial(limit_rule, profile, border)
+        for cells in () if amount > FEW else (40,) if short else (50, 100, 200):
+            simulated = partial(literal, profile, border, amount, cells=cells, constant_force=self.held)
+            yield "cycle by cycle (thesis)", f"{cells} cells", simulated
+
+
 WORN = {
-    "easy: parabola, N = 2": (2.0, 0.455, 2.0, False),
-    "typical: parabola, N = 8": (2.0, 0.455, 8.0, False),
-    "typical: cone, force held": (1.0, 0.3, 4.0, True),
-    "hard: flat, n = 8, c = 0.1": (8.0, 0.1, 4.0, False),
+    "easy: parabola, N = 2": Worn(2.0, 0.455, 2.0),
+    "easy: gross slip": Worn(2.0, 0.0, 1.0),
+    "typical: parabola, N = 8": Worn(2.0, 0.455, 8.0),
+    "typical: cone, force held": Worn(1.0, 0.3, 4.0, held=True),
+    "hard: flat, n = 8, c = 0.1": Worn(8.0, 0.1, 4.0),
+    "hard: N = 300": Worn(2.0, 0.455, 300.0),
+    "hard: gross slip, force held": Worn(1.0, 0.0, 2.0, held=True),
 }
+FEW = 20.0  # cycles beyond which they are not followed one by one
+
+
+def _last(profile: PowerProfile, block: LoadBlock, cells: int):
+    return history(profile, [block], cells=cells)[0]
 
 
 def wear(short: bool) -> Iterator[Point]:
@@ -40,33 +90,23 @@ def wear(short: bool) -> Iterator[Point]:
     The truth is the exact evolution at 1e-5, which those cycles tend to. Errors are over what can wear, as `accuracy`
     is: the largest of the profile at any radius.
     """
-    for case, (exponent, border, amount, held) in list(WORN.items())[: 1 if short else None]:
+    for case, worn in list(WORN.items())[: 1 if short else None]:
         for like, rounder, more in neighbours(short):
-            profile, stick, cycles = PowerProfile(exponent * 1.1**rounder), border, amount * 1.5**more
-
-            def evolved(accuracy, profile=profile, stick=stick, cycles=cycles, held=held):
-                return exact(profile, stick, [cycles], accuracy, constant_force=held)[0]
-
-            truth = evolved(1e-3 if short else 1e-5)
+            body = worn._replace(exponent=worn.exponent * 1.1**rounder, amount=worn.amount * 1.5**more)
+            truth = body.evolved(1e-3 if short else 1e-5)
             radii = np.linspace(0, 1.2 * truth.contact_radius, 400)
-            scale = 1 - float(profile.image(np.array(stick)))
 
-            def error(found, truth=truth, radii=radii, scale=scale):
+            def error(found, truth=truth, radii=radii, scale=body.scale):
                 return float(np.max(np.abs(found.height(radii) - truth.height(radii)))) / scale
 
             for accuracy in (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4):
-                evolved(accuracy)
-                found, seconds = timed(evolved, accuracy, calls=2)
-                stated = float(np.nanmax(found.error("worn_profile", radii))) / scale
+                body.evolved(accuracy)
+                found, seconds = timed(body.evolved, accuracy, calls=2)
+                stated = float(np.nanmax(found.error("worn_profile", radii))) / body.scale
                 yield Point("wear", case, "exact evolution", f"accuracy {accuracy:g}", seconds, error(found), stated)
-            if like:
-                continue
-            rule = fast_forced if held else fast
-            found, seconds = timed(rule, profile, stick, cycles, 0.8, calls=2)
-            yield Point("wear", case, "fast rule, ξ = 0.8", "", seconds, error(found))
-            for cells in (40,) if short else (50, 100, 200):
-                found, seconds = timed(lambda: literal(profile, stick, cycles, cells=cells, constant_force=held))  # noqa: B023
-                yield Point("wear", case, "cycle by cycle (thesis)", f"{cells} cells", seconds, error(found))
+            for method, setting, solve in () if like else body.otherwise(short):
+                found, seconds = timed(solve, calls=2)
+                yield Point("wear", case, method, setting, seconds, error(found))
 
 
 def films(short: bool) -> Iterator[Point]:
