@@ -144,7 +144,6 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         deepest = max(deepest, history.depth[moment])
         highest = max(highest, history.depth[moment] + history.rate[moment])
     known, found, edges, edges_drag = 0, 0, 0.0, 0.0
-    oldest, last_start = -np.inf, -np.inf
     n, finish = int(track.cells), track.cells + track.origin
     contact, begin, free_from = True, track.origin, 0.0
     guard = deborah * now.time < GUARD_CELLS
@@ -191,9 +190,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, Wakes(places, farthest, known, oldest), until, w, spreads, window)
+                    known = worth_keeping(now, Wakes(places, farthest, known), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    oldest, last_start = last_start, begin
                     if not lost:
                         known = _remember(until, _farthest(now, until, highest, barriers), work, known)
                     contact, free_from, x = False, until, until
@@ -209,7 +207,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(places, farthest, known, oldest)
+                wakes = Wakes(places, farthest, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope

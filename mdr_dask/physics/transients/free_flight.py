@@ -24,7 +24,6 @@ NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube i
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
 MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
-FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
 class Instant(NamedTuple):
@@ -42,15 +41,11 @@ class Instant(NamedTuple):
 
 
 class Wakes(NamedTuple):
-    """Places where contact is left now and the farthest where it was, ``count`` of them.
-
-    `oldest` is the start of the last patch that hides older wakes.
-    """
+    """Places where contact is left now and the farthest where it was, ``count`` of them."""
 
     places: FloatArray
     farthest: FloatArray
     count: int  # type: ignore[assignment]
-    oldest: float
 
 
 @inlined
@@ -149,7 +144,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
         value, value_slope, value_gain = _left_from(now, x, wakes.places[k], wakes.farthest[k])
         if value > u:
             u, slope, gain = value, value_slope, value_gain
-    if now.time < FADED and x - now.deborah * now.time > wakes.oldest:
+    if now.first.depth * now.left > u:  # heights count from the highest point
         value, value_slope = left_before(now, x)
         if value > u:
             u, slope, gain = value, value_slope, 0.0
