@@ -22,7 +22,7 @@ from mdr_dask import execute, store
 from mdr_dask.campaign import loads
 
 SEED_OF_TRUTH = 99
-ROUNDS = 3  # in turns, where nothing is random: later ones find what the first prepared
+ROUNDS = 3  # in turns, where nothing is random: the first prepares what all settings share
 TOLD = "accuracy and until"
 
 

@@ -91,7 +91,10 @@ def exact(
         check_stick_radius(stick_radius)
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
     wanted = sorted({float(amount) for amount in amounts})
-    resolutions = {forced_contacts: forced_resolution, _fretted: partial(fretted_resolution, stick_radius)}
+    resolutions: dict[Solver, Callable[[float], Resolution]] = {
+        forced_contacts: forced_resolution,
+        _fretted: partial(fretted_resolution, stick_radius),
+    }
     resolution = resolutions.get(solve, Resolution)(min(accuracy, COARSEST))
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
