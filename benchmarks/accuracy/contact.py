@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import j0
 
 from benchmarks.accuracy.points import Point, neighbours
-from benchmarks.measures import timed
+from benchmarks.measures import timed, timed_in_turns
 from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.mdr import transforms
 from mdr_dask.physics.mdr.revolution import PowerProfile
@@ -99,9 +99,9 @@ def wear(short: bool) -> Iterator[Point]:
             def error(found, truth=truth, radii=radii, scale=body.scale):
                 return float(np.max(np.abs(found.height(radii) - truth.height(radii)))) / scale
 
-            for accuracy in (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4):
-                body.evolved(accuracy)
-                found, seconds = timed(body.evolved, accuracy, calls=2)
+            asked = (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)
+            solved = timed_in_turns([partial(body.evolved, accuracy) for accuracy in asked], 2 if short else 3)
+            for accuracy, (found, seconds) in zip(asked, solved, strict=True):
                 stated = float(np.nanmax(found.error("worn_profile", radii))) / body.scale
                 yield Point("wear", case, "exact evolution", f"accuracy {accuracy:g}", seconds, error(found), stated)
             for method, setting, solve in () if like else body.otherwise(short):
