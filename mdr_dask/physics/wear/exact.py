@@ -235,15 +235,11 @@ def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resol
 
 
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Solve gross slip at constant force.
-
-    The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps
-    follow the panels' noise.
-    """
+    """Solve gross slip at constant force: the pressure tends to a jump at the edge, with short panels there."""
     panels = resolution.panels_of_a_punch(_sharpness(profile))
     virgin = GrossSlip(profile, panels)
     problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
-    return _slid_contacts(problem, wanted, 5.0 * resolution.step, resolution.first)
+    return _slid_contacts(problem, wanted, resolution.step, resolution.first)
 
 
 def _sharpness(profile: Profile) -> float:
