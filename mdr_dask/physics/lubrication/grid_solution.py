@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,7 +18,8 @@ _SUBDIVISION = 41
 _TOO_EARLY = 0.1
 
 
-class GridSolution(NamedTuple):
+@dataclass(frozen=True)
+class GridSolution:
     """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the steps taken, and
     the spacing of the nodes over that of the density which places them.
 
@@ -43,12 +45,12 @@ class GridSolution(NamedTuple):
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
 
-    @property
+    @cached_property
     def central_film(self) -> float:
         """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
         return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
 
-    @property
+    @cached_property
     def minimum(self) -> tuple[float, float]:
         """Position and height of the lowest film, between the nodes around the lowest one."""
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
@@ -62,7 +64,7 @@ class GridSolution(NamedTuple):
         width = positions[1] - positions[0]
         return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
 
-    @property
+    @cached_property
     def spike(self) -> tuple[float, float]:
         """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
         P = self.pressure
@@ -74,7 +76,7 @@ class GridSolution(NamedTuple):
             return float("nan"), float("nan")
         return float(self.nodes[last]), float(P[last])
 
-    @property
+    @cached_property
     def rupture(self) -> float:
         """Where the film ends, from three values of the pressure, which goes out like a square.
 
@@ -89,7 +91,7 @@ class GridSolution(NamedTuple):
         end = _lagrange(root[None, :], x[None, :], np.zeros(1))[0] + _TOO_EARLY * cell
         return float(np.clip(end, x[2], behind + cell))
 
-    @property
+    @cached_property
     def cut(self) -> float:
         """Distance of the film's end from the nearest node, in cells: a half at most."""
         end = self.rupture
