@@ -8,7 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.lubrication.deformation import film as film_at
+from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
 _SPIKE = 0.01
@@ -44,6 +46,11 @@ class GridSolution:
         """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
+
+    @cached_property
+    def density(self) -> FloatArray:
+        """The density of nodes that the solution asks for, at its own."""
+        return adapted_density(self.nodes, self.pressure, self.film, self.central)
 
     @cached_property
     def central_film(self) -> float:
@@ -88,7 +95,7 @@ class GridSolution:
         if not (root.size == 3 and root[0] > root[1] > root[2] > 0):
             return float(behind)
         cell = behind - self.nodes[last]
-        end = _lagrange(root[None, :], x[None, :], np.zeros(1))[0] + _TOO_EARLY * cell
+        end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
         return float(np.clip(end, x[2], behind + cell))
 
     @cached_property
@@ -100,17 +107,30 @@ class GridSolution:
         return float(min(abs(share), abs(1 - share)))
 
 
+@kernel
 def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
     """Return the cubic through the two nodes before and the two behind each position."""
-    first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
-    around = first[:, None] + np.arange(4)
-    return _lagrange(nodes[around], values[around], positions)
+    result = np.empty(positions.size)
+    for k in range(positions.size):
+        low, high = 2, nodes.size - 2  # of the first node that is not before the position
+        while low < high:
+            middle = (low + high) // 2
+            if nodes[middle] < positions[k]:
+                low = middle + 1
+            else:
+                high = middle
+        total = 0.0
+        for i in range(low - 2, low + 2):
+            share = values[i]
+            for j in range(low - 2, low + 2):
+                if j != i:
+                    share *= (positions[k] - nodes[j]) / (nodes[i] - nodes[j])
+            total += share
+        result[k] = total
+    return result
 
 
-def _lagrange(x: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the polynomial through the values at x, shape (m, k), at each of m positions."""
-    total = np.zeros(positions.size)
-    for k in range(x.shape[1]):
-        others = [m for m in range(x.shape[1]) if m != k]
-        total += values[:, k] * np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
-    return total
+def _at_zero(x: list[float], values: list[float]) -> float:
+    """Return the parabola through three values at x, at zero."""
+    (a, b, c), (at_a, at_b, at_c) = x, values
+    return at_a * b * c / ((a - b) * (a - c)) + at_b * a * c / ((b - a) * (b - c)) + at_c * a * b / ((c - a) * (c - b))
