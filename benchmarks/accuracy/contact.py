@@ -112,7 +112,7 @@ def wear(short: bool) -> Iterator[Point]:
 def films(short: bool) -> Iterator[Point]:
     """Yield the worse film of the lightest to the heaviest of 70 contacts, and of nine like each in load and speed.
 
-    The truth of the first is that of another solver, known to 5e-6; of the others, grids of 641, 906 and 1281 nodes.
+    The truth of the first is that of another solver, known to 5e-6; of the others, the finest five grids.
     """
     with FILMS.open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
@@ -134,7 +134,7 @@ def _films(name: str, case: line_contact.LineContact, truth, short: bool) -> Ite
 
     nodes = line_contact.SETTINGS.nodes
     if truth is None:
-        finest = line_contact.SETTINGS._replace(nodes=nodes[-3:])
+        finest = line_contact.SETTINGS._replace(nodes=nodes[-5:])
         truth = [float(film.value) for film in _both(line_contact.solve_film(case, 0.0, finest))]
 
     def point(method, setting, found, seconds):

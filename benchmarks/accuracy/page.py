@@ -48,7 +48,7 @@ ABOUT = {
     ),
     "line contact (EHL)": (
         "Error of the worse film in nine of ten contacts: one, and nine with loads within 20 % and speeds within 50 % "
-        "of it. Reference: films of another solver on up to 10241 nodes, known to 5e-6; of the nine, the finest three "
+        "of it. Reference: films of another solver on up to 10241 nodes, known to 5e-6; of the nine, the finest five "
         "grids ([films](evidence/ehl.md))."
     ),
     "mixed lubrication": (
