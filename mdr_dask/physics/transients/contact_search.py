@@ -13,6 +13,7 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
+    fastest,
     foreseen,
     left_before,
     losing,
@@ -138,14 +139,17 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     write_spreads(now, window, spreads)
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
+    pace = fastest(history) / deborah
+    sure, seen, seen_at, fades = -np.inf, 0.0, 0.0, 0.0
     sums[:] = 0.0
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            known_at = -np.inf
+            known_at = sure = -np.inf
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
+                sure = (sure - pace) * fade_of_cell
                 highest = deepest + peak[i]
                 if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
                     i += 1
@@ -175,9 +179,12 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     add_patch(track, begin, until, lift, deborah, sums)
                     start[found], end[found] = begin, until
                     found += 1
-                    w = depth + height_at(track, until)[0]
+                    h, slope, _ = height_at(track, until)
+                    w = depth + h
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
+                    sure, seen, seen_at = (w - pace) * fade_of_cell, w, until
+                    fades = -slope / w if w > 0 else 0.0
                     oldest, last_start = last_start, begin
                     if not lost:
                         known = _remember(until, places, known)
@@ -194,21 +201,26 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
+                h = c0 + (probe - cell) * (c1 + (probe - cell) * (c2 + (probe - cell) * c3))
+                if not pulls and depth + h <= sure:
+                    break
                 wakes = Wakes(places, known, oldest)
-                u, u_slope, _ = wake_at(now, wakes, probe)
-                h, slope, _ = height_at(track, probe)
-                gap, rise = depth + h - u, slope - u_slope
-                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
-                least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
-                if gap > 0:
-                    guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
+                free, guess = seen * np.exp(fades * (seen_at - probe)), probe
+                if depth + h > free:
+                    guess = cell + foreseen((c0, c1, c2, c3), depth, (free, fades), low, probe - cell)
+                met, gain = meeting(now, wakes, cell + low, probe, guess)
+                seen, seen_at = met.wake, met.place
+                fades = -met.falls / seen if seen > 0 else 0.0
+                if met.touches:
+                    begin, contact, x = met.place, True, met.place
                     h, slope, _ = height_at(track, begin)
-                    edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
+                    edge = max(lift + h + deborah * slope, 0.0) * gain / met.rise if met.rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
-                    contact, x = True, begin
                     next_free = next_free_place(now, begin) if guard else np.inf
                     continue
+                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+                least_free, known_at = (seen - CLEAR * spread) * fade_of_cell, probe
+                sure = (seen - pace) * fade_of_cell
                 if not pulls:
                     break
                 known = worth_keeping(now, wakes, probe, depth + h, spreads, window)

@@ -48,6 +48,16 @@ class Wakes(NamedTuple):
     oldest: float
 
 
+class Meeting(NamedTuple):
+    """Whether a line meets a wake, where, displacement and slope of the wake last seen, and the rise of their gap."""
+
+    touches: bool
+    place: float
+    wake: float
+    falls: float
+    rise: float
+
+
 @inlined
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
@@ -69,6 +79,17 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
         (enter + y * (2 * c2 + 3 * y * c3)) / step,
         (2 * c2 + 6 * y * c3) / step**2,
     )
+
+
+@inlined
+def fastest(history: History) -> float:
+    """Return a bound of the rate of the depth so far, up or down: the largest control point of its parabolas."""
+    most = abs(history.rate[0])
+    for k in range(1, history.count):
+        taken = history.time[k] - history.time[k - 1]
+        middle = 3 * (history.depth[k] - history.depth[k - 1]) / taken - history.rate[k - 1] - history.rate[k]
+        most = max(most, abs(history.rate[k]), abs(middle))
+    return most
 
 
 @inlined
@@ -155,13 +176,12 @@ def foreseen(
         Coefficients of the height in the cell.
     depth : float
     wake : tuple of float
-        Displacement at `high`, and its slope along the line.
+        Displacement at `high`, and the rate at which it fades along the line.
     low, high : float
         Places in the cell.
     """
     c0, c1, c2, c3 = line
-    u, falls = wake[0], -wake[1]
-    rate, y = falls / u if u > 0 else 0.0, high
+    (u, rate), y = wake, high
     for _ in range(FORESEEN_STEPS):
         free = u * np.exp(rate * (high - y))
         rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
@@ -175,26 +195,45 @@ def foreseen(
 
 
 @inlined
-def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
-    """Return where the line rises through the wake, the slopes of their gap by place and depth."""
+def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[Meeting, float]:
+    """Return whether and where from low to high the line rises through the wake, and what wake is there.
+
+    Parameters
+    ----------
+    now, wakes : Instant, Wakes
+    low, high : float
+        Places between which their distance rises, below it at `low`.
+    x : float
+        Where it is looked at first.
+
+    Returns
+    -------
+    meeting : Meeting
+        At `high` where the line stays below the wake.
+    gain : float
+        Derivative of the gap by the depth.
+    """
     depth = now.history.depth[now.history.count - 1]
-    slope, gain = 1.0, 0.0
+    touches, u, u_slope, rise, gain = False, 0.0, 0.0, 1.0, 0.0
     for _ in range(ROOT_STEPS):
-        if not low < x < high:
-            x = 0.5 * (low + high)
         u, u_slope, gain = wake_at(now, wakes, x)
         h, h_slope, _ = height_at(now.track, x)
-        gap = depth + h - u
-        slope = h_slope - u_slope
+        gap, rise = depth + h - u, h_slope - u_slope
         if gap > 0:
-            high = x
+            high, touches = x, True
+        elif x >= high and not touches:
+            break
         else:
             low = x
-        step = -gap / slope if slope > 0 else 2.0
-        if abs(step) < MET or high - low < 1e-9:
-            return min(max(x + step, low), high), slope, 1 - gain
-        x += step
-    return x, slope, 1 - gain
+        step = -gap / rise if rise > 0 else 2.0
+        end = x + step
+        if (abs(step) < MET and (touches or end < high)) or (touches and high - low < 1e-9):
+            touches, x = True, min(max(end, low), high)
+            break
+        x = end
+        if not low < x < high:
+            x = 0.5 * (low + high) if touches else high
+    return Meeting(touches, x, u, u_slope, rise), 1 - gain
 
 
 @inlined
