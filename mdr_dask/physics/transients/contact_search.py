@@ -139,17 +139,20 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     write_spreads(now, window, spreads)
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
-    pace = fastest(history) / deborah
-    sure, seen, seen_at, fades = -np.inf, 0.0, 0.0, 0.0
+    lately = 0.5 * deborah * now.time
+    pace, span = fastest(history, 0.5 * now.time) / deborah, spreads[spreads.size - 1]
+    fade_since = np.exp(-1 / deborah)
+    sure, left, seen, seen_at, fades = -np.inf, 0.0, 0.0, 0.0, 0.0
     sums[:] = 0.0
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            known_at = sure = -np.inf
+            passed = i - runs[run - 1, 1] if run > 0 else i
+            known_at, sure = -np.inf, sure * np.exp(-passed / min(deborah, now.first.deborah)) if sure > 0 else sure
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                sure = (sure - pace) * fade_of_cell
+                sure *= fade_since if i + 1 - left < 2 * lately else fade_of_cell
                 highest = deepest + peak[i]
                 if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
                     i += 1
@@ -183,7 +186,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     w = depth + h
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    sure, seen, seen_at = (w - pace) * fade_of_cell, w, until
+                    sure, left, seen, seen_at = w * fade_of_cell, until, w, until
                     fades = -slope / w if w > 0 else 0.0
                     oldest, last_start = last_start, begin
                     if not lost:
@@ -202,7 +205,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
                 h = c0 + (probe - cell) * (c1 + (probe - cell) * (c2 + (probe - cell) * c3))
-                if not pulls and depth + h <= sure:
+                slack = min(span, pace * (i - seen_at)) if i - left < lately else span
+                if not pulls and depth + h <= sure - slack:
                     break
                 wakes = Wakes(places, known, oldest)
                 free, guess = seen * np.exp(fades * (seen_at - probe)), probe
@@ -220,7 +224,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     continue
                 spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
                 least_free, known_at = (seen - CLEAR * spread) * fade_of_cell, probe
-                sure = (seen - pace) * fade_of_cell
+                sure, left = seen * fade_of_cell, places[0] if known > 0 else -np.inf
                 if not pulls:
                     break
                 known = worth_keeping(now, wakes, probe, depth + h, spreads, window)

@@ -21,7 +21,7 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
+MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is rounding
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
@@ -82,13 +82,15 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
 
 
 @inlined
-def fastest(history: History) -> float:
-    """Return a bound of the rate of the depth so far, up or down: the largest control point of its parabolas."""
-    most = abs(history.rate[0])
-    for k in range(1, history.count):
+def fastest(history: History, since: float) -> float:
+    """Return a bound of the rate of the depth from some time on, up or down: the control points of its parabolas."""
+    k = history.count - 1
+    most = abs(history.rate[k])
+    while k > 0 and history.time[k] > since:
         taken = history.time[k] - history.time[k - 1]
         middle = 3 * (history.depth[k] - history.depth[k - 1]) / taken - history.rate[k - 1] - history.rate[k]
-        most = max(most, abs(history.rate[k]), abs(middle))
+        most = max(most, abs(history.rate[k - 1]), abs(middle))
+        k -= 1
     return most
 
 
