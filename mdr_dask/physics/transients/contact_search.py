@@ -133,7 +133,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     oldest, last_start = -np.inf, -np.inf
     n, finish = int(track.cells), track.cells + track.origin
     contact, begin, free_from = True, track.origin, 0.0
-    guard = deborah * now.time < GUARD_CELLS
+    # faster sliding and rising: what is pressed fades less along the line than what the jump found free
+    rises = deborah >= now.first.deborah and lift <= depth
+    guard = deborah * now.time < GUARD_CELLS and not rises
     next_free = next_free_place(now, begin) if guard else np.inf
     window = WINDOW_CELLS
     write_spreads(now, window, spreads)
@@ -143,6 +145,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     pace, span = fastest(history, 0.5 * now.time) / deborah, spreads[spreads.size - 1]
     fade_since = np.exp(-1 / deborah)
     sure, left, seen, seen_at, fades = -np.inf, 0.0, 0.0, 0.0, 0.0
+    entered = depth
     sums[:] = 0.0
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
@@ -184,6 +187,10 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     found += 1
                     h, slope, _ = height_at(track, until)
                     w = depth + h
+                    # no older wake is above that at the touching, faded since
+                    older = (entered + min(span, pace * (until - begin))) / (1 + (until - begin) / deborah)
+                    if known > 0 and begin - places[0] < lately and older + 2 * span < w:
+                        known = 0
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
                     sure, left, seen, seen_at = w * fade_of_cell, until, w, until
@@ -218,6 +225,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 if met.touches:
                     begin, contact, x = met.place, True, met.place
                     h, slope, _ = height_at(track, begin)
+                    entered = depth + h
                     edge = max(lift + h + deborah * slope, 0.0) * gain / met.rise if met.rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
                     next_free = next_free_place(now, begin) if guard else np.inf
