@@ -70,14 +70,15 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     low = last_until(history.time, t, low, high)
     high = low + 1
     step = history.time[high] - history.time[low]
-    y = (t - history.time[low]) / step
+    pace = 1 / step
+    y = (t - history.time[low]) * pace
     rise = history.depth[high] - history.depth[low]
     enter, leave = history.rate[low] * step, history.rate[high] * step
     c2, c3 = 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
     return (
         history.depth[low] + y * (enter + y * (c2 + y * c3)),
-        (enter + y * (2 * c2 + 3 * y * c3)) / step,
-        (2 * c2 + 6 * y * c3) / step**2,
+        (enter + y * (2 * c2 + 3 * y * c3)) * pace,
+        (2 * c2 + 6 * y * c3) * pace * pace,
     )
 
 
