@@ -161,6 +161,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
+            if not contact and i < n and lift <= barriers.idle[i]:
+                i += 1
+                continue
             if contact and positive and begin <= i and i + 1 < next_free:
                 whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
                 i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1
