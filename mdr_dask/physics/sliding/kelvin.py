@@ -90,12 +90,12 @@ def write_barriers(
         highest = first if first > last else last
         # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
         q, r = a + 2 * deborah * b, b + 3 * deborah * c
-        x = summit(-q, -r, -c)
+        near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
+        x = summit(-q, -r, -c) if max(near, far) > highest else NONE
         if x < 1:
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
         written[i] = highest
-        near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
         idle[i] = min(min(first, last), min(near, far))
         every = highest if highest > every else every
     barriers.block[block] = every

@@ -156,12 +156,13 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
             if not contact:
                 least_free *= fade_of_cell
                 sure *= fade_since if i + 1 - left < 2 * lately else fade_of_cell
-                highest = deepest + peak[i]
-                if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
+                highest = deepest + peak[np.uintp(i)]
+                low = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
+                if highest <= low or (highest < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
-            if not contact and i < n and lift <= barriers.idle[i]:
+            if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
                 i += 1
                 continue
             if contact and positive and begin <= i and i + 1 < next_free:
