@@ -21,8 +21,8 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is rounding
-FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
+MET = 0.01  # of a cell: a last Newton step with the curvature, for its cube is what is left
+FORESEEN, FORESEEN_STEPS = 1e-3, 5  # of a cell: the last step to a place that is only foreseen
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
@@ -186,7 +186,8 @@ def foreseen(
     c0, c1, c2, c3 = line
     (u, rate), y = wake, high
     for _ in range(FORESEEN_STEPS):
-        free = u * np.exp(rate * (high - y))
+        back = rate * (high - y)
+        free = u * (1 + back * (1 + 0.5 * back))
         rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
         if rise <= 0:
             break
@@ -220,7 +221,7 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
     touches, u, u_slope, rise, gain = False, 0.0, 0.0, 1.0, 0.0
     for _ in range(ROOT_STEPS):
         u, u_slope, gain = wake_at(now, wakes, x)
-        h, h_slope, _ = height_at(now.track, x)
+        h, h_slope, bend = height_at(now.track, x)
         gap, rise = depth + h - u, h_slope - u_slope
         if gap > 0:
             high, touches = x, True
@@ -229,6 +230,9 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
         else:
             low = x
         step = -gap / rise if rise > 0 else 2.0
+        if abs(step) < MET:
+            bend -= u_slope * u_slope / u if u > 0 else 0.0
+            step -= 0.5 * step * step * bend / rise
         end = x + step
         if (abs(step) < MET and (touches or end < high)) or (touches and high - low < 1e-9):
             touches, x = True, min(max(end, low), high)
