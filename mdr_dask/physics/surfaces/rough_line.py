@@ -46,7 +46,7 @@ class RoughLine:
 
     def cubic(self, nodes: int) -> CubicLine:
         """Return the line of cubic cells on a grid."""
-        return self.through(*self.roughness.heights_and_slopes(nodes))
+        return self.through(self.heights(nodes), self.slopes(nodes))
 
     def straight(self, nodes: int) -> CubicLine:
         """Return the line of straight cells on a grid."""

@@ -34,12 +34,6 @@ class Waves:
         """Return dh/dx at the same places, exact."""
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
-    def heights_and_slopes(self, nodes: int) -> tuple[FloatArray, FloatArray]:
-        """Return both, in two thirds of the time that one after the other take."""
-        slopes = self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1))
-        heights, slopes = series(np.stack([self.coefficients, slopes]), nodes)
-        return heights, slopes
-
     def from_place(self, place: float) -> Waves:
         """Return the same line from a place on, 0..1, for grids of more than two nodes for the shortest wave."""
         wave = np.arange(1, self.coefficients.size + 1)
@@ -52,20 +46,20 @@ class Waves:
 
 
 def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT, for each row of coefficients.
+    """Return 2 Re sum_k c_k exp(2 pi i k x) at x = 0, 1/nodes, ... by FFT.
 
     Raises
     ------
     ValueError
         If the grid does not resolve the shortest wave.
     """
-    *rows, modes = coefficients.shape
+    modes = coefficients.size
     if nodes < 2 * modes:
         raise ValueError(f"expected at least {2 * modes} nodes for {modes} harmonics, got {nodes}")
-    spectrum = np.zeros((*rows, nodes // 2 + 1), dtype=np.complex128)
-    spectrum[..., 1 : modes + 1] = coefficients
+    spectrum = np.zeros(nodes // 2 + 1, dtype=np.complex128)
+    spectrum[1 : modes + 1] = coefficients
     if nodes == 2 * modes:
-        spectrum[..., -1] = 2 * spectrum[..., -1].real
+        spectrum[-1] = 2 * spectrum[-1].real
     heights: FloatArray = fft.irfft(spectrum, nodes, norm="forward", overwrite_x=True)
     return heights
 

@@ -116,21 +116,22 @@ def _left_from(now: Instant, x: float, place: float) -> tuple[float, float, floa
     from there suffice, because the displacement is stationary in it.
     """
     best, best_slope, best_gain = -1.0, 0.0, 0.0
-    s, deborah = place, now.deborah
+    s, deborah, pace = place, now.deborah, 1 / now.deborah
     for _ in range(4):
-        then = now.time - (x - s) / deborah
+        since = (x - s) * pace
+        then = now.time - since
         if then <= 0:
             break
         d, rate, change = _depth_at(now.history, then)
         h, slope, curvature = height_at(now.track, s)
-        fade = np.exp(-(x - s) / deborah)
+        fade = np.exp(-since)
         force = d + h + rate + deborah * slope
-        falls = (rate + change) / deborah + slope + deborah * curvature
+        falls = (rate + change) * pace + slope + deborah * curvature
         step = -force / falls if falls < 0 else 0.0
         near = abs(step) < NEAR
-        u = (d + h + (0.5 * force * step / deborah if near else 0.0)) * fade
+        u = (d + h + (0.5 * force * step * pace if near else 0.0)) * fade
         if u > best:
-            best, best_slope = u, -(d + h + rate) * fade / deborah
+            best, best_slope = u, -(d + h + rate) * fade * pace
             best_gain = _follows(now.history, then) * fade
         if near:
             break
