@@ -20,7 +20,6 @@ from mdr_dask.physics.transients.free_flight import (
     meeting,
     next_free_place,
     spread_over,
-    wake_at,
     worth_keeping,
     write_spreads,
 )
@@ -141,6 +140,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     write_spreads(now, window, spreads)
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
+    # a wake falls by fading and by what the depth changed from one of its elements to the next, which bounds it from
+    # the last place on where it was seen
     lately = 0.5 * deborah * now.time
     pace, span = fastest(history, 0.5 * now.time) / deborah, spreads[spreads.size - 1]
     fade_since = np.exp(-1 / deborah)
@@ -157,8 +158,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 least_free *= fade_of_cell
                 sure *= fade_since if i + 1 - left < 2 * lately else fade_of_cell
                 highest = deepest + peak[np.uintp(i)]
-                low = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
-                if highest <= low or (highest < least_free and i + 1 - known_at < window):
+                least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
+                if highest <= least or (highest < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
@@ -193,7 +194,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     w = depth + h
                     # no older wake is above that at the touching, faded since
                     older = (entered + min(span, pace * (until - begin))) / (1 + (until - begin) / deborah)
-                    if known > 0 and begin - places[0] < lately and older + 2 * span < w:
+                    if known > 0 and until - places[0] < lately and older + 2 * span < w:
                         known = 0
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until

@@ -21,7 +21,7 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET = 0.01  # of a cell: a last Newton step with the curvature, for its cube is what is left
+MET, MISSED = 0.01, 1e-7  # of a cell: a last Newton step with the curvature, and what may be left beyond it
 FORESEEN, FORESEEN_STEPS = 1e-3, 5  # of a cell: the last step to a place that is only foreseen
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
@@ -92,7 +92,7 @@ def fastest(history: History, since: float) -> float:
         middle = 3 * (history.depth[k] - history.depth[k - 1]) / taken - history.rate[k - 1] - history.rate[k]
         most = max(most, abs(history.rate[k - 1]), abs(middle))
         k -= 1
-    return most
+    return float(most)
 
 
 @inlined
@@ -231,11 +231,10 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
         else:
             low = x
         step = -gap / rise if rise > 0 else 2.0
-        if abs(step) < MET:
-            bend -= u_slope * u_slope / u if u > 0 else 0.0
-            step -= 0.5 * step * step * bend / rise
-        end = x + step
-        if (abs(step) < MET and (touches or end < high)) or (touches and high - low < 1e-9):
+        bent = 0.5 * step * (bend - (u_slope * u_slope / u if u > 0 else 0.0)) / rise if rise > 0 else 1.0
+        near = abs(step) < MET and abs(step) * bent * bent < MISSED
+        end = x + (step * (1 - bent) if near else step)
+        if (near and (touches or end < high)) or (touches and high - low < 1e-9):
             touches, x = True, min(max(end, low), high)
             break
         x = end
