@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,11 +120,17 @@ def _solve(
     return depth, False
 
 
+class _Swept(NamedTuple):
+    """A line as sweeps at one Deborah number take it."""
+
+    cells: Cells
+    blocks: Blocks
+    barriers: Barriers
+
+
 @kernel
 def _states(
-    cells: Cells,
-    blocks: Blocks,
-    barriers: Barriers,
+    line: _Swept,
     cases: Cases,
     guesses: FloatArray,
     close: float,
@@ -137,7 +144,8 @@ def _states(
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
-    n, (deborahs, loads) = cells.mean.size - 1, cases
+    (cells, blocks, barriers), (deborahs, loads) = line, cases
+    n = cells.mean.size - 1
     unwritten, sums, trail, starts = places_for(0), np.empty(SUMS), np.empty(4), True
     copy_into(trail, first)
     for k in range(loads.size):
@@ -287,7 +295,7 @@ def _swept(
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
-        _states(cells, blocks, near, alike, starts[some], close, first, ordered[some], ordered_status[some])
+        _states(_Swept(cells, blocks, near), alike, starts[some], close, first, ordered[some], ordered_status[some])
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= cells.top

@@ -13,13 +13,13 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
-    fastest,
     foreseen,
     left_before,
     losing,
     meeting,
     next_free_place,
     spread_over,
+    wake_at,
     worth_keeping,
     write_spreads,
 )
@@ -132,31 +132,20 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     oldest, last_start = -np.inf, -np.inf
     n, finish = int(track.cells), track.cells + track.origin
     contact, begin, free_from = True, track.origin, 0.0
-    # faster sliding and rising: what is pressed fades less along the line than what the jump found free
-    rises = deborah >= now.first.deborah and lift <= depth
-    guard = deborah * now.time < GUARD_CELLS and not rises
+    guard = deborah * now.time < GUARD_CELLS
     next_free = next_free_place(now, begin) if guard else np.inf
     window = WINDOW_CELLS
     write_spreads(now, window, spreads)
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
-    # a wake falls by fading and by what the depth changed from one of its elements to the next, which bounds it from
-    # the last place on where it was seen
-    lately = 0.5 * deborah * now.time
-    pace, span = fastest(history, 0.5 * now.time) / deborah, spreads[spreads.size - 1]
-    fade_since = np.exp(-1 / deborah)
-    sure, left, seen, seen_at, fades = -np.inf, 0.0, 0.0, 0.0, 0.0
-    entered = depth
     sums[:] = 0.0
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            passed = i - runs[run - 1, 1] if run > 0 else i
-            known_at, sure = -np.inf, sure * np.exp(-passed / min(deborah, now.first.deborah)) if sure > 0 else sure
+            known_at = -np.inf
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                sure *= fade_since if i + 1 - left < 2 * lately else fade_of_cell
                 highest = deepest + peak[np.uintp(i)]
                 least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
                 if highest <= least or (highest < least_free and i + 1 - known_at < window):
@@ -190,16 +179,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     add_patch(track, begin, until, lift, deborah, sums)
                     start[found], end[found] = begin, until
                     found += 1
-                    h, slope, _ = height_at(track, until)
-                    w = depth + h
-                    # no older wake is above that at the touching, faded since
-                    older = (entered + min(span, pace * (until - begin))) / (1 + (until - begin) / deborah)
-                    if known > 0 and until - places[0] < lately and older + 2 * span < w:
-                        known = 0
+                    w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    sure, left, seen, seen_at = w * fade_of_cell, until, w, until
-                    fades = -slope / w if w > 0 else 0.0
                     oldest, last_start = last_start, begin
                     if not lost:
                         known = _remember(until, places, known)
@@ -216,28 +198,21 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                h = c0 + (probe - cell) * (c1 + (probe - cell) * (c2 + (probe - cell) * c3))
-                slack = min(span, pace * (i - seen_at)) if i - left < lately else span
-                if not pulls and depth + h <= sure - slack:
-                    break
                 wakes = Wakes(places, known, oldest)
-                free, guess = seen * np.exp(fades * (seen_at - probe)), probe
-                if depth + h > free:
-                    guess = cell + foreseen((c0, c1, c2, c3), depth, (free, fades), low, probe - cell)
-                met, gain = meeting(now, wakes, cell + low, probe, guess)
-                seen, seen_at = met.wake, met.place
-                fades = -met.falls / seen if seen > 0 else 0.0
-                if met.touches:
-                    begin, contact, x = met.place, True, met.place
+                u, u_slope, _ = wake_at(now, wakes, probe)
+                h, slope, _ = height_at(track, probe)
+                gap, rise = depth + h - u, slope - u_slope
+                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+                least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
+                if gap > 0:
+                    guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
+                    begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
                     h, slope, _ = height_at(track, begin)
-                    entered = depth + h
-                    edge = max(lift + h + deborah * slope, 0.0) * gain / met.rise if met.rise > 0 else 0.0
+                    edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
+                    contact, x = True, begin
                     next_free = next_free_place(now, begin) if guard else np.inf
                     continue
-                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
-                least_free, known_at = (seen - CLEAR * spread) * fade_of_cell, probe
-                sure, left = seen * fade_of_cell, places[0] if known > 0 else -np.inf
                 if not pulls:
                     break
                 known = worth_keeping(now, wakes, probe, depth + h, spreads, window)

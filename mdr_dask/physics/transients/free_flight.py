@@ -21,8 +21,8 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET, MISSED = 0.01, 1e-7  # of a cell: a last Newton step with the curvature, and what may be left beyond it
-FORESEEN, FORESEEN_STEPS = 1e-3, 5  # of a cell: the last step to a place that is only foreseen
+MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
+FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
@@ -48,16 +48,6 @@ class Wakes(NamedTuple):
     oldest: float
 
 
-class Meeting(NamedTuple):
-    """Whether a line meets a wake, where, displacement and slope of the wake last seen, and the rise of their gap."""
-
-    touches: bool
-    place: float
-    wake: float
-    falls: float
-    rise: float
-
-
 @inlined
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
@@ -80,19 +70,6 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
         (enter + y * (2 * c2 + 3 * y * c3)) * pace,
         (2 * c2 + 6 * y * c3) * pace * pace,
     )
-
-
-@inlined
-def fastest(history: History, since: float) -> float:
-    """Return a bound of the rate of the depth from some time on, up or down: the control points of its parabolas."""
-    k = history.count - 1
-    most = abs(history.rate[k])
-    while k > 0 and history.time[k] > since:
-        taken = history.time[k] - history.time[k - 1]
-        middle = 3 * (history.depth[k] - history.depth[k - 1]) / taken - history.rate[k - 1] - history.rate[k]
-        most = max(most, abs(history.rate[k - 1]), abs(middle))
-        k -= 1
-    return float(most)
 
 
 @inlined
@@ -180,15 +157,15 @@ def foreseen(
         Coefficients of the height in the cell.
     depth : float
     wake : tuple of float
-        Displacement at `high`, and the rate at which it fades along the line.
+        Displacement at `high`, and its slope along the line.
     low, high : float
         Places in the cell.
     """
     c0, c1, c2, c3 = line
-    (u, rate), y = wake, high
+    u, falls = wake[0], -wake[1]
+    rate, y = falls / u if u > 0 else 0.0, high
     for _ in range(FORESEEN_STEPS):
-        back = rate * (high - y)
-        free = u * (1 + back * (1 + 0.5 * back))
+        free = u * np.exp(rate * (high - y))
         rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
         if rise <= 0:
             break
@@ -200,47 +177,26 @@ def foreseen(
 
 
 @inlined
-def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[Meeting, float]:
-    """Return whether and where from low to high the line rises through the wake, and what wake is there.
-
-    Parameters
-    ----------
-    now, wakes : Instant, Wakes
-    low, high : float
-        Places between which their distance rises, below it at `low`.
-    x : float
-        Where it is looked at first.
-
-    Returns
-    -------
-    meeting : Meeting
-        At `high` where the line stays below the wake.
-    gain : float
-        Derivative of the gap by the depth.
-    """
+def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
+    """Return where the line rises through the wake, the slopes of their gap by place and depth."""
     depth = now.history.depth[now.history.count - 1]
-    touches, u, u_slope, rise, gain = False, 0.0, 0.0, 1.0, 0.0
+    slope, gain = 1.0, 0.0
     for _ in range(ROOT_STEPS):
+        if not low < x < high:
+            x = 0.5 * (low + high)
         u, u_slope, gain = wake_at(now, wakes, x)
-        h, h_slope, bend = height_at(now.track, x)
-        gap, rise = depth + h - u, h_slope - u_slope
+        h, h_slope, _ = height_at(now.track, x)
+        gap = depth + h - u
+        slope = h_slope - u_slope
         if gap > 0:
-            high, touches = x, True
-        elif x >= high and not touches:
-            break
+            high = x
         else:
             low = x
-        step = -gap / rise if rise > 0 else 2.0
-        bent = 0.5 * step * (bend - (u_slope * u_slope / u if u > 0 else 0.0)) / rise if rise > 0 else 1.0
-        near = abs(step) < MET and abs(step) * bent * bent < MISSED
-        end = x + (step * (1 - bent) if near else step)
-        if (near and (touches or end < high)) or (touches and high - low < 1e-9):
-            touches, x = True, min(max(end, low), high)
-            break
-        x = end
-        if not low < x < high:
-            x = 0.5 * (low + high) if touches else high
-    return Meeting(touches, x, u, u_slope, rise), 1 - gain
+        step = -gap / slope if slope > 0 else 2.0
+        if abs(step) < MET or high - low < 1e-9:
+            return min(max(x + step, low), high), slope, 1 - gain
+        x += step
+    return x, slope, 1 - gain
 
 
 @inlined
