@@ -28,7 +28,7 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KNOWN, FEWEST = 2**22, 4  # numbers among the barriers that are kept, at least those of some Deborah numbers
+KNOWN, FEWEST = 2**21, 4  # cells whose barriers are kept, 16 bytes each, at least those of some Deborah numbers
 NEWTON_STEPS = 60
 EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, and what it may miss
 
