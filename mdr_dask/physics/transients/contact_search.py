@@ -160,11 +160,15 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                top = deepest + peak[i]
-                if top <= min(floor[i], floor[i + 1]) or (top < least_free and i + 1 - known_at < window):
+                top = deepest + peak[np.uintp(i)]
+                least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
+                if top <= least or (top < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
+            if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
+                i += 1
+                continue
             if contact and positive and begin <= i and i + 1 < next_free:
                 whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
                 i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1

@@ -22,7 +22,7 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
-MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
+MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 
 
@@ -60,14 +60,15 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     low = last_until(history.time, t, low, high)
     high = low + 1
     step = history.time[high] - history.time[low]
-    y = (t - history.time[low]) / step
+    pace = 1 / step
+    y = (t - history.time[low]) * pace
     rise = history.depth[high] - history.depth[low]
     enter, leave = history.rate[low] * step, history.rate[high] * step
     c2, c3 = 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
     return (
         history.depth[low] + y * (enter + y * (c2 + y * c3)),
-        (enter + y * (2 * c2 + 3 * y * c3)) / step,
-        (2 * c2 + 6 * y * c3) / step**2,
+        (enter + y * (2 * c2 + 3 * y * c3)) * pace,
+        (2 * c2 + 6 * y * c3) * pace * pace,
     )
 
 
@@ -92,22 +93,22 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
     The displacement is stationary in that place, and few steps of Newton suffice. It is -1 where no element at x left
     there.
     """
-    deborah = now.deborah
+    deborah, pace = now.deborah, 1 / now.deborah
     first = x - deborah * now.time
     low, high, s = first, min(x, farthest), max(place, first)
     for _ in range(ROOT_STEPS):
         if s > high:
             break
-        then = max(now.time - (x - s) / deborah, 0.0)
-        d, rate, change = _depth_at(now.history, then)
+        since = (x - s) * pace
+        d, rate, change = _depth_at(now.history, max(now.time - since, 0.0))
         h, slope, curvature = height_at(now.track, s)
         force = d + h + rate + deborah * slope
-        falls = (rate + change) / deborah + slope + deborah * curvature
+        falls = (rate + change) * pace + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
         if abs(step) < NEAR:
-            fade = np.exp(-(x - s) / deborah)
-            u = (d + h + 0.5 * force * step / deborah) * fade
-            return u, -(d + h + rate) * fade / deborah, _follows(now.history, then) * fade
+            fade = np.exp(-since)
+            u = (d + h + 0.5 * force * step * pace) * fade
+            return u, -(d + h + rate) * fade * pace, _follows(now.history, now.time - since) * fade
         if force > 0:
             low = s
         elif s > first:
