@@ -32,7 +32,7 @@ def judged(seed: int, number: int) -> tuple[float, dict[str, float]]:
     amplitude = roughness.amplitudes(points // 2, hurst)
     line = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(seed, number, points // 2), points))
     load, ratio = 10 ** random.uniform(-3, 0.7), float(random.choice(RATIOS))
-    deborah = 10 ** random.uniform(-2.5, 0.3) / roughness.spectral_slope(amplitude)
+    deborah = 10 ** random.uniform(-2.5, 1.5) / roughness.spectral_slope(amplitude)
     prepared = PreparedLine.of(line.cubic(points * grid))
     loads, numbers = np.array([load]), np.array([[deborah, deborah * ratio]])
     ends = ends_on(prepared, loads, numbers)

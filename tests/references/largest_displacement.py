@@ -74,8 +74,10 @@ def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> fl
         history = History(found.time, found.depth, found.rate, now + 1, 0.0)
         instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
         travel, patches = marching.deborah * time, touch(instant, marching.reachable, work)
-        shortest = np.min((work.end - work.start)[1 : patches - 1], initial=travel)  # the first and last make one
-        if travel > 1.2 * marching.track.cells or patches < 0 or shortest < SHORT / SAMPLES:
+        if patches < 0 or travel > 1.2 * marching.track.cells:
+            continue
+        whole = slice(1, patches - 1)  # the first and the last are one
+        if np.min(work.end[whole] - work.start[whole], initial=travel) < SHORT / SAMPLES:
             continue
         load, doubt = load_by_largest(marching, found, int(now), line)
         worst = np.fmax(worst, (abs(load - work.sums[LOAD]) - doubt) / work.sums[LOAD])

@@ -76,7 +76,8 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    return Workspace(start, end, np.zeros(SUMS), *np.empty((2, CANDIDATES)), np.empty(WINDOWS), barriers)
+    places, farthest = np.empty((2, CANDIDATES))
+    return Workspace(start, end, np.zeros(SUMS), places, farthest, np.empty(WINDOWS), barriers)
 
 
 @inlined
