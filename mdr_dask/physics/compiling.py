@@ -1,4 +1,4 @@
-"""The four decorators of compiled kernels."""
+"""The five decorators of compiled kernels."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ import gc
 import hashlib
 import re
 from collections.abc import Callable
-from functools import cache
+from functools import cache, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import types
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager
 from numba.core.event import Event, Listener, register
 from numba.core.types import unliteral
+from numba.extending import typeof_impl
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.version import __version__
@@ -21,6 +25,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 PACKAGE = Path(__file__).parents[1]
 IMPORTS = re.compile(r"^\s*(?:from|import) mdr_dask\.([\w.]+)(?: import ([\w, ]+))?", re.MULTILINE)
+# Passes that are for closures, for expressions of whole arrays, and for variables of several types
+UNNEEDED = {"InlineClosureLikes", "NopythonRewrites", "ReconstructSSA", "PreLowerStripPhis"}
 
 
 class _CollectLater(Listener):
@@ -46,29 +52,79 @@ class _CollectLater(Listener):
 register("numba:compile", _CollectLater())  # type: ignore[no-untyped-call]
 
 
+class Lean(CompilerBase):
+    """The passes of numba that a function of numbers and given arrays needs; the others take a seventh of the time."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """Return numba's own pipeline without those passes."""
+        lean = PassManager("lean")
+        for each, description in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
+            if each.__name__ not in UNNEEDED:
+                lean.add_pass(each, description)
+        lean.finalize()
+        return [lean]
+
+
+#: Options of what allocates nothing
+BARE: dict[str, object] = {"_nrt": False, "pipeline_class": Lean}
+
+
+class Part:
+    """A function that kernels are made from: Python calls it as it is written."""
+
+    def __init__(self, function: Callable[..., Any], dispatcher: Any) -> None:
+        self.py_func, self.dispatcher = function, dispatcher
+        update_wrapper(self, function)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call what was compiled into kernels, uncompiled."""
+        return self.py_func(*arguments)
+
+
+@typeof_impl.register(Part)
+def _type_of_part(part: Part, _: object) -> types.Dispatcher:
+    return types.Dispatcher(part.dispatcher)
+
+
 def kernel(function: Kernel) -> Kernel:
     """Compile a function that never raises and may allocate arrays."""
-    return _compiled(function)
+    return _kept(_compiled(function, cache=True))
 
 
 def compiled(function: Kernel) -> Kernel:
     """Compile a function that allocates nothing and never raises: counting references would take half of its time."""
-    return _compiled(function, _nrt=False)
+    return _kept(_compiled(function, cache=True, **BARE))
+
+
+def spliced(function: Kernel) -> Kernel:
+    """Compile a function into its only caller before types are known: each level of callers optimises those below."""
+    return _kept(_compiled(function, cache=True, inline="always", **BARE))
+
+
+def part(function: Kernel) -> Kernel:
+    """Compile a function that only kernels call, allocates nothing and never raises."""
+    return _part(function)
 
 
 def inlined(function: Kernel) -> Kernel:
-    """Compile a function into its callers: handing over a line, word by word, would take most of its time."""
-    return _compiled(function, _nrt=False, forceinline=True)
+    """Compile a part into its callers: handing over a line, word by word, would take most of its time."""
+    return _part(function, forceinline=True)
 
 
 def fused(function: Kernel) -> Kernel:
-    """Compile a function into its callers, products and sums in one rounding."""
-    return _compiled(function, _nrt=False, forceinline=True, fastmath={"contract", "nsz"})
+    """Compile a part into its callers, products and sums in one rounding."""
+    return _part(function, forceinline=True, fastmath={"contract", "nsz"})
 
 
-def _compiled(function: Kernel, **options: object) -> Kernel:
+def _part(function: Kernel, **options: object) -> Kernel:
+    """Compile a function without what Python would call, and without a file: both take as long as a small part."""
+    dispatcher = _compiled(function, no_cpython_wrapper=True, **BARE, **options)
+    return cast(Kernel, Part(function, dispatcher) if hasattr(dispatcher, "py_func") else function)
+
+
+def _compiled(function: Callable[..., Any], **options: object) -> Any:
     """Compile a function once for every type of its arguments, of which a number written in a call is none."""
-    compile_it = numba.njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True, **options)  # type: ignore[call-overload]
+    compile_it = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)  # type: ignore[call-overload]
     kernel: Any = compile_it(function)
     if hasattr(kernel, "get_call_template"):
         template: Any = kernel.get_call_template
@@ -76,11 +132,16 @@ def _compiled(function: Kernel, **options: object) -> Kernel:
         kernel.get_call_template = lambda types, named: template(
             [plain(each) for each in types], {name: plain(each) for name, each in named.items()}
         )
+    return kernel
+
+
+def _kept(kernel: Any) -> Any:
+    """Return a kernel whose file is another one when what it is made from has changed."""
     kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
     if kept is not None:  # numba looks at the kernel's own file only, and reads types that are no more
-        source = _sources(Path(function.__code__.co_filename))
+        source = _sources(Path(kernel.py_func.__code__.co_filename))
         kept._version = f"{numba.__version__}, mdr_dask {__version__}, {source}"
-    return cast(Kernel, kernel)
+    return kernel
 
 
 @cache
@@ -102,3 +163,15 @@ def copy_into(target: FloatArray, source: FloatArray) -> None:
     """Copy an array to the front of another: assigning to a slice would compile the words of its error, for seconds."""
     for i in range(source.size):
         target[i] = source[i]
+
+
+@inlined
+def greater(one: float, other: float) -> float:
+    """Return the greater of two numbers: numba compiles a `max` of its own for every kind of caller."""
+    return other if other > one else one
+
+
+@inlined
+def lesser(one: float, other: float) -> float:
+    """Return the lesser of two numbers."""
+    return other if other < one else one
