@@ -69,7 +69,7 @@ class Lean(CompilerBase):
 BARE: dict[str, object] = {"_nrt": False, "pipeline_class": Lean}
 
 
-class Part:
+class Nested:
     """A function that kernels are made from: Python calls it as it is written."""
 
     def __init__(self, function: Callable[..., Any], dispatcher: Any) -> None:
@@ -81,9 +81,9 @@ class Part:
         return self.py_func(*arguments)
 
 
-@typeof_impl.register(Part)
-def _type_of_part(part: Part, _: object) -> types.Dispatcher:
-    return types.Dispatcher(part.dispatcher)
+@typeof_impl.register(Nested)
+def _type_of_nested(function: Nested, _: object) -> types.Dispatcher:
+    return types.Dispatcher(function.dispatcher)
 
 
 def kernel(function: Kernel) -> Kernel:
@@ -101,25 +101,25 @@ def spliced(function: Kernel) -> Kernel:
     return _kept(_compiled(function, cache=True, inline="always", **BARE))
 
 
-def part(function: Kernel) -> Kernel:
+def nested(function: Kernel) -> Kernel:
     """Compile a function that only kernels call, allocates nothing and never raises."""
-    return _part(function)
+    return _nested(function)
 
 
 def inlined(function: Kernel) -> Kernel:
-    """Compile a part into its callers: handing over a line, word by word, would take most of its time."""
-    return _part(function, forceinline=True)
+    """Compile a nested function into its callers: handing over a line, word by word, would take most of its time."""
+    return _nested(function, forceinline=True)
 
 
 def fused(function: Kernel) -> Kernel:
-    """Compile a part into its callers, products and sums in one rounding."""
-    return _part(function, forceinline=True, fastmath={"contract", "nsz"})
+    """Compile a nested function into its callers, products and sums in one rounding."""
+    return _nested(function, forceinline=True, fastmath={"contract", "nsz"})
 
 
-def _part(function: Kernel, **options: object) -> Kernel:
+def _nested(function: Kernel, **options: object) -> Kernel:
     """Compile a function without what Python would call, and without a file: both take as long as a small part."""
     dispatcher = _compiled(function, no_cpython_wrapper=True, **BARE, **options)
-    return cast(Kernel, Part(function, dispatcher) if hasattr(dispatcher, "py_func") else function)
+    return cast(Kernel, Nested(function, dispatcher) if hasattr(dispatcher, "py_func") else function)
 
 
 def _compiled(function: Callable[..., Any], **options: object) -> Any:

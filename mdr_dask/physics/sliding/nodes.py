@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, greater, lesser, part, spliced
+from mdr_dask.physics.compiling import compiled, copy_into, greater, lesser, nested, spliced
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
@@ -53,7 +53,7 @@ class Nodes(NamedTuple):
     rise: float
 
 
-@part
+@nested
 def _take(given: FloatArray, first: int, stride: int, turn: FloatArray) -> None:
     """Write every stride-th number of a turn from the first one on, and those of the turns before and after."""
     n = turn.size - BEFORE - AFTER
@@ -153,7 +153,7 @@ def _take_line(
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
 
 
-@part
+@nested
 def _integrals(
     h: FloatArray,
     s: FloatArray,
@@ -184,7 +184,7 @@ def _integrals(
         square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
 
 
-@part
+@nested
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
     """Write the highest point of cells, from the second node on."""
     for k in range(cells):

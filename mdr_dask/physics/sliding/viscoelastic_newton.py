@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
 from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
@@ -85,7 +85,7 @@ def follow(
                 stretch[m] += depth - strain
 
 
-@compiled
+@nested
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
     if stretch.size == 0:
@@ -193,7 +193,7 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
         column /= norm
 
 
-@compiled
+@nested
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
     """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]

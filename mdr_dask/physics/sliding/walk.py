@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import fused, greater, lesser, part, spliced
+from mdr_dask.physics.compiling import fused, greater, lesser, nested, spliced
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -151,7 +151,7 @@ def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple
     return gap < 0, stop, crest, held, gap
 
 
-@part
+@nested
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Take a case over the cells of a tile."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
@@ -215,7 +215,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     workspace[STRETCH + k] += stretch
 
 
-@part
+@nested
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
@@ -295,7 +295,7 @@ def sweep(
         cells = BLOCK if BLOCK < rest else rest
 
 
-@part
+@nested
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write what does not change of a case on a grid."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah

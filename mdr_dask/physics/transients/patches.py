@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
@@ -162,7 +162,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
     sums[TILT] += rise
 
 
-@compiled
+@nested
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
 
