@@ -175,3 +175,15 @@ def greater(one: float, other: float) -> float:
 def lesser(one: float, other: float) -> float:
     """Return the lesser of two numbers."""
     return other if other < one else one
+
+
+@inlined
+def last_until(values: FloatArray, x: float, low: int, high: int) -> int:
+    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        if values[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined, nested
+from mdr_dask.physics.compiling import compiled, inlined, last_until, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
@@ -92,18 +92,6 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
         c1 + y * (2 * c2 + y * 3 * c3),
         2 * c2 + 6 * y * c3,
     )
-
-
-@inlined
-def last_until(values: FloatArray, x: float, low: int, high: int) -> int:
-    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
-    while high - low > 1:
-        middle = (low + high) // 2
-        if values[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
 
 
 @inlined
