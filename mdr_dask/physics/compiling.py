@@ -25,8 +25,9 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 PACKAGE = Path(__file__).parents[1]
 IMPORTS = re.compile(r"^\s*(?:from|import) mdr_dask\.([\w.]+)(?: import ([\w, ]+))?", re.MULTILINE)
-# Passes that are for closures, for expressions of whole arrays, and for variables of several types
-UNNEEDED = {"InlineClosureLikes", "NopythonRewrites", "ReconstructSSA", "PreLowerStripPhis"}
+# Passes of numba that are for variables of several types; and for closures and expressions of whole arrays
+ONE_TYPE = {"ReconstructSSA", "PreLowerStripPhis"}
+ONE_NUMBER = {"InlineClosureLikes", "NopythonRewrites"}
 
 
 class _CollectLater(Listener):
@@ -52,21 +53,29 @@ class _CollectLater(Listener):
 register("numba:compile", _CollectLater())  # type: ignore[no-untyped-call]
 
 
-class Lean(CompilerBase):
-    """The passes of numba that a function of numbers and given arrays needs; the others take a seventh of the time."""
+class Allocating(CompilerBase):
+    """The passes of numba that kernels need whose variables keep their types."""
+
+    unneeded = ONE_TYPE
 
     def define_pipelines(self) -> list[PassManager]:
-        """Return numba's own pipeline without those passes."""
+        """Return numba's own pipeline without the others."""
         lean = PassManager("lean")
         for each, description in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            if each.__name__ not in UNNEEDED:
+            if each.__name__ not in self.unneeded:
                 lean.add_pass(each, description)
         lean.finalize()
         return [lean]
 
 
+class Bare(Allocating):
+    """The passes for what allocates nothing: there are no expressions of whole arrays."""
+
+    unneeded = ONE_TYPE | ONE_NUMBER
+
+
 #: Options of what allocates nothing
-BARE: dict[str, object] = {"_nrt": False, "pipeline_class": Lean}
+BARE: dict[str, object] = {"_nrt": False, "pipeline_class": Bare}
 
 
 class Nested:
@@ -88,7 +97,7 @@ def _type_of_nested(function: Nested, _: object) -> types.Dispatcher:
 
 def kernel(function: Kernel) -> Kernel:
     """Compile a function that never raises and may allocate arrays."""
-    return _kept(_compiled(function, cache=True))
+    return _kept(_compiled(function, cache=True, pipeline_class=Allocating))
 
 
 def compiled(function: Kernel) -> Kernel:
