@@ -60,11 +60,12 @@ class Allocating(CompilerBase):
 
     def define_pipelines(self) -> list[PassManager]:
         """Return numba's own pipeline without the others."""
-        lean = PassManager("lean")
-        for each, description in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
+        lean = PassManager("lean")  # type: ignore[no-untyped-call]
+        whole: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
+        for each, description in whole.passes:
             if each.__name__ not in self.unneeded:
-                lean.add_pass(each, description)
-        lean.finalize()
+                lean.add_pass(each, description)  # type: ignore[no-untyped-call]
+        lean.finalize()  # type: ignore[no-untyped-call]
         return [lean]
 
 

@@ -146,7 +146,11 @@ def _take_line(
             above[k] = greater(h[i], h[i + 1]) + ABOVE * (greater(s[i], 0.0) + greater(-s[i + 1], 0.0))
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
         for k in range(BLOCK):
-            peak, lowest, steepest = greater(peak, above[k]), lesser(lowest, h[begin + k]), lesser(steepest, s[begin + k])
+            peak, lowest, steepest = (
+                greater(peak, above[k]),
+                lesser(lowest, h[begin + k]),
+                lesser(steepest, s[begin + k]),
+            )
             heights += mean[k]
             squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest

@@ -188,7 +188,7 @@ def _solve(
     settings = SETTINGS
     for begin in range(0, loads.size, LANES):
         rest = loads.size - begin
-        count = LANES if LANES < rest else rest
+        count = LANES if rest > LANES else rest
         for k in range(count):
             lanes[k] = begin + k
             last_step[k] = np.nan

@@ -292,7 +292,7 @@ def sweep(
                 workspace[k] = 0.0
         first += cells
         rest = BEFORE + n - first
-        cells = BLOCK if BLOCK < rest else rest
+        cells = BLOCK if rest > BLOCK else rest
 
 
 @nested
