@@ -1,4 +1,4 @@
-"""The five decorators of compiled kernels."""
+"""The six decorators of compiled kernels, and functions that stand in for some of numba's, which compile for long."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 PACKAGE = Path(__file__).parents[1]
 IMPORTS = re.compile(r"^\s*(?:from|import) mdr_dask\.([\w.]+)(?: import ([\w, ]+))?", re.MULTILINE)
-# Passes of numba that are for variables of several types; and for closures and expressions of whole arrays
-ONE_TYPE = {"ReconstructSSA", "PreLowerStripPhis"}
-ONE_NUMBER = {"InlineClosureLikes", "NopythonRewrites"}
+# Passes of numba for variables of several types, and for closures and expressions of whole arrays
+SEVERAL_TYPES = {"ReconstructSSA", "PreLowerStripPhis"}
+WHOLE_ARRAYS = {"InlineClosureLikes", "NopythonRewrites"}
 
 
 class _CollectLater(Listener):
@@ -53,104 +53,100 @@ class _CollectLater(Listener):
 register("numba:compile", _CollectLater())  # type: ignore[no-untyped-call]
 
 
-class Allocating(CompilerBase):
-    """The passes of numba that kernels need whose variables keep their types."""
+class Passes(CompilerBase):
+    """Numba's passes without those for variables of several types, which no kernel has."""
 
-    unneeded = ONE_TYPE
+    unneeded = SEVERAL_TYPES
 
     def define_pipelines(self) -> list[PassManager]:
-        """Return numba's own pipeline without the others."""
-        lean = PassManager("lean")  # type: ignore[no-untyped-call]
+        """Return the passes."""
         whole: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
+        passes: Any = PassManager("kernel")  # type: ignore[no-untyped-call]
         for each, description in whole.passes:
             if each.__name__ not in self.unneeded:
-                lean.add_pass(each, description)  # type: ignore[no-untyped-call]
-        lean.finalize()  # type: ignore[no-untyped-call]
-        return [lean]
+                passes.add_pass(each, description)
+        passes.finalize()
+        return [passes]
 
 
-class Bare(Allocating):
-    """The passes for what allocates nothing: there are no expressions of whole arrays."""
+class BarePasses(Passes):
+    """The passes for what allocates nothing, so that it holds no expressions of whole arrays: a seventh less time."""
 
-    unneeded = ONE_TYPE | ONE_NUMBER
+    unneeded = SEVERAL_TYPES | WHOLE_ARRAYS
 
 
-#: Options of what allocates nothing
-BARE: dict[str, object] = {"_nrt": False, "pipeline_class": Bare}
+BARE: dict[str, Any] = {"_nrt": False, "pipeline_class": BarePasses}
 
 
 class Nested:
-    """A function that kernels are made from: Python calls it as it is written."""
+    """A function in kernels: what Python would call, and a file, take as long as a small one. Python has another."""
 
-    def __init__(self, function: Callable[..., Any], dispatcher: Any) -> None:
-        self.py_func, self.dispatcher = function, dispatcher
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        self.py_func = function
+        self.in_kernels = _compiled(function, no_cpython_wrapper=True, **BARE, **options)
+        self.in_python = _compiled(function, **BARE, **options)  # compiled when a test or a reader calls it
         update_wrapper(self, function)
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call what was compiled into kernels, uncompiled."""
-        return self.py_func(*arguments)
+        """Call the function from Python."""
+        return self.in_python(*arguments)
 
 
 @typeof_impl.register(Nested)
 def _type_of_nested(function: Nested, _: object) -> types.Dispatcher:
-    return types.Dispatcher(function.dispatcher)
+    return types.Dispatcher(function.in_kernels)
 
 
 def kernel(function: Kernel) -> Kernel:
     """Compile a function that never raises and may allocate arrays."""
-    return _kept(_compiled(function, cache=True, pipeline_class=Allocating))
+    return _kept(function, pipeline_class=Passes)
 
 
 def compiled(function: Kernel) -> Kernel:
     """Compile a function that allocates nothing and never raises: counting references would take half of its time."""
-    return _kept(_compiled(function, cache=True, **BARE))
+    return _kept(function, **BARE)
 
 
 def spliced(function: Kernel) -> Kernel:
-    """Compile a function into its only caller before types are known: each level of callers optimises those below."""
-    return _kept(_compiled(function, cache=True, inline="always", **BARE))
+    """Compile a function into its only caller before types are known: each level of callers optimises all below it."""
+    return _kept(function, inline="always", **BARE)
 
 
 def nested(function: Kernel) -> Kernel:
-    """Compile a function that only kernels call, allocates nothing and never raises."""
-    return _nested(function)
+    """Compile a function that only kernels call, a small one or of one kernel: it has no file."""
+    return cast(Kernel, Nested(function))
 
 
 def inlined(function: Kernel) -> Kernel:
     """Compile a nested function into its callers: handing over a line, word by word, would take most of its time."""
-    return _nested(function, forceinline=True)
+    return cast(Kernel, Nested(function, forceinline=True))
 
 
 def fused(function: Kernel) -> Kernel:
     """Compile a nested function into its callers, products and sums in one rounding."""
-    return _nested(function, forceinline=True, fastmath={"contract", "nsz"})
+    return cast(Kernel, Nested(function, forceinline=True, fastmath={"contract", "nsz"}))
 
 
-def _nested(function: Kernel, **options: object) -> Kernel:
-    """Compile a function without what Python would call, and without a file: both take as long as a small part."""
-    dispatcher = _compiled(function, no_cpython_wrapper=True, **BARE, **options)
-    return cast(Kernel, Nested(function, dispatcher) if hasattr(dispatcher, "py_func") else function)
+def _kept(function: Kernel, **options: Any) -> Kernel:
+    """Compile a function into a file that is not read any more when what it is made from has changed."""
+    kernel = _compiled(function, cache=True, **options)
+    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+    if kept is not None:  # numba looks at the kernel's own file only, and reads types that are no more
+        source = _sources(Path(function.__code__.co_filename))
+        kept._version = f"{numba.__version__}, mdr_dask {__version__}, {source}"
+    return cast(Kernel, kernel)
 
 
-def _compiled(function: Callable[..., Any], **options: object) -> Any:
+def _compiled(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function once for every type of its arguments, of which a number written in a call is none."""
-    compile_it = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)  # type: ignore[call-overload]
-    kernel: Any = compile_it(function)
+    njit: Any = numba.njit
+    kernel = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
     if hasattr(kernel, "get_call_template"):
         template: Any = kernel.get_call_template
         plain: Callable[[Any], Any] = unliteral
         kernel.get_call_template = lambda types, named: template(
             [plain(each) for each in types], {name: plain(each) for name, each in named.items()}
         )
-    return kernel
-
-
-def _kept(kernel: Any) -> Any:
-    """Return a kernel whose file is another one when what it is made from has changed."""
-    kept = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-    if kept is not None:  # numba looks at the kernel's own file only, and reads types that are no more
-        source = _sources(Path(kernel.py_func.__code__.co_filename))
-        kept._version = f"{numba.__version__}, mdr_dask {__version__}, {source}"
     return kernel
 
 
