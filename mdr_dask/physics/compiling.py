@@ -25,9 +25,8 @@ Kernel = TypeVar("Kernel", bound=Callable[..., object])
 
 PACKAGE = Path(__file__).parents[1]
 IMPORTS = re.compile(r"^\s*(?:from|import) mdr_dask\.([\w.]+)(?: import ([\w, ]+))?", re.MULTILINE)
-# Passes of numba for variables of several types, and for closures and expressions of whole arrays
-SEVERAL_TYPES = {"ReconstructSSA", "PreLowerStripPhis"}
-WHOLE_ARRAYS = {"InlineClosureLikes", "NopythonRewrites"}
+# Passes of numba for closures, expressions of whole arrays, and variables of several types
+UNNEEDED = {"InlineClosureLikes", "NopythonRewrites", "ReconstructSSA", "PreLowerStripPhis"}
 
 
 class _CollectLater(Listener):
@@ -53,26 +52,18 @@ class _CollectLater(Listener):
 register("numba:compile", _CollectLater())  # type: ignore[no-untyped-call]
 
 
-class Passes(CompilerBase):
-    """Numba's passes without those for variables of several types, which no kernel has."""
-
-    unneeded = SEVERAL_TYPES
+class BarePasses(CompilerBase):
+    """The passes of numba that a function of numbers and given arrays needs; the others take a seventh of the time."""
 
     def define_pipelines(self) -> list[PassManager]:
         """Return the passes."""
         whole: Any = DefaultPassBuilder.define_nopython_pipeline(self.state)  # type: ignore[no-untyped-call]
-        passes: Any = PassManager("kernel")  # type: ignore[no-untyped-call]
+        passes: Any = PassManager("bare")  # type: ignore[no-untyped-call]
         for each, description in whole.passes:
-            if each.__name__ not in self.unneeded:
+            if each.__name__ not in UNNEEDED:
                 passes.add_pass(each, description)
         passes.finalize()
         return [passes]
-
-
-class BarePasses(Passes):
-    """The passes for what allocates nothing, so that it holds no expressions of whole arrays: a seventh less time."""
-
-    unneeded = SEVERAL_TYPES | WHOLE_ARRAYS
 
 
 BARE: dict[str, Any] = {"_nrt": False, "pipeline_class": BarePasses}
@@ -99,11 +90,14 @@ def _type_of_nested(function: Nested, _: object) -> types.Dispatcher:
 
 def kernel(function: Kernel) -> Kernel:
     """Compile a function that never raises and may allocate arrays."""
-    return _kept(function, pipeline_class=Passes)
+    return _kept(function)
 
 
 def compiled(function: Kernel) -> Kernel:
-    """Compile a function that allocates nothing and never raises: counting references would take half of its time."""
+    """Compile a function that allocates nothing and never raises: counting references would take half of its time.
+
+    Its variables keep their types from their first value on, a whole number that becomes a fraction aside.
+    """
     return _kept(function, **BARE)
 
 
