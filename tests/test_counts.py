@@ -1,6 +1,7 @@
 """What a change must not increase, counted: sweeps, transforms, lines, solves, tasks, files, modules, files read."""
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -8,6 +9,7 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from planted import SLIDING, make
@@ -300,3 +302,40 @@ def test_lines_of_a_block_of_jumps(transforms):
     result = model.compute(block(model, numbers, columns, (0,), ["friction_coefficient_jump"]))
     assert result.solves == 5
     assert len(transforms) <= 10
+
+
+COMPILING = """
+import sys
+from collections import Counter
+from numba.core.event import Listener, register
+
+class Noting(Listener):
+    counted = Counter()
+
+    def on_start(self, event):
+        self.counted[event.data["dispatcher"].py_func.__module__.split(".")[0]] += 1
+
+    def on_end(self, event):
+        pass
+
+register("numba:compile", Noting())
+from mdr_dask.cli import main
+
+try:
+    main(["run", "study.yaml", "--quiet", "--threads", "1"])
+finally:
+    print(Noting.counted["mdr_dask"], Noting.counted["numba"])
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+def test_kernels_that_a_first_study_compiles(tmp_path):
+    """Each takes a seventh of a second of processor time; and not one part of numba is among them."""
+    (tmp_path / "study.yaml").write_text(SLIDING)
+    empty = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    command = [sys.executable, "-P", "-c", COMPILING]
+    found = subprocess.run(command, cwd=tmp_path, env=empty, capture_output=True, text=True, check=True)
+    ours, of_numba = map(int, found.stdout.splitlines()[-1].split())
+    assert ours <= 21
+    assert of_numba == 0

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 COUNTS: Counter[str] = Counter()
-KERNELS = {"kernel", "compiled", "inlined", "fused"}  # the decorators of what is compiled
+KERNELS = {"kernel", "compiled", "spliced", "nested", "inlined", "fused"}  # the decorators of what is compiled
 OPERATIONS = {ast.Add: "add", ast.Sub: "add", ast.Mult: "multiply", ast.Div: "divide"}
 COMPARES = {ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
 FUNCTIONS = {"sqrt": "root", "pow": "power"} | dict.fromkeys(

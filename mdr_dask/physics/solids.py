@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import kernel, nested
 
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant, J / (mol K)."""
@@ -354,7 +354,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     return Recovery(zeros, stretch, amplitude)
 
 
-@compiled
+@nested
 def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
     """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
     total, rate = 1.0, 0.0
@@ -398,7 +398,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     return zeros, distance
 
 
-@compiled
+@nested
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
     """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
     high = np.log(gap)

@@ -9,13 +9,45 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from numba.core.event import Listener, install_listener
 
 import mdr_dask
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, greater, last_until, lesser, nested, spliced
 
 pytestmark = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+
+
+@nested
+def third(x):
+    return x / 3
+
+
+@spliced
+def doubled(x):
+    if x < 0:
+        return -2 * x
+    return 2 * x
+
+
+@compiled
+def combined(x):
+    total = 0
+    for _ in range(3):
+        total = total + third(x) + doubled(x) + greater(x, -x) - lesser(x, -x)
+    return total
+
+
+@spliced
+def once(x):
+    return 3 * x
+
+
+@compiled
+def within(x):
+    return once(x)
+
 
 MODULE = """
 from mdr_dask.physics.compiling import compiled
@@ -111,3 +143,61 @@ def test_garbage_is_collected_after_compiling_but_not_meanwhile():
     assert not any(collects)
     assert collects
     assert gc.isenabled()
+
+
+def test_a_kernel_is_what_its_functions_are_in_python():
+    """Its variables are of one type from the first to the last value, as numba's are not."""
+    for x in (2.0, -0.7, 0.0):
+        assert combined(x) == combined.py_func(x)
+
+
+def test_what_only_kernels_call_has_neither_a_file_nor_what_python_calls():
+    combined(1.0)
+    (signature,) = third.in_kernels.overloads
+    assert "cpython" not in third.in_kernels.inspect_llvm(signature)
+    assert third.in_kernels.stats.cache_path is None
+    assert within(1.0) == 3.0
+    assert not once.overloads, "a spliced function is compiled within its caller only"
+    assert (third(1.5), doubled(-2.0)) == (0.5, 4.0)
+    assert np.isinf(third(np.inf)), "and from Python it divides as in kernels"
+
+
+def test_kernels_skip_the_passes_that_they_have_no_use_for():
+    """By the names that numba gives them: were one of them called otherwise, compiling would take longer again."""
+    taken = []
+
+    class Noting(Listener):
+        def on_start(self, event):
+            taken.append(event.data["name"].split()[0])
+
+        def on_end(self, event):
+            pass
+
+    @compiled
+    def quarter(x):
+        return x / 4
+
+    quarter._cache.disable()  # type: ignore[attr-defined]
+    with install_listener("numba:run_pass", Noting()):
+        assert quarter(3.0) == 0.75
+    skipped = {"reconstruct_ssa", "strip_phis", "inline_closure_likes", "nopython_rewrites"}
+    assert "nopython_type_inference" in taken
+    assert not skipped & set(taken)
+    every = {"ReconstructSSA", "PreLowerStripPhis", "InlineClosureLikes", "NopythonRewrites"}
+    assert every <= set(vars(numba.core.typed_passes)) | set(vars(numba.core.untyped_passes))
+
+
+@pytest.mark.parametrize("one", [0.0, -0.0, 1.5, np.inf, np.nan])
+@pytest.mark.parametrize("other", [0.0, -0.0, -2.0, np.nan])
+def test_the_greater_and_the_lesser_are_those_of_python(one, other):
+    pairs = ((greater(one, other), max(one, other)), (lesser(one, other), min(one, other)))
+    for found, expected in pairs:
+        assert np.float64(found).tobytes() == np.float64(expected).tobytes()
+
+
+def test_the_last_value_until_a_place_is_that_of_a_search():
+    values = np.array([0.0, 0.5, 0.5, 2.0])
+    for x in (-1.0, 0.0, 0.3, 0.5, 1.9, 2.0, 5.0):
+        expected = max(int(np.searchsorted(values, x, side="right")) - 1, 0)
+        assert last_until(values, x, 0, values.size) == expected
+        assert last_until(values, x, 0, 3) == min(expected, 2)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
@@ -65,7 +65,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
     jumps[end] -= number
 
 
-@compiled
+@nested
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
     """Add a number to one position of the circle, at most once around off, as jumps."""
     points = jumps.size - 1
@@ -74,7 +74,7 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
     jumps[at + 1] -= number
 
 
-@compiled
+@nested
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add what the window's edges leave of a cluster: its head and its tail.
 
@@ -104,7 +104,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
         node += 1
 
 
-@compiled
+@nested
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
     """Add the windows that lie within a cluster, which they cut on both sides."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
@@ -233,7 +233,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
     return abs(at - edge), force
 
 
-@compiled
+@nested
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
     """Return the length in intimate contact of one window; `work` has room for its overlap and what crosses it."""
     points, pieces = pair.line_1.size, int(np.ceil(window))

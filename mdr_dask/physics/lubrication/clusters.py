@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, nested
 from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
@@ -52,7 +52,7 @@ class Clusters(NamedTuple):
         return self.total > self.limit * self.length**3
 
 
-@compiled
+@nested
 def whole_piece(overlap: FloatArray, k: int) -> float:
     """Return the integral of a spline from node k to the next."""
     found: float = (overlap[k] + 11 * overlap[k + 1] + 11 * overlap[k + 2] + overlap[k + 3]) / 24

@@ -10,17 +10,17 @@ from math import log, pi
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 
 
-@compiled
+@nested
 def _second_integral(x: float) -> float:
     """Return the function whose second derivative is ``ln|x|``."""
     square = x * x
     return 0.0 if square == 0.0 else 0.25 * square * (log(square) - 3.0)
 
 
-@compiled
+@nested
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     """Turn second integrals of ``ln|x|`` at the nodes into integrals over hat functions there; zero at both ends."""
     left, left_slope = row[0], 0.0

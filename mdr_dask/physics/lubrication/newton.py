@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
@@ -137,7 +137,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
     return scale * mean, -scale * (mean + slope), scale * slope
 
 
-@compiled
+@nested
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of nodes f-1, f, f+1 for the value at the face between f and f+1, flow to the right."""
     if f == 0:
@@ -208,7 +208,7 @@ def balance(
             derivative[g, 2] -= d2
 
 
-@compiled
+@nested
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:

@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, last_until
 from mdr_dask.physics.mdr.transforms import gauss
 
 
@@ -192,7 +192,7 @@ def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
     if place >= mesh.edges[-1]:
         return 0.0
     order = mesh.order
-    panel = min(max(int(np.searchsorted(mesh.edges, place, side="right")) - 1, 0), mesh.edges.size - 2)
+    panel = last_until(mesh.edges, place, 0, mesh.edges.size - 1)
     above, below = 0.0, 0.0
     for member in range(0 if panel > 0 else 1, order + 1):
         node = panel * order + member - 1

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import inlined, last_until, nested
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
 
 
@@ -187,10 +187,10 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
     return rise * gap
 
 
-@compiled
+@nested
 def _piece(image: Image, place: float, derivative: int) -> float:
     """Return the piecewise cubic at a place, or its slope."""
-    cell = min(max(np.searchsorted(image.knots, place, side="right") - 1, 0), image.coefficients.shape[1] - 1)
+    cell = last_until(image.knots, place, 0, image.coefficients.shape[1])
     local, k = place - image.knots[cell], image.coefficients
     if derivative == 0:
         return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])

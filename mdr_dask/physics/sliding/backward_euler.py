@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
@@ -127,7 +127,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     return blocks
 
 
-@compiled
+@nested
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Take every case over a block by closed sums; queue those that touch or leave in it, and return their number."""
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
@@ -153,7 +153,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
     return queued
 
 
-@compiled
+@nested
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
     """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, kernel
+from mdr_dask.physics.compiling import compiled, inlined, kernel, nested
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
@@ -101,7 +101,7 @@ def write_barriers(
     barriers.block[block] = every
 
 
-@compiled
+@nested
 def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
     if x > 1 / 32:
@@ -131,7 +131,7 @@ def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: floa
     return NONE
 
 
-@compiled
+@nested
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
     """Return the root of a cubic that falls monotonously from low to high."""
     x = low + (high - low) * 0.5
@@ -160,7 +160,7 @@ class Flight(NamedTuple):
     start: float
 
 
-@compiled
+@nested
 def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
     """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
     w0, a, b, c, u, start = flight
@@ -182,7 +182,7 @@ def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
     return x
 
 
-@compiled
+@nested
 def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
     """Return where from low to stop a free element touches first, or `NONE`.
 
@@ -203,7 +203,7 @@ def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
     return NONE
 
 
-@compiled
+@nested
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
     """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
@@ -218,7 +218,7 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
     return half * (2 * w0 + area / 9), half * stretch / 9
 
 
-@compiled
+@nested
 def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into
+from mdr_dask.physics.compiling import compiled, copy_into, greater, lesser, nested, spliced
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
@@ -53,11 +53,12 @@ class Nodes(NamedTuple):
     rise: float
 
 
-@compiled
+@nested
 def _take(given: FloatArray, first: int, stride: int, turn: FloatArray) -> None:
     """Write every stride-th number of a turn from the first one on, and those of the turns before and after."""
     n = turn.size - BEFORE - AFTER
-    turned = min(-(-(given.size - first) // stride), n)  # up to the end of the turn as it is given
+    given_yet = -(-(given.size - first) // stride)
+    turned = given_yet if given_yet < n else n  # up to the end of the turn as it is given
     for i in range(turned):
         turn[BEFORE + i] = given[first + i * stride]
     first -= given.size
@@ -142,17 +143,21 @@ def _take_line(
         _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
-            above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
+            above[k] = greater(h[i], h[i + 1]) + ABOVE * (greater(s[i], 0.0) + greater(-s[i + 1], 0.0))
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
         for k in range(BLOCK):
-            peak, lowest, steepest = max(peak, above[k]), min(lowest, h[begin + k]), min(steepest, s[begin + k])
+            peak, lowest, steepest = (
+                greater(peak, above[k]),
+                lesser(lowest, h[begin + k]),
+                lesser(steepest, s[begin + k]),
+            )
             heights += mean[k]
             squares += square[k]
         blocks[j, PEAK], blocks[j, LOWEST], blocks[j, STEEPEST] = peak, lowest, steepest
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
 
 
-@compiled
+@nested
 def _integrals(
     h: FloatArray,
     s: FloatArray,
@@ -183,7 +188,7 @@ def _integrals(
         square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
 
 
-@compiled
+@nested
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
     """Write the highest point of cells, from the second node on."""
     for k in range(cells):
@@ -194,11 +199,11 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
         root = math.sqrt(inside) if inside > 0 else 0.0
         x = s0 / (root - a) if a <= 0 else -(a + root) / (3 * b)  # neither cancels, and a level start is no fault
         x = x if (x > 0) & (x < 1) else 0.0
-        top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
+        top, ends = h0 + x * (s0 + x * (a + x * b)), greater(h0, h1)
         peak[k] = top if top > ends else ends
 
 
-@compiled
+@spliced
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
     """Write a tile of a line, on the finer grid that weights make, and return the number of its cells.
 

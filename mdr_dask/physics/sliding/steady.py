@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
@@ -39,14 +39,14 @@ SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
-@compiled
+@nested
 def _floor(depth: float) -> float:
     """Return the lattice depth at or below a positive depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.floor(math.ldexp(mantissa, LATTICE_BITS)), exponent - LATTICE_BITS)
 
 
-@compiled
+@nested
 def _next(depth: float) -> float:
     """Return the lattice depth above one."""
     mantissa, exponent = math.frexp(depth)
@@ -69,7 +69,7 @@ def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
     trail[0], trail[1], trail[2], trail[3] = np.log(depth), load, slope, bend
 
 
-@compiled
+@nested
 def _guess(trail: FloatArray, load: float) -> float:
     """Extrapolate log depth over log load to a load."""
     ahead = np.log(load) - trail[1]

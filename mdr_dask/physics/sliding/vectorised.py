@@ -187,7 +187,8 @@ def _solve(
     last_step, last, now, rate = place.last_step, place.last, place.now, place.rate
     settings = SETTINGS
     for begin in range(0, loads.size, LANES):
-        count = min(LANES, loads.size - begin)
+        rest = loads.size - begin
+        count = LANES if rest > LANES else rest
         for k in range(count):
             lanes[k] = begin + k
             last_step[k] = np.nan

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
 from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
@@ -35,7 +35,7 @@ class Swept(NamedTuple):
     solid: Travelling
 
 
-@kernel
+@compiled
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
@@ -85,7 +85,7 @@ def follow(
                 stretch[m] += depth - strain
 
 
-@compiled
+@nested
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
     if stretch.size == 0:
@@ -127,7 +127,7 @@ class Krylov(NamedTuple):
     workspace: FloatArray
 
 
-@kernel
+@nested
 def newton_step(
     residual: FloatArray,
     scale: FloatArray,
@@ -154,17 +154,22 @@ def newton_step(
     size = residual.size
     right = rotations[2]
     step[:] = 0.0
-    np.divide(residual, scale, basis[0])
-    norm = np.sqrt(np.sum(basis[0] ** 2))
+    square = 0.0
+    for k in range(size):  # an expression of whole arrays would compile the words of its error, for seconds
+        basis[0, k] = residual[k] / scale[k]
+        square += basis[0, k] * basis[0, k]
+    norm = np.sqrt(square)
     if not norm > 0:
         return
-    basis[0] /= norm
+    for k in range(size):
+        basis[0, k] /= norm
     right[0] = norm
     used = 0
     for j in range(size):
         column = basis[j + 1]
         follow(basis[j], swept, True, column, workspace)
-        column /= scale
+        for k in range(size):
+            column[k] /= scale[k]
         used = j + 1
         _orthogonalise(basis, triangle, j)
         _rotate(triangle, rotations, j)
@@ -174,26 +179,35 @@ def newton_step(
         for j in range(i + 1, used):
             right[i] -= triangle[i, j] * right[j]
         right[i] /= triangle[i, i]
-        step += right[i] * basis[i]
+        for k in range(size):
+            step[k] += right[i] * basis[i, k]
 
 
-@kernel
+@nested
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
     """Take the earlier rows out of row j + 1, twice against rounding, and leave the coefficients in column j."""
     column = basis[j + 1]
-    triangle[: j + 1, j] = 0.0
+    for i in range(j + 1):
+        triangle[i, j] = 0.0
     for _ in range(2):
         for i in range(j + 1):
-            part = np.sum(column * basis[i])
+            part = 0.0
+            for k in range(column.size):
+                part += column[k] * basis[i, k]
             triangle[i, j] += part
-            column -= part * basis[i]
-    norm = np.sqrt(np.sum(column**2))
+            for k in range(column.size):
+                column[k] -= part * basis[i, k]
+    square = 0.0
+    for k in range(column.size):
+        square += column[k] * column[k]
+    norm = np.sqrt(square)
     triangle[j + 1, j] = norm
     if norm > 0:
-        column /= norm
+        for k in range(column.size):
+            column[k] /= norm
 
 
-@compiled
+@nested
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
     """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, nested
 
 CLOSED, OPEN_END = 0, 1
 
@@ -51,7 +51,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
             product[m] += columns[k, m] * factor
 
 
-@compiled
+@nested
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
@@ -69,7 +69,7 @@ def step_factors(
             area[m] = deborah[m] * (length - gain[m])
 
 
-@compiled
+@nested
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
@@ -82,7 +82,7 @@ def _pressure_inside(
     return pressure, rate
 
 
-@compiled
+@nested
 def leaving_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
@@ -104,7 +104,7 @@ def leaving_point(
     return point
 
 
-@compiled
+@nested
 def touching_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
@@ -127,7 +127,7 @@ def touching_point(
     return point
 
 
-@compiled
+@nested
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
     strain, rate = 0.0, 0.0
     for k in range(times.size):
@@ -137,7 +137,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
     return strain, rate
 
 
-@compiled
+@nested
 def _fly(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
@@ -186,7 +186,7 @@ class Passage(NamedTuple):
     totals: FloatArray
 
 
-@compiled
+@nested
 def sweep_arms(
     penetration: FloatArray,
     start: FloatArray,
@@ -314,7 +314,7 @@ def _contact(
     return place, strain, pressure, left
 
 
-@compiled
+@nested
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
@@ -326,7 +326,7 @@ def _stretch(
     return pressure
 
 
-@compiled
+@nested
 def _into_flight(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
@@ -342,7 +342,7 @@ def _into_flight(
         multiply(amplitude_of, e, modes)
 
 
-@compiled
+@nested
 def _add_flight(
     length: float,
     modes: FloatArray,

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, fused
+from mdr_dask.physics.compiling import fused, greater, lesser, nested, spliced
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -105,8 +105,8 @@ def _leaves(
     x += (w + r * s) * tangent
     x = x if x > begins else begins
     x = x if x < 1 else 1.0
-    steepest = max(-cell.s0, -cell.s1, 0.25 * (cell.s0 + cell.s1) - 1.5 * (cell.w1 - cell.w0), 0.0)
-    crest = max(min(_at(cell, x), r * steepest), 0.0)
+    steepest = greater(greater(-cell.s0, -cell.s1), 0.25 * (cell.s0 + cell.s1) - 1.5 * (cell.w1 - cell.w0))
+    crest = greater(lesser(_at(cell, x), r * greater(steepest, 0.0)), 0.0)
     return x, crest, _fading((1 - x) * inverse)
 
 
@@ -127,7 +127,7 @@ def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float)
     low, high = -0.5 * root, 0.5 * (last - root)
     step = step if step > low else low
     step = step if step < high else high
-    return root + step, waited * max(1 - step * inverse, 0.0)
+    return root + step, waited * greater(1 - step * inverse, 0.0)
 
 
 @fused
@@ -151,7 +151,7 @@ def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple
     return gap < 0, stop, crest, held, gap
 
 
-@compiled
+@nested
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Take a case over the cells of a tile."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
@@ -215,7 +215,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     workspace[STRETCH + k] += stretch
 
 
-@compiled
+@nested
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
@@ -252,7 +252,7 @@ def _pass_block(
     return queued
 
 
-@compiled
+@spliced
 def sweep(
     line: Nodes,
     weights: FloatArray,
@@ -270,7 +270,7 @@ def sweep(
     for k in range(count):
         w = workspace[DEPTH + k] + line.height[BEFORE - 1]
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
-        workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
+        workspace[U + k], workspace[FADE + k] = greater(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
     # the summit, where every case touches, lies in the cell before the first one; then blocks, and what is left
     first, cells = BEFORE - 1, 1
@@ -291,12 +291,13 @@ def sweep(
             for k in range(LOAD, DEPTH):
                 workspace[k] = 0.0
         first += cells
-        cells = min(BLOCK, BEFORE + n - first)
+        rest = BEFORE + n - first
+        cells = BLOCK if rest > BLOCK else rest
 
 
-@compiled
+@nested
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write what does not change of a case on a grid."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
-    workspace[INVERSE + k] = min(1 / deborah, LARGE)
+    workspace[INVERSE + k] = lesser(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel
+from mdr_dask.physics.compiling import compiled, copy_into, greater, inlined, kernel, lesser
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # a position in a cell that is not there
@@ -231,17 +231,17 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, fl
     """
     n, node = height.size, -np.inf
     for i in range(n):
-        node = max(node, height[i])
+        node = greater(node, height[i])
     best, best_place, highest, rise = 0, 0.0, -np.inf, STEEPEST_RISE / n
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
         after = height[following]
-        if max(height[i], after) + rise * max(slope[i] - slope[following], 0.0) < node:
+        if greater(height[i], after) + rise * greater(slope[i] - slope[following], 0.0) < node:
             continue
         enter, leave, place = slope[i] / n, slope[following] / n, 0.0
-        if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
+        if enter > 0 > leave and greater(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = min(max(-enter / (b - math.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            place = lesser(greater(-enter / (b - math.sqrt(greater(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
             b, c = b * place * place, c * (place * place * place)
         else:
             b, c = 0.0, 0.0

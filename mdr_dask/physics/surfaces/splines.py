@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.compiling import compiled, nested
 from mdr_dask.physics.surfaces.waves import series
 
 Piece = tuple[float, float, float, float]
@@ -130,7 +130,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     return count
 
 
-@compiled
+@nested
 def _extremes(of: Piece) -> tuple[float, float]:
     """Return where a piece has its extremes, in order, 0 in place of one outside 0..1."""
     a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c

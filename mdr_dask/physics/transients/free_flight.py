@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined
-from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, last_until, patch_before
+from mdr_dask.physics.compiling import inlined, last_until
+from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left

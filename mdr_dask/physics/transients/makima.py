@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 
 FLAT = 1e-9  # of the largest weight on the curve: with less a point has the mean of the slopes two away
 
@@ -21,7 +21,7 @@ def _weights(secant: FloatArray, i: int) -> tuple[float, float]:
     return before, after
 
 
-@compiled
+@nested
 def _write_tangents(secant: FloatArray, tangent: FloatArray) -> None:
     """Write the slopes at points from those between them, two beyond either end included."""
     largest = 0.0

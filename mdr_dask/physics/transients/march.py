@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.compiling import compiled, kernel, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
 from mdr_dask.physics.transients.free_flight import Instant
@@ -122,7 +122,7 @@ def _balance(
     return Outcome.DEPTH_NOT_FOUND, 0.0
 
 
-@compiled
+@nested
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
 
@@ -145,7 +145,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     return a * pace, b * pace
 
 
-@compiled
+@nested
 def _foretold(found: Trajectory, now: int) -> float:
     """Extrapolate the depth to moment `now`: by a parabola over the places, as soon as there are three of them."""
     time, place, depth, rate, _ = found

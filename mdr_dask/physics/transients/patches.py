@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, last_until, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
@@ -95,18 +95,6 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
 
 
 @inlined
-def last_until(values: FloatArray, x: float, low: int, high: int) -> int:
-    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
-    while high - low > 1:
-        middle = (low + high) // 2
-        if values[middle] <= x:
-            low = middle
-        else:
-            high = middle
-    return low
-
-
-@inlined
 def patch_before(patches: Patches, s: float) -> int:
     """Return the last patch that begins at s or before, or the first one; those near the last one found come first."""
     low, high = int(patches.cursor[0]), patches.count
@@ -162,7 +150,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
     sums[TILT] += rise
 
 
-@compiled
+@nested
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.worn import (
@@ -268,7 +268,7 @@ def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
         result[k] = _change(rule, max(places[k] - rule.c, 0.0))
 
 
-@compiled
+@nested
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
@@ -326,7 +326,7 @@ def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: Floa
         result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, quadrature)
 
 
-@compiled
+@nested
 def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
     """Return the root of the scar's integral in a bracket, or its higher end if there is none."""
     if not bracket.high_value < 0.0 < bracket.low_value:
@@ -376,7 +376,7 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
     return radius, volume, 2.0 * (load + worn)
 
 
-@compiled
+@nested
 def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> float:
     """Return int_0^c (1 - g0) dx."""
     if rule.image.knots.size == 0:
@@ -407,7 +407,7 @@ def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: F
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
 
 
-@compiled
+@nested
 def _power_rule(no_table: Image, exponent: float, c: float, rest: float) -> Rule:
     image = Image(exponent, no_table.knots, no_table.coefficients)
     return Rule(image, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)

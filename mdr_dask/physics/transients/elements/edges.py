@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
@@ -143,7 +143,7 @@ def _cell(
     return low, high
 
 
-@compiled
+@nested
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
     """Return mean load, drag and fraction in contact; there is nothing before element `first`. Note edges if `keep`."""
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges

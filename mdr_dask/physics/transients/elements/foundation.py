@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, kernel
+from mdr_dask.physics.compiling import compiled, inlined, kernel, nested
 from mdr_dask.physics.solids import recovery_times
 
 
@@ -118,7 +118,7 @@ class Release(NamedTuple):
     after: float
 
 
-@compiled
+@nested
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
     """Write how modes decay and arms fade over a time."""
     for k in range(decay.size):
@@ -152,7 +152,7 @@ def fly(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray
     return at_rest(solid, arms, i)
 
 
-@compiled
+@nested
 def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
     """Return the displacement without force of an element that has no dashpot."""
     pull, glass = 0.0, 1.0

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
@@ -89,7 +89,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     return (next_load + total) / glass
 
 
-@compiled
+@nested
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
@@ -109,7 +109,7 @@ def _instant(
     return depth, work / n, good
 
 
-@compiled
+@nested
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
     n, dissipated = state.displacement.size, 0.0
@@ -195,7 +195,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     )
 
 
-@compiled
+@nested
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
@@ -214,7 +214,7 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
-@compiled
+@nested
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
@@ -289,7 +289,7 @@ def _step(
     return depth, work, dissipated, True
 
 
-@compiled
+@nested
 def _state_energy(solid: Foundation, state: State) -> float:
     energy, n = 0.0, state.displacement.size
     if solid.times.size == 0:
