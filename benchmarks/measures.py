@@ -41,15 +41,21 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> Non
         print(f"| {' | '.join(str(cell) for cell in row)} |")
 
 
+COLUMNS, CROWDED = 4, 1e4  # panels in a row; ratio of times from which ticks stand at decades only
+
+
 def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str, goal: float | None = None) -> None:
     """Write a figure of error over processor time: a panel each title, in it a curve each method."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    figure = Figure(figsize=(max(3.6 * len(panels), 6.4), 4.2), layout="constrained")
-    for axes, (title, curves) in zip(
-        figure.subplots(1, len(panels), sharey=True, squeeze=False)[0], panels.items(), strict=True
-    ):
+    rows = -(-len(panels) // COLUMNS)
+    columns = -(-len(panels) // rows)
+    figure = Figure(figsize=(max(3.6 * columns, 6.4), 4.2 * rows), layout="constrained")
+    places = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    for axes in places[len(panels) :]:
+        axes.remove()
+    for axes, (title, curves) in zip(places, panels.items(), strict=False):
         for label, (seconds, errors) in curves.items():
             axes.loglog(seconds, errors, "o-", ms=4, label=label)
         if goal is not None:
@@ -58,11 +64,12 @@ def draw_errors(panels: Mapping[str, Mapping[str, Curve]], error: str, path: str
         low, high = axes.get_xlim()
         wider = max(10 * low / high, 1.0) ** 0.5  # within less than a decade ticks would lie at each other
         axes.set_xlim(low / wider, high * wider)
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < CROWDED * low else (1.0,)))
         axes.xaxis.set_major_formatter("{x:g}")
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel(error)
+    for axes in places[: len(panels) : columns]:
+        axes.set_ylabel(error)
     figure.axes[0].legend(fontsize="x-small")
     figure.savefig(path, dpi=120)
 
