@@ -41,7 +41,10 @@ ABOUT = {
         "Nyquist point; backward Euler, which shares nothing with it, tends to the same ([loading "
         "histories](evidence/loading-histories.md))."
     ),
-    "transforms": ("Largest error of the profile of the image cos 5x. Reference: the Bessel function J0(5r)."),
+    "transforms": (
+        "Largest error of the profile of the images cos 5x, max(x^2 - 1, 0), which has a kink, and cos 200x. "
+        "Reference: the profiles in closed form, Bessel's J0 and one of arccos 1/r and sqrt(r^2 - 1)."
+    ),
     "wear": (
         "Largest error of the worn profile over the depth that can wear, which is what `accuracy` means here. "
         "Reference: the exact evolution itself at 1e-5; every cycle simulated, as the thesis did, tends to the same "
