@@ -32,8 +32,8 @@ ABOUT = {
         "element ([materials](evidence/materials.md))."
     ),
     "velocity jump": (
-        "Largest error of friction at any time, over its last value: velocities that rise by a fifth under a heavy and "
-        "a usual load, and fall to a fifth under a light one. Reference: every element followed from rest on two fine "
+        "Largest error of friction at any time, over its last value. Velocities rise by a fifth under a heavy and a "
+        "usual load, and fall to a fifth under a light one. Reference: every element followed from rest on two fine "
         "grids, extrapolated ([kinetics](evidence/kinetics.md))."
     ),
     "loading histories": (

@@ -19,17 +19,18 @@ def written_units(text: str) -> dict[str, str]:
     Parameters
     ----------
     text : str
-        A campaign file that has been checked.
+        A campaign file, as a store holds it; one that is damaged has no units.
 
     Returns
     -------
     dict of str to str
         By the name of the parameter's coordinate: ``{"rotation_speed": "rpm", "indenter_radius": "mm"}``.
     """
-    data = parse(text, "", Problems()).data or {}
-    series = (data.get("series") or {}).values()
+    whole = parse(text, "", Problems()).data
+    data = whole if isinstance(whole, dict) else {}
+    series = data.get("series")
     found: dict[str, set[str]] = {}
-    for parameters in (data.get("parameters"), *series):
+    for parameters in (data.get("parameters"), *(series.values() if isinstance(series, dict) else ())):
         for name, unit in _below("", parameters):
             found.setdefault(name, set()).add(unit)
     return {name: unit for name, (unit, *others) in found.items() if not others}
