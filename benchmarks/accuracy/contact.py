@@ -4,34 +4,84 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import j0
 
 from benchmarks.accuracy.points import Point, neighbours
-from benchmarks.measures import timed
+from benchmarks.measures import timed, timed_in_turns
 from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.mdr import transforms
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.uniform_grid import uniform_grid
-from mdr_dask.physics.wear.exact import exact
+from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced_rule import fast_forced
-from mdr_dask.physics.wear.rules import fast
+from mdr_dask.physics.wear.history import LoadBlock, history
+from mdr_dask.physics.wear.rules import fast, limit
+from mdr_dask.physics.wear.worn import virgin_load
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from references.literal_wear import literal
 
 FILMS = Path(__file__).parents[2] / "tests/references/heavy_line_contacts.csv"
 KNOWN = 5e-6  # relative error of those films
-#: Exponent, c / a0, N, and whether the force is held.
+
+
+class Worn(NamedTuple):
+    """A body r^n, its c / a0 (0 is gross slip), amount of wear, and whether the force is held."""
+
+    exponent: float
+    border: float
+    amount: float
+    held: bool = False
+
+    @property
+    def profile(self) -> PowerProfile:
+        return PowerProfile(self.exponent)
+
+    @property
+    def scale(self) -> float:
+        """What can wear, over d0."""
+        return 1 - float(self.profile.image(np.array(self.border)))
+
+    def evolved(self, accuracy: float):
+        return exact(self.profile, self.border, [self.amount], accuracy, constant_force=self.held)[0]
+
+    def otherwise(self, short: bool) -> Iterator[tuple[str, str, Callable]]:
+        """Yield the other rules that serve here: method, setting, and what solves."""
+        profile, border, amount = self.profile, self.border, self.amount
+        kept = {"force": 2 * virgin_load(profile, 1.0)} if self.held else {"depth": 1.0}
+        block = LoadBlock(amount, self.scale if border > 0 else np.inf, **kept)
+        for cells in (40,) if short else (50, 100, 200, 400):
+            yield "blocks of load", f"{cells} cells", partial(_last, profile, block, cells)
+        if border == 0:
+            return
+        fast_rule, limit_rule = (fast_forced, limit_under_force) if self.held else (fast, limit)
+        yield "fast rule, ξ = 0.8", "", partial(fast_rule, profile, border, amount, 0.8)
+        yield "limit rule", "", partial(limit_rule, profile, border)
+        for cells in () if amount > FEW else (40,) if short else (50, 100, 200):
+            simulated = partial(literal, profile, border, amount, cells=cells, constant_force=self.held)
+            yield "cycle by cycle (thesis)", f"{cells} cells", simulated
+
+
 WORN = {
-    "easy: parabola, N = 2": (2.0, 0.455, 2.0, False),
-    "typical: parabola, N = 8": (2.0, 0.455, 8.0, False),
-    "typical: cone, force held": (1.0, 0.3, 4.0, True),
-    "hard: flat, n = 8, c = 0.1": (8.0, 0.1, 4.0, False),
+    "easy: parabola, N = 2": Worn(2.0, 0.455, 2.0),
+    "easy: gross slip": Worn(2.0, 0.0, 1.0),
+    "typical: parabola, N = 8": Worn(2.0, 0.455, 8.0),
+    "typical: cone, force held": Worn(1.0, 0.3, 4.0, held=True),
+    "hard: flat, n = 8, c = 0.1": Worn(8.0, 0.1, 4.0),
+    "hard: N = 300": Worn(2.0, 0.455, 300.0),
+    "hard: gross slip, force held": Worn(1.0, 0.0, 2.0, held=True),
 }
+FEW = 20.0  # cycles beyond which they are not followed one by one
+
+
+def _last(profile: PowerProfile, block: LoadBlock, cells: int):
+    return history(profile, [block], cells=cells)[0]
 
 
 def wear(short: bool) -> Iterator[Point]:
@@ -40,39 +90,29 @@ def wear(short: bool) -> Iterator[Point]:
     The truth is the exact evolution at 1e-5, which those cycles tend to. Errors are over what can wear, as `accuracy`
     is: the largest of the profile at any radius.
     """
-    for case, (exponent, border, amount, held) in list(WORN.items())[: 1 if short else None]:
+    for case, worn in list(WORN.items())[: 1 if short else None]:
         for like, rounder, more in neighbours(short):
-            profile, stick, cycles = PowerProfile(exponent * 1.1**rounder), border, amount * 1.5**more
-
-            def evolved(accuracy, profile=profile, stick=stick, cycles=cycles, held=held):
-                return exact(profile, stick, [cycles], accuracy, constant_force=held)[0]
-
-            truth = evolved(1e-3 if short else 1e-5)
+            body = worn._replace(exponent=worn.exponent * 1.1**rounder, amount=worn.amount * 1.5**more)
+            truth = body.evolved(1e-3 if short else 1e-5)
             radii = np.linspace(0, 1.2 * truth.contact_radius, 400)
-            scale = 1 - float(profile.image(np.array(stick)))
 
-            def error(found, truth=truth, radii=radii, scale=scale):
+            def error(found, truth=truth, radii=radii, scale=body.scale):
                 return float(np.max(np.abs(found.height(radii) - truth.height(radii)))) / scale
 
-            for accuracy in (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4):
-                evolved(accuracy)
-                found, seconds = timed(evolved, accuracy, calls=2)
-                stated = float(np.nanmax(found.error("worn_profile", radii))) / scale
+            asked = (0.1, 0.01) if short else (0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4)
+            solved = timed_in_turns([partial(body.evolved, accuracy) for accuracy in asked], 2 if short else 3)
+            for accuracy, (found, seconds) in zip(asked, solved, strict=True):
+                stated = float(np.nanmax(found.error("worn_profile", radii))) / body.scale
                 yield Point("wear", case, "exact evolution", f"accuracy {accuracy:g}", seconds, error(found), stated)
-            if like:
-                continue
-            rule = fast_forced if held else fast
-            found, seconds = timed(rule, profile, stick, cycles, 0.8, calls=2)
-            yield Point("wear", case, "fast rule, ξ = 0.8", "", seconds, error(found))
-            for cells in (40,) if short else (50, 100, 200):
-                found, seconds = timed(lambda: literal(profile, stick, cycles, cells=cells, constant_force=held))  # noqa: B023
-                yield Point("wear", case, "cycle by cycle (thesis)", f"{cells} cells", seconds, error(found))
+            for method, setting, solve in () if like else body.otherwise(short):
+                found, seconds = timed(solve, calls=2)
+                yield Point("wear", case, method, setting, seconds, error(found))
 
 
 def films(short: bool) -> Iterator[Point]:
     """Yield the worse film of the lightest to the heaviest of 70 contacts, and of nine like each in load and speed.
 
-    The truth of the first is that of another solver, known to 5e-6; of the others, grids of 641, 906 and 1281 nodes.
+    The truth of the first is that of another solver, known to 5e-6; of the others, the finest five grids.
     """
     with FILMS.open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
@@ -94,7 +134,7 @@ def _films(name: str, case: line_contact.LineContact, truth, short: bool) -> Ite
 
     nodes = line_contact.SETTINGS.nodes
     if truth is None:
-        finest = line_contact.SETTINGS._replace(nodes=nodes[-3:])
+        finest = line_contact.SETTINGS._replace(nodes=nodes[-5:])
         truth = [float(film.value) for film in _both(line_contact.solve_film(case, 0.0, finest))]
 
     def point(method, setting, found, seconds):
@@ -127,21 +167,24 @@ def jumps(short: bool) -> Iterator[Point]:
     """Yield the course of friction after a jump against every element followed on two fine grids, extrapolated."""
     from benchmarks.kinetics import work_precision as own
 
-    finest = 2 if short else 8
-    own.march(2, 8), own.papers(1), own.followed(1)
-    ladder = {grid: timed(own.followed, grid) for grid in ((1, 2) if short else (2, 4, 8))}
-    truth = (4 * ladder[finest][0] - ladder[finest // 2][0]) / 3
-    for arguments in ((2, 8),) if short else ((2, 8), (4, 8), (4, 12), (8, 24), (16, 48)):
-        trace, seconds = timed(own.march, *arguments, calls=1 if short else 3)
-        setting = f"oversampling {arguments[0]}, {arguments[1]} steps a decade"
-        yield Point("velocity jump", "one line", "graded march", setting, seconds, float(np.max(np.abs(trace - truth))))
-    for grid, (trace, seconds) in ladder.items():
-        error = float(np.max(np.abs(trace - truth)))
-        yield Point("velocity jump", "one line", "every element followed", f"oversampling {grid}", seconds, error)
-    for grid in (1,) if short else (1, 4, 16):
-        trace, seconds = timed(own.papers, grid)
-        error = float(np.max(np.abs(trace - truth)))
-        yield Point("velocity jump", "one line", "backward Euler (thesis)", f"oversampling {grid}", seconds, error)
+    finest = 2 if short else 16
+    for name, case in list(own.CASES.items())[: 1 if short else None]:
+        own.march(case, 2, 8), own.papers(case, 1), own.followed(case, 1)
+        ladder = {grid: timed(own.followed, case, grid) for grid in ((1, 2) if short else (2, 4, 8, 16))}
+        truth = (4 * ladder[finest][0] - ladder[finest // 2][0]) / 3
+
+        def point(method, setting, trace, seconds, stated=np.nan, name=name, truth=truth):
+            return Point("velocity jump", name, method, setting, seconds, float(np.max(np.abs(trace - truth))), stated)
+
+        for grid, steps in ((2, 8),) if short else ((2, 8), (4, 8), (4, 12), (8, 24), (16, 48)):
+            (trace, errors), seconds = timed(own.march, case, grid, steps, calls=1 if short else 3)
+            setting = f"oversampling {grid}, {steps} steps a decade"
+            yield point("graded march", setting, trace, seconds, float(np.max(errors)))
+        for grid, (trace, seconds) in ladder.items():
+            yield point("every element followed", f"oversampling {grid}", trace, seconds)
+        for grid in (1,) if short else (1, 4, 16):
+            trace, seconds = timed(own.papers, case, grid)
+            yield point("backward Euler (thesis)", f"oversampling {grid}", trace, seconds)
 
 
 def histories(short: bool) -> Iterator[Point]:

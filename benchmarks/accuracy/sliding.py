@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.accuracy.points import Point, neighbours
-from benchmarks.measures import timed
+from benchmarks.measures import timed_in_turns
 from mdr_dask.physics.sliding.problem import Aim, Arms, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
@@ -63,12 +64,14 @@ def rough(hurst: float, realisation: int = 1):
 def ladder(
     line, arms, deborah: float, truth, grids, scheme="hermite", repeats=15
 ) -> Iterator[tuple[str, float, float, float]]:
-    """Yield setting, processor time, error of the friction and its stated error, for every grid."""
+    """Yield setting, processor time, error of the friction and its stated error, for every grid or accuracy."""
     case = np.array([deborah]), np.array([truth.load])
-    for grid in grids:
-        aim = Aim(("drag",), 0.01, grid, scheme) if isinstance(grid, int) else Aim(("drag",), grid, "auto", scheme)
-        solve(line, arms, *case, aim)
-        (steady, errors), seconds = timed(solve, line, arms, *case, aim, calls=repeats)
+    aims = [
+        Aim(("drag",), 0.01, grid, scheme) if isinstance(grid, int) else Aim(("drag",), grid, "auto", scheme)
+        for grid in grids
+    ]
+    solved = timed_in_turns([partial(solve, line, arms, *case, aim) for aim in aims], repeats)
+    for grid, ((steady, errors), seconds) in zip(grids, solved, strict=True):
         friction, stated = steady.drag[0] / truth.load, float(errors.drag[0] / steady.drag[0])
         setting = f"grid {grid}" if isinstance(grid, int) else f"auto, {grid:g}"
         # below its own doubt the reference cannot judge
@@ -102,10 +105,11 @@ def solids(short: bool) -> Iterator[Point]:
             arms = Arms(solid.moduli, tuple(1.5**faster * each for each in solid.deborah))
             body = slow.Body(np.array(arms.moduli), np.array(arms.deborah), 0.0)
             truth = exact(reference, depth + 0.1 * higher, body, True, short)
-            for found in ladder(line, arms, 0.0, truth, (4, 16) if short else (4, 8, 16, 32, 64)):
-                yield Point("general solids", case, "straight cells, extrapolated", *found)
-            for found in ladder(line, arms, 0.0, truth, (0.05, 0.01, 0.001)[: 1 if short else 3]):
-                yield Point("general solids", case, "accuracy: auto", *found)
+            tried = (4, 16, 0.05) if short else (4, 8, 16, 32, 64, 0.05, 0.01, 0.001)
+            for found in ladder(line, arms, 0.0, truth, tried):
+                asked = found[0].startswith("auto")
+                method = "accuracy: auto" if asked else "straight cells, extrapolated"
+                yield Point("general solids", case, method, *found)
 
 
 def indenters(short: bool) -> Iterator[Point]:

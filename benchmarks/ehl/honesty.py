@@ -1,7 +1,7 @@
 """Whether the stated errors of films hold: ``python -m benchmarks ehl honesty [cases] [seed]``.
 
 Random contacts of the whole box and heavy ones (M > 200), with Barus' and Roelands' law, with and without density,
-flooded and starved, solved to four accuracies and compared with grids of four times the nodes.
+flooded and starved, solved to four accuracies and compared with the finest five grids.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ OPTIONS = (
 ACCURACIES = (1e-2, 1e-3, 3e-4, 1e-4)
 LEAST_LOAD = 200.0
 #: The reference: no case is stopped before its finest grid.
-FINEST = SETTINGS._replace(nodes=(161, 321, 641, 1281))
+FINEST = SETTINGS._replace(nodes=SETTINGS.nodes[-5:])
 
 
 def cases(box, number, seed):

@@ -66,9 +66,9 @@ def _estimates(case: EhlLineParameters, W: float, solution: LineSolution, output
         "minimum_film_thickness": lambda: solution.minimum_film.scaled(metres),
         "film": lambda: _profile(read(lambda grid: grid.film_between(place)).scaled(film)),
         "pressure": lambda: _profile(read(lambda grid: grid.pressure_between(place)).scaled(p0)),
-        "minimum_position": lambda: read(lambda grid: grid.minimum[0]),
-        "rupture_position": lambda: read(lambda grid: grid.rupture),
-        "spike_position": lambda: read(lambda grid: grid.spike[0]),
+        "minimum_position": lambda: solution.position(lambda grid: grid.minimum[0]),
+        "rupture_position": lambda: solution.position(lambda grid: grid.rupture),
+        "spike_position": lambda: solution.position(lambda grid: grid.spike[0]),
         "spike_pressure": lambda: read(lambda grid: grid.spike[1]).scaled(p0),
         "traction_coefficient": lambda: read(
             lambda grid: traction.sliding_coefficient(solution.case, grid, W, case.slide_roll_ratio, stress)

@@ -37,6 +37,8 @@ _RENAMED = {"contact_force": "normal_force"}
 _USUAL, _FINEST, _FINER, _ENOUGH = 1e-3, 1e-5, 0.5, 0.7
 #: The accuracy that cases begin at over that of the campaign: to begin again costs more than to begin finer.
 _BEGIN = {"depth": 0.2, "force": 0.6}
+#: The same over 1 - c where only volumes are wanted: `python -m benchmarks accuracy measure campaigns_of_wear`.
+_VOLUME = 0.9
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -90,7 +92,7 @@ def seconds(block: Block[FrettingWear]) -> float:
         return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
-    finer = (_USUAL / _first_accuracy(parameters.accuracy, block.accuracy, parameters.hold)) ** 0.6
+    finer = (_USUAL / _first_accuracy(parameters.accuracy, block.accuracy, _BEGIN[parameters.hold])) ** 0.6
     each = {"limit": 1e-3, "fast": 1e-3, "exact": 0.03 * finer}[parameters.wear_rule]
     if parameters.hold == "force":
         each = {"limit": 0.3 * finer, "fast": 0.03, "exact": 0.5 * finer}[parameters.wear_rule]
@@ -305,15 +307,23 @@ def _task(parameters: FrettingWear, indenter: Indenter, numbers: Numbers, place:
     )
 
 
-def _first_accuracy(given: float | None, asked: float | None, hold: str) -> float:
+def _first_accuracy(given: float | None, asked: float | None, share: float) -> float:
     """Return the accuracy that a case begins at: the finer of that given and what the campaign's probably needs."""
-    needed = _USUAL if given is None and asked is None else np.inf if asked is None else _BEGIN[hold] * asked
+    needed = _USUAL if given is None and asked is None else np.inf if asked is None else share * asked
     return max(min(needed, np.inf if given is None else given), _FINEST)
+
+
+def _beginning(task: Task, demand: _Demand) -> float:
+    """Return the accuracy that a task begins at over that asked: the thinner the slip annulus, the faster it wears."""
+    if demand.outputs != ["wear_volume"] or (task.rule, task.hold) != ("exact", "depth"):
+        return _BEGIN[task.hold]
+    return min(_VOLUME * (1.0 - task.profile.inside(task.level)), 1.0)
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
     """Solve a task for all its (N, xi), more finely for those that miss the accuracy asked; say which still do."""
-    accuracy, left = _first_accuracy(task.accuracy, demand.accuracy, task.hold), list(range(len(wanted)))
+    accuracy = _first_accuracy(task.accuracy, demand.accuracy, _beginning(task, demand))
+    left = list(range(len(wanted)))
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
         contacts = _solved(task, [wanted[number] for number in left], accuracy, errors=demand.errors)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.lubrication.deformation import film as film_at
+from mdr_dask.physics.lubrication.grids import adapted_density
 
 #: A second pressure maximum counts as a spike if it stands out by this share of the greatest pressure.
 _SPIKE = 0.01
@@ -17,7 +20,8 @@ _SUBDIVISION = 41
 _TOO_EARLY = 0.1
 
 
-class GridSolution(NamedTuple):
+@dataclass(frozen=True)
+class GridSolution:
     """Pressure (in p0) and film (in ``a^2/R``) at the nodes of one grid, the film at ``X = 0``, the steps taken, and
     the spacing of the nodes over that of the density which places them.
 
@@ -43,12 +47,17 @@ class GridSolution(NamedTuple):
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
 
-    @property
+    @cached_property
+    def density(self) -> FloatArray:
+        """The density of nodes that the solution asks for, at its own."""
+        return adapted_density(self.nodes, self.pressure, self.film, self.central)
+
+    @cached_property
     def central_film(self) -> float:
         """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
         return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
 
-    @property
+    @cached_property
     def minimum(self) -> tuple[float, float]:
         """Position and height of the lowest film, between the nodes around the lowest one."""
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
@@ -62,7 +71,7 @@ class GridSolution(NamedTuple):
         width = positions[1] - positions[0]
         return float(positions[k] + offset * width), float(heights[k] + offset * (left + right) / 4)
 
-    @property
+    @cached_property
     def spike(self) -> tuple[float, float]:
         """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
         P = self.pressure
@@ -74,7 +83,7 @@ class GridSolution(NamedTuple):
             return float("nan"), float("nan")
         return float(self.nodes[last]), float(P[last])
 
-    @property
+    @cached_property
     def rupture(self) -> float:
         """Where the film ends, from three values of the pressure, which goes out like a square.
 
@@ -86,10 +95,10 @@ class GridSolution(NamedTuple):
         if not (root.size == 3 and root[0] > root[1] > root[2] > 0):
             return float(behind)
         cell = behind - self.nodes[last]
-        end = _lagrange(root[None, :], x[None, :], np.zeros(1))[0] + _TOO_EARLY * cell
+        end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
         return float(np.clip(end, x[2], behind + cell))
 
-    @property
+    @cached_property
     def cut(self) -> float:
         """Distance of the film's end from the nearest node, in cells: a half at most."""
         end = self.rupture
@@ -98,17 +107,30 @@ class GridSolution(NamedTuple):
         return float(min(abs(share), abs(1 - share)))
 
 
+@kernel
 def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
     """Return the cubic through the two nodes before and the two behind each position."""
-    first = np.clip(np.searchsorted(nodes, positions) - 2, 0, nodes.size - 4)
-    around = first[:, None] + np.arange(4)
-    return _lagrange(nodes[around], values[around], positions)
+    result = np.empty(positions.size)
+    for k in range(positions.size):
+        low, high = 2, nodes.size - 2  # of the first node that is not before the position
+        while low < high:
+            middle = (low + high) // 2
+            if nodes[middle] < positions[k]:
+                low = middle + 1
+            else:
+                high = middle
+        total = 0.0
+        for i in range(low - 2, low + 2):
+            share = values[i]
+            for j in range(low - 2, low + 2):
+                if j != i:
+                    share *= (positions[k] - nodes[j]) / (nodes[i] - nodes[j])
+            total += share
+        result[k] = total
+    return result
 
 
-def _lagrange(x: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the polynomial through the values at x, shape (m, k), at each of m positions."""
-    total = np.zeros(positions.size)
-    for k in range(x.shape[1]):
-        others = [m for m in range(x.shape[1]) if m != k]
-        total += values[:, k] * np.prod([(positions - x[:, m]) / (x[:, k] - x[:, m]) for m in others], axis=0)
-    return total
+def _at_zero(x: list[float], values: list[float]) -> float:
+    """Return the parabola through three values at x, at zero."""
+    (a, b, c), (at_a, at_b, at_c) = x, values
+    return at_a * b * c / ((a - b) * (a - c)) + at_b * a * c / ((b - a) * (b - c)) + at_c * a * b / ((c - a) * (c - b))

@@ -9,7 +9,7 @@ well enough.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,11 +61,16 @@ class Settings(NamedTuple):
     adapted_nodes, adaptations : int
         Nodes of the grids that are placed by a solution before grids are compared, and their number.
     nodes : tuple of int
-        Nodes of the grids that are compared: three, then the next one or the one after it, whichever is expected to
-        meet the accuracy. The last is a cap: its dense equations take some 30 ms a step.
-    laid_again : float
-        Greatest distance of a film's end from the nearest node, in cells, with which a grid is kept as it is, unless
-        it meets the accuracy. Else it is laid once more, from its own end.
+        Nodes of the grids that are compared, as many as the accuracy needs, three at least. The last is a cap: its
+        dense equations take some 30 ms a step.
+    end_order : float
+        Power of the spacing that the error of a film's end goes like: where a finer grid lets expect it.
+    further : float
+        Greatest share of a pressure by which two grids let expect another one on the next: spikes move.
+    further_steps : int
+        Greatest number of steps from there; then the last grid's own pressure is taken.
+    fourth : float
+        Error of a film over what is left of a fourth power of the spacing, :func:`extrapolate`.
     floor : float
         Least share of an error that is trusted in a film, :class:`Trust`.
     sharpest : float
@@ -80,6 +85,8 @@ class Settings(NamedTuple):
     cut : float
         Added to that share for a film that ends a whole cell from the nearest node: where in its cell it ends makes
         the minimum film scatter.
+    placed : float
+        Least error of a position, in cells there.
     spiked : float
         That share for readings other than films, which pass the spike, whatever the spacing.
     """
@@ -93,16 +100,20 @@ class Settings(NamedTuple):
     )
     attempt_steps: int = 80
     paces: tuple[Pace, ...] = (Pace(0.12, 30), Pace(0.05, 80), Pace(0.02, 250))
-    adapted_nodes: int = 121
+    adapted_nodes: int = 161
     adaptations: int = 2
-    nodes: tuple[int, ...] = (41, 81, 161, 227, 321, 454, 641, 906, 1281)
-    laid_again: float = 0.2
+    nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
+    end_order: float = 4.0
+    further: float = 0.1
+    further_steps: int = 12
+    fourth: float = 3.0
     floor: float = 0.01
     sharpest: float = 50.0
-    spike: float = 0.15
+    spike: float = 0.2
     narrow: float = 0.004
     thick: float = 30.0
     cut: float = 0.1
+    placed: float = 0.1
     spiked: float = 0.13
 
 
@@ -243,14 +254,24 @@ class LineSolution:
         """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
         return _tends_to(self.grids, reading, SETTINGS.spiked)
 
+    def position(self, reading: Callable[[GridSolution], float]) -> Limit:
+        """Return what a position in half widths tends to, which is known no better than to a share of a cell."""
+        found, nodes = self.estimate(reading), self.finest.nodes
+        after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
+        cell = nodes[after] - nodes[after - 1]
+        return found._replace(error=np.maximum(found.error, SETTINGS.placed * cell))
+
 
 def _tends_to(
-    solved: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], share: float
+    solved: Sequence[GridSolution],
+    reading: Callable[[GridSolution], float | FloatArray],
+    share: float,
+    fourth: float | None = None,
 ) -> Limit:
     """Return what a reading of the last grids tends to; `share` is the least error's, but for what a cut film adds."""
     last = solved[-4:]
     least = share + SETTINGS.cut * max(grid.cut for grid in last[-3:])
-    return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least)
+    return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least, fourth)
 
 
 def expected_film(M: float, L: float) -> float:
@@ -302,15 +323,46 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
     return outcome, state
 
 
+def _density(source: GridSolution) -> tuple[FloatArray, FloatArray]:
+    """Return positions and the density of nodes there that a solution asks for."""
+    return source.nodes, grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
+
+
 def _refined(
-    case: LineContact, state: GridSolution, source: GridSolution, count: int, paces: tuple[Pace, ...]
+    case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int, settings: Settings
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes placed as the solution `source` asks for, starting from `state`."""
-    density = grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
-    end = max(source, state, key=lambda grid: grid.nodes.size).rupture
-    nodes, spacing = grids.aligned(source.nodes, density, count, end)
-    guess = np.interp(nodes, state.nodes, state.pressure)
-    return _solve_on(case, nodes, guess, state.central, paces, spacing)
+    """Solve on some `count` nodes placed as the `source` asks for, from what the last one or two grids let expect."""
+    last, paces = before[-1], settings.paces
+    spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
+    end = _expected(before, lambda grid: grid.rupture, spacing, settings.end_order)
+    nodes, spacing = grids.aligned(source.nodes, source.density, count, float(end))
+    if len(before) == 1:
+        guess = np.interp(nodes, last.nodes, last.pressure)
+        return _solve_on(case, nodes, guess, last.central, paces, spacing)
+    here = last.pressure_between(nodes)
+    further = _expected(before, lambda grid: grid.pressure_between(nodes), spacing, 2.0) - here
+    guess = here + np.clip(further, -settings.further * here, settings.further * here)
+    central = float(_expected(before, lambda grid: grid.central, spacing, 2.0))
+    outcome, found = _solve_on(case, nodes, guess, central, (paces[0]._replace(most=settings.further_steps),), spacing)
+    if outcome == Outcome.CONVERGED:
+        return outcome, found
+    outcome, again = _refined(case, before[-1:], source, count, settings)
+    return outcome, replace(again, steps=found.steps + again.steps)
+
+
+def _expected(
+    before: Sequence[GridSolution],
+    reading: Callable[[GridSolution], float | FloatArray],
+    spacing: float,
+    order: float,
+) -> FloatArray:
+    """Return what the last two grids let expect of a reading at another spacing, or what the only one has."""
+    last = np.asarray(reading(before[-1]))
+    if len(before) == 1:
+        return last
+    coarse, fine = before[-2].spacing ** order, before[-1].spacing ** order
+    share = (fine - spacing**order) / (coarse - fine)
+    return np.asarray(last + share * (last - reading(before[-2])))
 
 
 def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
@@ -318,7 +370,7 @@ def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, G
     outcome, state = _first_solution(case, settings)
     steps = state.steps
     for _ in range(settings.adaptations if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, state, state, settings.adapted_nodes, settings.paces)
+        adapted_outcome, adapted = _refined(case, (state,), state, settings.adapted_nodes, settings)
         steps += adapted.steps
         if adapted_outcome == Outcome.CONVERGED:
             state = adapted
@@ -351,38 +403,26 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     h_c/R = 2.546e-05
     """
     outcome, source, steps = _adapted_solution(case, settings)
-    failure, state = (outcome, source), source
-    solved: list[GridSolution] = []
-    ladder = list(settings.nodes) if outcome == Outcome.CONVERGED else []
-    while ladder:
-        outcome, finer = _refined(case, state, source, ladder.pop(0), settings.paces)
+    failure, found, solved = (outcome, source), None, list[GridSolution]()
+    for count in settings.nodes if outcome == Outcome.CONVERGED else ():
+        outcome, finer = _refined(case, _nearest(solved, source), source, count, settings)
         steps += finer.steps
-        if outcome != Outcome.CONVERGED:
+        if outcome == Outcome.CONVERGED:
+            solved.append(finer)
+        elif solved:
+            break
+        else:  # a grid before the first solution is too coarse for this film
             failure = outcome, finer
-            if solved:
-                break  # a grid before the first solution is too coarse for this film
-            continue
-        solved.append(finer)
-        if _error(case, solved) <= accuracy:
-            break
-        if finer.cut > settings.laid_again and finer.nodes.size > settings.adapted_nodes:
-            outcome, again = _refined(case, finer, source, finer.nodes.size, settings.paces)
-            steps += again.steps
-            if outcome == Outcome.CONVERGED:
-                solved[-1] = again
-        state, error = solved[-1], _error(case, solved)
-        if error <= accuracy:
-            break
-        if len(ladder) > 1 and len(solved) > 2 and error * (state.nodes.size / ladder[0]) ** 4 > accuracy:
-            ladder.pop(0)  # the estimate goes like the fourth power of the spacing
-    if len(solved) < 3:
-        return _no_solution(case, *failure, steps)
-    return _solution(case, solved, steps)
+        if len(solved) > 2:
+            found = _solution(case, solved, steps)
+            if found.error <= accuracy:
+                break
+    return found or _no_solution(case, *failure, steps)
 
 
-def _error(case: LineContact, solved: list[GridSolution]) -> float:
-    """Return the estimated relative error of the worse film, infinite with fewer than three grids."""
-    return _solution(case, solved, 0).error if len(solved) > 2 else np.inf
+def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[GridSolution]:
+    """Return the last two grids, from which a finer one starts, or the source as long as that is finer."""
+    return solved[-2:] if solved and solved[-1].nodes.size > source.nodes.size - 3 else [source]
 
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
@@ -390,8 +430,8 @@ def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> Line
     viscosity = min(float(log_viscosities(np.ones(1), case.liquid)[0]), SETTINGS.sharpest)
     narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
     share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
-    central = _tends_to(solved, lambda grid: grid.central_film, share)
-    minimum = _tends_to(solved, lambda grid: grid.minimum[1], share)
+    films = _tends_to(solved, lambda grid: np.array([grid.central_film, grid.minimum[1]]), share, SETTINGS.fourth)
+    central, minimum = (Limit(*(column[film] for column in films)) for film in (0, 1))
     return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
 
 

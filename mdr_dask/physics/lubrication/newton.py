@@ -275,13 +275,29 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
 
 
 @compiled
+def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
+    """Add to H what the pressures P deform; four rows at once, as their sums do not wait for one another."""
+    n = P.size
+    for i in range(0, n - 3, 4):
+        h0, h1, h2, h3 = H[i], H[i + 1], H[i + 2], H[i + 3]
+        for j in range(n):
+            p = P[j]
+            h0 += influence[i, j] * p
+            h1 += influence[i + 1, j] * p
+            h2 += influence[i + 2, j] * p
+            h3 += influence[i + 3, j] * p
+        H[i], H[i + 1], H[i + 2], H[i + 3] = h0, h1, h2, h3
+    for i in range(n - n % 4, n):
+        for j in range(n):
+            H[i] += influence[i, j] * P[j]
+
+
+@compiled
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
     """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
     for i in range(P.size):
-        total = central + 0.5 * grid.nodes[i] ** 2
-        for j in range(P.size):
-            total += grid.influence[i, j] * P[j]
-        H[i] = total
+        H[i] = central + 0.5 * grid.nodes[i] ** 2
+    _add_deformation(grid.influence, P, H)
 
 
 @kernel
@@ -289,12 +305,11 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
     share = min(1.0, clip * np.max(P) / largest) if largest > 0.0 else 1.0
+    film_step = np.full_like(H, change)
+    _add_deformation(grid.influence, step, film_step)
     for i in range(P.size):
-        film_step = change
-        for j in range(P.size):
-            film_step += grid.influence[i, j] * step[j]
-        if film_step < 0.0:
-            share = min(share, -_FILM_SHARE * H[i] / film_step)
+        if film_step[i] < 0.0:
+            share = min(share, -_FILM_SHARE * H[i] / film_step[i])
     return share
 
 

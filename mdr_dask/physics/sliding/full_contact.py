@@ -52,14 +52,16 @@ def steady_full_contact(
     [19.7392] [5.]
     """
     height, slope = nodes
-    pressure = height
+    # sums over the nodes are those over the spectrum; arms only add to the pressure of a wave
+    pressure, heaviest = height, np.max(loads, initial=0.0)
+    if not heaviest > DEEP * np.sqrt(height @ height / height.size):
+        return None
     if arms:
         wave = 2j * np.pi * np.arange(1, waves.coefficients.size + 1)
         relaxing = sum((stiffness * (1 - 1 / (1 + wave * time)) for stiffness, time in arms), np.zeros(1))
         pressure = height + series(waves.coefficients * relaxing, height.size)
-    # sums over the nodes are those over the spectrum
     elastic = pressure @ pressure / height.size
-    if not np.max(loads, initial=0.0) > DEEP * np.sqrt(elastic):
+    if not heaviest > DEEP * np.sqrt(elastic):
         return None
     lost, stretch = (pressure @ slope / height.size if arms else 0.0), slope @ slope / height.size
     with np.errstate(over="ignore", invalid="ignore"):

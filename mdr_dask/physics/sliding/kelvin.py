@@ -45,16 +45,20 @@ def blocks_of(cells: Cells) -> Blocks:
 
 
 class Barriers(NamedTuple):
-    """The depths that keep cells and blocks pressed at a Deborah number; NaN for blocks not needed yet."""
+    """The depths that keep cells and blocks pressed at a Deborah number; NaN for blocks not needed yet.
+
+    Up to those in `idle` no part of a cell is pressed.
+    """
 
     cell: FloatArray
     block: FloatArray
+    idle: FloatArray
 
 
 @kernel
 def barriers_for(cells: int) -> Barriers:
     """Return barriers of a line of which none is known."""
-    return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan))
+    return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
 
 
 class Places(NamedTuple):
@@ -74,8 +78,11 @@ def places_for(patches: int) -> Places:
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
-    """Write the depth that keeps each whole cell of a block pressed, w + deborah w' > 0, and their maximum."""
-    every, written = -np.inf, barriers.cell
+    """Write the depth that keeps each whole cell of a block pressed, w + deborah w' > 0, and their maximum.
+
+    That up to which none of a cell is pressed follows from the control points of the force, which bound it.
+    """
+    every, written, idle = -np.inf, barriers.cell, barriers.idle
     for i in range(block * BLOCK, min((block + 1) * BLOCK, written.size)):
         h0, a, b, c = cubic(height, enter, leave, i)
         first = -(h0 + deborah * a)
@@ -83,11 +90,13 @@ def write_barriers(
         highest = first if first > last else last
         # the force less the depth, p + q x + r x^2 + c x^3, may be least inside
         q, r = a + 2 * deborah * b, b + 3 * deborah * c
-        x = summit(-q, -r, -c)
+        near, far = first - q / 3, last + (q + 2 * r + 3 * c) / 3
+        x = summit(-q, -r, -c) if max(near, far) > highest else NONE
         if x < 1:
             inside = first - x * (q + x * (r + x * c))
             highest = inside if inside > highest else highest
         written[i] = highest
+        idle[i] = min(min(first, last), min(near, far))
         every = highest if highest > every else every
     barriers.block[block] = every
 

@@ -24,7 +24,7 @@ from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
 COARSEST, FINEST = 4, 256  # points for every Nyquist point that `auto` begins and ends with for a general solid
-ROUGHLY = 0.01  # accuracy that the coarsest often meets; errors fall with the third power of the points
+ROUGHLY = 0.05  # accuracy that the coarsest mostly meets; stated errors fall with the third power of the points
 CELLS = 4  # the general solver compares grids of every, every second and every fourth node
 CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
 
@@ -107,7 +107,7 @@ def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray
     left = (
         (steady.status != Outcome.CONVERGED) & np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
     )
-    finer = max(0, int(np.log2(ROUGHLY / aim.accuracy) / 3))
+    finer = max(0, int(np.ceil(np.log2(ROUGHLY / aim.accuracy) / 3)))
     first = min(COARSEST * 2**finer, FINEST) if aim.oversampling == "auto" else aim.oversampling
     turned = line.from_summit()
     straight = cache(lambda oversampling: turned.straight(-(-line.points * oversampling // CELLS) * CELLS))

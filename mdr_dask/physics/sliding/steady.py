@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, inlined, kernel, nested
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
@@ -51,7 +53,7 @@ def _next(depth: float) -> float:
     return math.ldexp(math.ldexp(mantissa, LATTICE_BITS) + 1, exponent - LATTICE_BITS)
 
 
-@inlined
+@compiled
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
     """Begin a `trail` where nothing but a depth for a load is known."""
     trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), 0.7, 0.0
@@ -118,33 +120,36 @@ def _solve(
     return depth, False
 
 
+class _Swept(NamedTuple):
+    """A line as sweeps at one Deborah number take it."""
+
+    cells: Cells
+    blocks: Blocks
+    barriers: Barriers
+
+
 @kernel
 def _states(
-    cells: Cells,
-    blocks: Blocks,
+    line: _Swept,
     cases: Cases,
     guesses: FloatArray,
     close: float,
+    first: FloatArray,
     results: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
-    """Solve the cases of one line, ordered by Deborah number and load; see `Steady` for the columns of the results.
+    """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
 
-    The search for a depth follows that of the case before, or starts from its guess where that is a number. Where the
-    tangent at a guess moves it by less than ``close``, relatively, that is taken for the answer.
+    The search for a depth follows that of the case before, that of the first one the trail given, which is then its
+    own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
+    ``close``, relatively, that is taken for the answer.
     """
-    n, (deborahs, loads) = cells.mean.size - 1, cases
-    barriers, unwritten = barriers_for(n), places_for(0)
-    sums, trail, first = np.empty(SUMS), np.zeros(4), np.zeros(4)
-    deborah = -1.0
-    _begin(first, loads[0] / n, loads[0])
+    (cells, blocks, barriers), (deborahs, loads) = line, cases
+    n = cells.mean.size - 1
+    unwritten, sums, trail, starts = places_for(0), np.empty(SUMS), np.empty(4), True
+    copy_into(trail, first)
     for k in range(loads.size):
-        starts = deborahs[k] != deborah
-        if starts:
-            deborah = deborahs[k]
-            barriers.block[:] = np.nan
-            copy_into(trail, first)
-        depth, converged = guesses[k], False
+        deborah, depth, converged = deborahs[k], guesses[k], False
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
@@ -158,6 +163,7 @@ def _states(
             continue
         if starts:
             copy_into(first, trail)
+            starts = False
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED
         results[k, 0] = sums[DRAG] + shift * sums[DRAG_RATE]
@@ -219,10 +225,26 @@ def steady_on_cells(
     loads: FloatArray,
     guesses: FloatArray | None = None,
     close: float = 0.0,
+    barriers_at: Callable[[float], Barriers] | None = None,
 ) -> Steady:
-    """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already."""
+    """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already.
+
+    Where others have use for the barriers of a Deborah number in cells, they are taken from where they are kept.
+    """
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, cases, start[good], close))
+    at = barriers_at or _unknown_barriers(cells.mean.size - 1)
+    return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, at, cases, start[good], close))
+
+
+def _unknown_barriers(cells: int) -> Callable[[float], Barriers]:
+    """Return a function that forgets the barriers of one Deborah number for those of the next."""
+    barriers = barriers_for(cells)
+
+    def forgotten(_: float) -> Barriers:
+        barriers.block.fill(np.nan)
+        return barriers
+
+    return forgotten
 
 
 def stepped_sliding(line: CubicLine, deborah: FloatArray, loads: FloatArray, contact: bool = True) -> Steady:
@@ -258,13 +280,22 @@ def _solved(
 
 
 def _swept(
-    cells: Cells, blocks: Blocks, cases: Cases, guesses: FloatArray, close: float
+    cells: Cells,
+    blocks: Blocks,
+    barriers_at: Callable[[float], Barriers],
+    cases: Cases,
+    guesses: FloatArray,
+    close: float,
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
-    in_order = Cases(cases.deborah[order], cases.loads[order])
-    _states(cells, blocks, in_order, guesses[order] + cells.top, close, ordered, ordered_status)
+    deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order] + cells.top, np.zeros(4)
+    _begin(first, loads[0] / (cells.mean.size - 1), loads[0])
+    edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
+    for some in (slice(*ends) for ends in pairwise(edges)):
+        alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
+        _states(_Swept(cells, blocks, near), alike, starts[some], close, first, ordered[some], ordered_status[some])
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= cells.top

@@ -120,9 +120,10 @@ class Cells(NamedTuple):
 @inlined
 def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i, by rising power."""
-    first, last = enter[i], leave[i]
-    rise = height[i + 1] - height[i]
-    return height[i], first, 3 * rise - 2 * first - last, first + last - 2 * rise
+    here, after = np.uintp(i), np.uintp(i + 1)  # an index with a sign would be looked at for it
+    first, last = enter[here], leave[here]
+    rise = height[after] - height[here]
+    return height[here], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
 @compiled

@@ -61,12 +61,13 @@ class Reachable(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What a search writes: patches and their sums, the places of leaving, ranges of the depth, and barriers."""
+    """What a search writes: patches and their sums, the places of leaving now and the farthest, ranges, barriers."""
 
     start: FloatArray
     end: FloatArray
     sums: FloatArray
     places: FloatArray
+    farthest: FloatArray
     spreads: FloatArray
     barriers: Barriers
 
@@ -75,15 +76,29 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    return Workspace(start, end, np.zeros(SUMS), np.empty(CANDIDATES), np.empty(WINDOWS), barriers)
+    places, farthest = np.empty((2, CANDIDATES))
+    return Workspace(start, end, np.zeros(SUMS), places, farthest, np.empty(WINDOWS), barriers)
 
 
 @inlined
-def _remember(place: float, places: FloatArray, known: int) -> int:
+def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
     """Write down where contact was left, over the last place where there is no more room; count the places."""
     known = min(known, CANDIDATES - 1)
-    places[known] = place
+    work.places[known], work.farthest[known] = place, farthest
     return known + 1
+
+
+@inlined
+def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) -> float:
+    """Return how far from where contact is left it can have reached, at the highest of depth and rate so far."""
+    i = min(int(place), int(now.track.cells))
+    h, slope, _ = height_at(now.track, i + 1.0)
+    if highest + h + now.deborah * slope <= 0:
+        return i + 1.0
+    i += 1
+    while i < int(now.track.cells) and keeps_pressed(now.track, barriers, now.deborah, i, highest):
+        i += 1
+    return i + 1.0
 
 
 @inlined
@@ -122,14 +137,14 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
     runs, floor = reachable.runs, reachable.floor
-    start, end, sums, places, spreads, barriers = work
+    start, end, sums, places, farthest, spreads, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
-    deepest = depth  # so far: elements may fly from where the line is no longer touched
+    deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
     for moment in range(history.count):
         deepest = max(deepest, history.depth[moment])
+        highest = max(highest, history.depth[moment] + history.rate[moment])
     known, found, edges, edges_drag = 0, 0, 0.0, 0.0
-    oldest, last_start = -np.inf, -np.inf
     n, finish = int(track.cells), track.cells + track.origin
     contact, begin, free_from = True, track.origin, 0.0
     guard = deborah * now.time < GUARD_CELLS
@@ -146,11 +161,15 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                highest = deepest + peak[i]
-                if highest <= min(floor[i], floor[i + 1]) or (highest < least_free and i + 1 - known_at < window):
+                top = deepest + peak[np.uintp(i)]
+                least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
+                if top <= least or (top < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
+            if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
+                i += 1
+                continue
             if contact and positive and begin <= i and i + 1 < next_free:
                 whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
                 i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1
@@ -176,11 +195,10 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, Wakes(places, known, oldest), until, w, spreads, window)
+                    known = worth_keeping(now, Wakes(places, farthest, known), until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    oldest, last_start = last_start, begin
                     if not lost:
-                        known = _remember(until, places, known)
+                        known = _remember(until, _farthest(now, until, highest, barriers), work, known)
                     contact, free_from, x = False, until, until
                     if lost:
                         break
@@ -194,7 +212,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(places, known, oldest)
+                wakes = Wakes(places, farthest, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
@@ -212,7 +230,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 if not pulls:
                     break
                 known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
-                known = _remember(probe, places, known)
+                known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
                 free_from = x = probe
         if contact and run + 1 < runs.shape[0]:
             return -1

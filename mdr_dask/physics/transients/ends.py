@@ -28,7 +28,7 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KNOWN = 4  # Deborah numbers whose barriers are kept
+KNOWN, FEWEST = 2**21, 4  # cells whose barriers are kept, 16 bytes each, at least those of some Deborah numbers
 NEWTON_STEPS = 60
 EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, and what it may miss
 
@@ -50,7 +50,7 @@ class PreparedLine(NamedTuple):
     def barriers(self, deborah: float) -> Barriers:
         """Return what is known of the barriers at a Deborah number in cells; cases in a row often share it."""
         if deborah not in self.known:
-            if len(self.known) >= KNOWN:
+            if len(self.known) >= max(KNOWN // self.cells.mean.size, FEWEST):
                 self.known.clear()
             self.known[deborah] = barriers_for(int(self.track.cells))
         return self.known[deborah]
@@ -126,7 +126,7 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
         On another grid, where the searches for the depth begin; the answer does not depend on it.
     """
     guesses = None if near is None else near.depth.ravel()
-    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses)
+    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses, 0.0, line.barriers)
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)

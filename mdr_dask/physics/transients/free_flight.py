@@ -21,9 +21,9 @@ from mdr_dask.physics.transients.patches import History, Patches, Track, height_
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
-MET = 1e-6  # of a cell: a last Newton step that is not checked, for its square is rounding
+STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
+MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
-FADED = 45.0  # relaxation times after which nothing is left of a displacement
 
 
 class Instant(NamedTuple):
@@ -41,11 +41,11 @@ class Instant(NamedTuple):
 
 
 class Wakes(NamedTuple):
-    """Places where contact is left now, ``count`` of them, and the start of the last patch that hides older wakes."""
+    """Places where contact is left now and the farthest where it was, ``count`` of them."""
 
     places: FloatArray
+    farthest: FloatArray
     count: int  # type: ignore[assignment]
-    oldest: float
 
 
 @inlined
@@ -60,14 +60,15 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     low = last_until(history.time, t, low, high)
     high = low + 1
     step = history.time[high] - history.time[low]
-    y = (t - history.time[low]) / step
+    pace = 1 / step
+    y = (t - history.time[low]) * pace
     rise = history.depth[high] - history.depth[low]
     enter, leave = history.rate[low] * step, history.rate[high] * step
     c2, c3 = 3 * rise - 2 * enter - leave, enter + leave - 2 * rise
     return (
         history.depth[low] + y * (enter + y * (c2 + y * c3)),
-        (enter + y * (2 * c2 + 3 * y * c3)) / step,
-        (2 * c2 + 6 * y * c3) / step**2,
+        (enter + y * (2 * c2 + 3 * y * c3)) * pace,
+        (2 * c2 + 6 * y * c3) * pace * pace,
     )
 
 
@@ -85,33 +86,41 @@ def _follows(history: History, t: float) -> float:
 
 
 @inlined
-def _left_from(now: Instant, x: float, place: float) -> tuple[float, float, float]:
-    """Return displacement at x of an element that left near `place`, its slope along x, and the derivative by depth.
+def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
+    """Return displacement at x of an element that left near `place` after the jump, its slope, its derivative by depth.
 
-    The leaving point of that element is where its load vanished then, not where it vanishes now; a few Newton steps
-    from there suffice, because the displacement is stationary in it.
+    An element leaves where its load vanished then, between the place where it vanishes now and the farthest one so far.
+    The displacement is stationary in that place, and few steps of Newton suffice. It is -1 where no element at x left
+    there.
     """
-    best, best_slope, best_gain = -1.0, 0.0, 0.0
-    s, deborah = place, now.deborah
-    for _ in range(4):
-        then = now.time - (x - s) / deborah
-        if then <= 0:
+    deborah, pace = now.deborah, 1 / now.deborah
+    first = x - deborah * now.time
+    low, high, s = first, min(x, farthest), max(place, first)
+    for _ in range(ROOT_STEPS):
+        if s > high:
             break
-        d, rate, change = _depth_at(now.history, then)
+        since = (x - s) * pace
+        d, rate, change = _depth_at(now.history, max(now.time - since, 0.0))
         h, slope, curvature = height_at(now.track, s)
-        fade = np.exp(-(x - s) / deborah)
         force = d + h + rate + deborah * slope
-        falls = (rate + change) / deborah + slope + deborah * curvature
-        step = -force / falls if falls < 0 else 0.0
-        near = abs(step) < NEAR
-        u = (d + h + (0.5 * force * step / deborah if near else 0.0)) * fade
-        if u > best:
-            best, best_slope = u, -(d + h + rate) * fade / deborah
-            best_gain = _follows(now.history, then) * fade
-        if near:
+        falls = (rate + change) * pace + slope + deborah * curvature
+        step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
+        if abs(step) < NEAR:
+            fade = np.exp(-since)
+            u = (d + h + 0.5 * force * step * pace) * fade
+            return u, -(d + h + rate) * fade * pace, _follows(now.history, now.time - since) * fade
+        if force > 0:
+            low = s
+        elif s > first:
+            high = s
+        else:
             break
-        s = min(max(s + min(max(step, -2.0), 2.0), 0.0), x)
-    return best, best_slope, best_gain
+        s += min(max(step, -STRIDE), STRIDE)
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        if high - low < NEAR:
+            break
+    return -1.0, 0.0, 0.0
 
 
 @inlined
@@ -133,10 +142,10 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
-        value, value_slope, value_gain = _left_from(now, x, wakes.places[k])
+        value, value_slope, value_gain = _left_from(now, x, wakes.places[k], wakes.farthest[k])
         if value > u:
             u, slope, gain = value, value_slope, value_gain
-    if now.time < FADED and x - now.deborah * now.time > wakes.oldest:
+    if now.first.depth * now.left > u:  # heights count from the highest point
         value, value_slope = left_before(now, x)
         if value > u:
             u, slope, gain = value, value_slope, 0.0
@@ -242,11 +251,9 @@ def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads:
     kept = 0
     for k in range(wakes.count):
         place = wakes.places[k]
-        if now.time * now.deborah <= x - place:
-            continue
-        u = _left_from(now, x, place)[0]
+        u = _left_from(now, x, place, wakes.farthest[k])[0]
         if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
-            wakes.places[kept] = place
+            wakes.places[kept], wakes.farthest[kept] = place, wakes.farthest[k]
             kept += 1
     return kept
 

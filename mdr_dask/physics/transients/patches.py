@@ -200,9 +200,10 @@ def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: f
 @inlined
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
     """Return whether the force is positive in all of cell i."""
-    if np.isnan(barriers.block[i // BLOCK]):
+    block = np.uintp(i) // np.uintp(BLOCK)
+    if np.isnan(barriers.block[block]):
         write_barriers(track.height, track.enter, track.leave, deborah, i // BLOCK, barriers)
-    return bool(barriers.cell[i] < lift)
+    return bool(barriers.cell[np.uintp(i)] < lift)
 
 
 @compiled

@@ -73,6 +73,8 @@ class Resolution(NamedTuple):
         How much wider the accuracy of two rougher solutions is, which tell the error.
     slowness : float
         How much more slowly than usual the error falls from them.
+    second : float
+        Share of the distance from the second of them, which counts where the first is close by chance.
     """
 
     accuracy: float
@@ -82,6 +84,7 @@ class Resolution(NamedTuple):
     order: int | None = None
     rough: tuple[float, float] = (8.0, 64.0)
     slowness: float = 1.0
+    second: float = 0.5
 
     @property
     def step(self) -> float:

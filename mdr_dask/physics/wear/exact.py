@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -27,8 +28,11 @@ from mdr_dask.physics.wear.rules import limit, limit_radius
 from mdr_dask.physics.wear.slip import FixedBorder, GrossSlip, PartialSlip, partial_slip
 from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_pressure, virgin_load, worn_image
 
-#: Accuracy above which solutions are no coarser, and how much wider steps may be at constant depth from 1e-3 on.
-COARSEST, WIDEST = 1e-2, 2.0
+#: Accuracy above which solutions are no coarser.
+COARSEST = 1e-2
+#: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
+#: solution; ``python -m benchmarks accuracy measure wear``.
+WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 4.0), (1e-2, 2.0)), 0.1, 0.25
 #: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Found = TypeVar("Found")
@@ -87,7 +91,10 @@ def exact(
         check_stick_radius(stick_radius)
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
     wanted = sorted({float(amount) for amount in amounts})
-    resolutions = {forced_contacts: forced_resolution, _fretted: fretted_resolution}
+    resolutions: dict[Solver, Callable[[float], Resolution]] = {
+        forced_contacts: forced_resolution,
+        _fretted: partial(fretted_resolution, stick_radius),
+    }
     resolution = resolutions.get(solve, Resolution)(min(accuracy, COARSEST))
     found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
@@ -96,6 +103,7 @@ def exact(
             one,
             rougher=tuple(other[amount] for other in rougher),
             slowness=resolution.slowness,
+            second=resolution.second,
             least_edge_error=least,
         )
         for amount, one in found.items()
@@ -143,13 +151,14 @@ def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) 
     return solve(ways[-1])
 
 
-def fretted_resolution(accuracy: float) -> Resolution:
+def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
     """Return the resolution for an accuracy at constant depth: the error falls as the root of that of the steps.
 
-    Steep bodies need more nodes a panel.
+    Steep bodies need more nodes a panel. A thin annulus of slip is worn off in few steps.
     """
-    order = 4 if accuracy > 5e-3 else 5 if accuracy > 5e-4 else 6
-    return Resolution(accuracy, wider=float(np.clip(WIDEST * (accuracy / 1e-3) ** 0.6, 1.0, WIDEST)), order=order)
+    order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
+    wider = np.exp(min((1.0 - stick_radius) / THIN, 1.0) * np.interp(np.log(accuracy), *np.log(WIDER).T))
+    return Resolution(accuracy, wider=float(wider), order=order, second=SECOND)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
@@ -226,15 +235,11 @@ def _slid(profile: Profile, c: float, wanted: Sequence[float], resolution: Resol
 
 
 def _slid_under_force(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
-    """Solve gross slip at constant force.
-
-    The pressure tends to a jump at the edge: short panels there, and steps no finer than the panels, or the steps
-    follow the panels' noise.
-    """
+    """Solve gross slip at constant force: the pressure tends to a jump at the edge, with short panels there."""
     panels = resolution.panels_of_a_punch(_sharpness(profile))
     virgin = GrossSlip(profile, panels)
     problem = GrossSlip(profile, panels, virgin.normal_force(virgin.start().unknowns))
-    return _slid_contacts(problem, wanted, 5.0 * resolution.step, resolution.first)
+    return _slid_contacts(problem, wanted, resolution.step, resolution.first)
 
 
 def _sharpness(profile: Profile) -> float:

@@ -33,8 +33,6 @@ class Settings(NamedTuple):
     ----------
     safety : float
         Error over the distance from rougher solutions.
-    second : float
-        Share of the distance from the second one, which counts where the first is close by chance.
     step : float
         Error of the contact radius over the way that it moves in a step, at least.
     volumes : float
@@ -46,7 +44,6 @@ class Settings(NamedTuple):
     """
 
     safety: float = 1.5
-    second: float = 0.5
     step: float = 0.15
     volumes: float = 0.14
     reach: int = 5
@@ -80,6 +77,8 @@ class Worn:
         Two rougher solutions of the same contact, which tell its error.
     slowness : float
         How much more slowly than usual the error falls from the rougher solutions to this one.
+    second : float
+        Share of the distance from the second one, which counts where the first is close by chance.
     least_edge_error : float
         Least error of the radii of scar and stick zone: rougher solutions may agree on them by chance.
     edge_step : float
@@ -101,6 +100,7 @@ class Worn:
     steps: int = 0
     rougher: tuple[Worn, ...] = ()
     slowness: float = 1.0
+    second: float = 0.5
     least_edge_error: float = 0.0
     edge_step: float = 0.0
     relative_error: float = np.nan
@@ -149,7 +149,7 @@ class Worn:
         value = self.value(output, places)
         with np.errstate(invalid="ignore"):
             gaps = [np.abs(value - one.value(output, places)) for one in self.rougher]
-        weighted = [gap * (SETTINGS.second if number else 1.0) for number, gap in enumerate(gaps)]
+        weighted = [gap * (self.second if number else 1.0) for number, gap in enumerate(gaps)]
         return np.asarray(self.slowness * np.max(weighted, axis=0))
 
     def _crowd(self, last: float) -> FloatArray:

@@ -71,3 +71,15 @@ def test_a_limit_moved_by_a_much_finer_grid_is_known_better() -> None:
         before = extrapolate(values[:3], h[:3]).value
         changed[ratio] = float(extrapolate(values, h).error / abs(before - 7))
     assert changed[2.0] < 0.4 * changed[1.41]
+
+
+@pytest.mark.parametrize("ratio", [2.0, 1.41])
+def test_whole_powers_leave_what_the_spacing_leaves_of_the_fourth(ratio: float) -> None:
+    """The same powers on finer grids: the error shrinks with what they leave, and covers it."""
+    over = []
+    for finest in (0.1, 0.05):
+        h = finest * ratio ** np.array([2.0, 1.0, 0.0])
+        found = extrapolate(7 + 0.5 * h**2 + 0.2 * h**3 + 0.3 * h**4, h, 1e-6, 3.0)
+        assert abs(found.value - 7) <= found.error
+        over.append(found.error / finest**4)
+    assert over[1] == pytest.approx(over[0], rel=0.3)

@@ -124,7 +124,7 @@ def test_flow_is_the_same_everywhere() -> None:
 
 @pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-13, 500.0), (5e-5, 1e-9, 2000.0), (2e-4, 1e-12, 2000.0)])
 def test_second_order(numbers: tuple[float, float, float]) -> None:
-    found = solve_film(line_contact(numbers, E_STAR), accuracy=1e-4)
+    found = solve_film(line_contact(numbers, E_STAR), accuracy=3e-5)
     assert found.central_film.order == pytest.approx(2.0, abs=0.15)
     assert found.minimum_film.order == pytest.approx(2.0, abs=0.2)  # the film ends at a node of every grid
 
@@ -300,6 +300,30 @@ def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = solve_film(case, accuracy=1e-4)
     monkeypatch.setattr(ehl_grid, "FLOODED", 3 * ehl_grid.FLOODED)
     assert solve_film(case, accuracy=1e-4).central_film.value == pytest.approx(usual.central_film.value, rel=1e-4)
+
+
+@pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-9, 500.0), (5e-5, 1e-10, 2000.0), (4e-4, 1e-12, 1000.0)])
+def test_positions_are_known_to_a_share_of_a_cell(numbers: tuple[float, float, float]) -> None:
+    case = line_contact(numbers, E_STAR)
+    here, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=2e-6)
+    for reading in (lambda grid: grid.rupture, lambda grid: grid.minimum[0]):
+        found, truth = here.position(reading), fine.position(reading)
+        assert abs(found.value - truth.value) <= found.error + truth.error
+
+
+@pytest.mark.parametrize("numbers", [(5e-5, 1e-10, 2000.0), (4e-4, 1e-12, 1000.0)])
+def test_two_grids_let_expect_the_next(numbers: tuple[float, float, float]) -> None:
+    """Newton's method takes two or three steps on each of them, and the film ends near a node."""
+    found = solve_film(line_contact(numbers, E_STAR), accuracy=2e-5)
+    assert found.finest.nodes.size > 300
+    assert all(grid.steps <= 3 and grid.cut < 0.1 for grid in found.grids[1:])
+
+
+def test_a_spike_that_moves_is_not_expected_where_it_was() -> None:
+    """From what two grids let expect here Newton's method finds no solution on the next; from the last one it does."""
+    found = solve_film(LineContact(5.88, 11.4), accuracy=1e-4)
+    assert found.outcome == Outcome.CONVERGED
+    assert found.error <= 1e-4
 
 
 def test_same_case_same_bytes() -> None:

@@ -49,7 +49,7 @@ def test_newtonian_traction_is_proportional_to_sliding_and_zero_in_rolling(solut
 
 def test_rolling_friction_of_a_rigid_contact_balances_the_pressure() -> None:
     """The half film times the gradient is, by parts, the pressure on half the slope of the gap."""
-    found = solve_film(LineContact(0.01, 0.0), accuracy=1e-4)
+    found = solve_film(LineContact(0.01, 0.0), accuracy=1e-5)
     small = 1e-6
     grid = found.finest
     by_pressure = -2 / np.pi * np.sqrt(8 * small / np.pi) * np.trapezoid(grid.pressure * grid.nodes / 2, grid.nodes)

@@ -6,7 +6,7 @@ from schemes import material_on_line, on_line
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding import viscoelastic
+from mdr_dask.physics.sliding import problem, viscoelastic
 from mdr_dask.physics.sliding.problem import Aim, Arms, solve
 from mdr_dask.physics.sliding.viscoelastic import ViscoelasticLadder, steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
@@ -263,11 +263,29 @@ def test_a_line_from_its_summit_has_it_on_every_grid(realisation):
     np.testing.assert_allclose(turned.heights(2**16), before, atol=np.abs(np.diff(finest)).max())
 
 
-def test_an_accuracy_solves_no_grid_twice(monkeypatch):
-    seen, whole = [], viscoelastic._solve
+@pytest.fixture
+def seen(monkeypatch):
+    """Return the cells of the grids that are solved from now on."""
+    cells, whole = [], viscoelastic._solve
     monkeypatch.setattr(
-        viscoelastic, "_solve", lambda profile, *rest: seen.append(profile.size - 1) or whole(profile, *rest)
+        viscoelastic, "_solve", lambda profile, *rest: cells.append(profile.size - 1) or whole(profile, *rest)
     )
+    return cells
+
+
+def test_an_accuracy_mostly_solves_three_grids(seen):
+    """Most cases began on half as many nodes, which stated more than the accuracy, and took a fourth."""
+    waves = Waves(0.5 * roughness.amplitudes(64, 0.7) * roughness.phase_factors(0, 1, 64), 128)
+    arms = Arms((1.0, 2.0, 4.0, 8.0, 16.0), (1.0, 0.1, 1e-2, 1e-3, 1e-4))
+    for accuracy, cells in ((0.05, 512), (0.01, 1024), (0.001, 2048)):
+        seen.clear()
+        steady, errors = solve(RoughLine(waves), arms, *np.array([[0.0], [0.9]]), Aim(("drag",), accuracy))
+        assert errors.drag[0] <= accuracy * steady.drag[0]
+        assert seen == [cells // 4, cells // 2, cells]
+
+
+def test_an_accuracy_solves_no_grid_twice(seen, monkeypatch):
+    monkeypatch.setattr(problem, "ROUGHLY", 0.001)  # begins too coarse
     waves = Waves(0.5 * roughness.amplitudes(64, 0.7) * roughness.phase_factors(0, 1, 64), 128)
     steady, errors = solve(RoughLine(waves), Arms((9.0,), (0.01,)), *np.array([[0.0], [0.6]]), Aim(("drag",), 2e-4))
     assert errors.drag[0] <= 2e-4 * steady.drag[0]

@@ -1,0 +1,84 @@
+"""Who touches after a jump, by the largest displacement of every element over all times so far, on a fine sampling."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from mdr_dask.physics.transients.contact_search import touch
+from mdr_dask.physics.transients.free_flight import Instant
+from mdr_dask.physics.transients.march import Finish, Marching, Trajectory, march_depth
+from mdr_dask.physics.transients.patches import LOAD, History
+
+SAMPLES = 12  # of a cell
+SHORT = 3.0  # samples: what is shorter cannot be judged
+
+
+class Sampled(NamedTuple):
+    """Heights and slopes of a track between its nodes, and what is left of the state before the jump at its time."""
+
+    height: np.ndarray
+    slope: np.ndarray
+    before: np.ndarray
+
+
+def sampled(marching: Marching) -> Sampled:
+    track, first, n = marching.track, marching.first, int(marching.track.cells)
+    y = np.arange(SAMPLES) / SAMPLES
+    h0, h1 = track.height[:n, None], track.height[1 : n + 1, None]
+    s0, s1 = track.enter[:n, None], track.leave[:n, None]
+    c2, c3 = 3 * (h1 - h0) - 2 * s0 - s1, s0 + s1 - 2 * (h1 - h0)
+    height, slope = (h0 + y * (s0 + y * (c2 + y * c3))).ravel(), (s0 + y * (2 * c2 + y * 3 * c3)).ravel()
+    before, step, fade = first.depth + height, 1, np.exp(-1 / SAMPLES / first.deborah)
+    while step < before.size:  # each has seen twice as far back as the one before
+        before = np.maximum(before, np.roll(before, step) * fade)
+        step, fade = 2 * step, fade**2
+    return Sampled(height, slope, np.maximum(before, 0.0))
+
+
+def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampled) -> tuple[float, float]:
+    """Return the load at a moment of a trajectory, and what samples at the edges of patches leave of it open.
+
+    The displacement of an element is the largest to which the line can have pressed it, faded since: the depth then and
+    the height then above it, with no thought of who touched what.
+    """
+    cells, deborah, time = marching.track.cells, marching.deborah, found.time[now]
+    places, travel = np.arange(line.height.size) / SAMPLES, deborah * time
+    around = np.append(places, cells), np.append(line.before, line.before[0])
+    free = np.interp((places - travel) % cells, *around) * np.exp(-time)
+    path = CubicHermiteSpline(found.time[: now + 1], found.depth[: now + 1], found.rate[: now + 1])
+    for back in range(1, int(travel * SAMPLES) + 1):
+        ago = back / SAMPLES / deborah
+        np.maximum(free, (path(time - ago) + np.roll(line.height, back)) * np.exp(-ago), out=free)
+    force = found.depth[now] + line.height + found.rate[now] + deborah * line.slope
+    touches = (found.depth[now] + line.height >= free) & (force > 0)
+    edges = np.flatnonzero(touches != np.roll(touches, -1))
+    doubt = np.maximum(np.abs(force[edges]), np.abs(np.roll(force, -1)[edges])).sum() / SAMPLES
+    return float((force * touches).sum() / SAMPLES), float(doubt)
+
+
+def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
+    """March a case of `velocity_jump`, and return how far loads of its search are from those, over the load.
+
+    What sampling leaves open counts as met; NaN where nothing could be judged.
+    """
+    for limits in relaxation.limits(relaxation.depth):
+        marching, found, work = relaxation.begun(limits, 3000)
+        aim = Finish(relaxation.depth[1], relaxation.after, 1e-9, 1e-9)
+        count, outcome = march_depth(marching, relaxation.pace, aim, found, work)
+        if outcome >= 0:
+            break
+    line, worst = sampled(marching), np.nan
+    for now in generator.permutation(np.arange(1, count))[:moments]:
+        time = found.time[now]
+        history = History(found.time, found.depth, found.rate, now + 1, 0.0)
+        instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
+        travel, patches = marching.deborah * time, touch(instant, marching.reachable, work)
+        if patches < 0 or travel > 1.2 * marching.track.cells:
+            continue
+        whole = slice(1, patches - 1)  # the first and the last are one
+        if np.min(work.end[whole] - work.start[whole], initial=travel) < SHORT / SAMPLES:
+            continue
+        load, doubt = load_by_largest(marching, found, int(now), line)
+        worst = np.fmax(worst, (abs(load - work.sums[LOAD]) - doubt) / work.sums[LOAD])
+    return float(worst)
