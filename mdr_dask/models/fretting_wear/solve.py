@@ -321,21 +321,25 @@ def _beginning(task: Task, demand: _Demand) -> float:
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
-    """Solve a task for all its (N, xi), more finely for those that miss the accuracy asked; say which still do."""
-    accuracy = _first_accuracy(task.accuracy, demand.accuracy, _beginning(task, demand))
-    left = list(range(len(wanted)))
+    """Solve a task for all its (N, xi), each more finely until it meets the accuracy asked; say which still miss it.
+
+    How finely depends on the case alone; those that want the same are solved together.
+    """
+    first = _first_accuracy(task.accuracy, demand.accuracy, _beginning(task, demand))
+    left = dict.fromkeys(range(len(wanted)), first)
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
-        contacts = _solved(task, [wanted[number] for number in left], accuracy, errors=demand.errors)
-        most = 0.0
-        for number, records in zip(left, contacts, strict=True):
+        accuracy = max(left.values())
+        alike = [number for number, at in left.items() if at == accuracy]
+        contacts = _solved(task, [wanted[number] for number in alike], accuracy, errors=demand.errors)
+        for number, records in zip(alike, contacts, strict=True):
             told, times = demand.missed(records)
             found[number] = records, told
-            most = max(most, times)
-        left = [number for number in left if found[number][1]]
-        if accuracy <= _FINEST or task.blocks:
-            break
-        accuracy = max(min(_FINER, _ENOUGH / most) * accuracy, _FINEST) if left else accuracy
+            if told and accuracy > _FINEST and not task.blocks:
+                halvings = np.ceil(np.log2(max(times / _ENOUGH, 1.0 / _FINER)))
+                left[number] = max(float(_FINER**halvings) * accuracy, _FINEST)
+            else:
+                del left[number]
     return [found[number] for number in range(len(wanted))]
 
 
