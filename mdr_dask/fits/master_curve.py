@@ -287,9 +287,9 @@ def _drawn(curve: xr.Dataset) -> FloatArray:
 def friction_of_roughness(series: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the friction that the force master curve is about, from the series of a store.
 
-    It is the coefficient of friction of the first series that varies force and velocity, averaged over realisations;
-    less
-    that of a series with the same forces and velocities and no roughness, if there is one: the bulk's own friction.
+    It is the coefficient of friction of the first rough series that varies force and velocity, averaged over
+    realisations; less that of a series with the same forces and velocities and no roughness, if there is one: the
+    bulk's own friction.
 
     Raises
     ------

@@ -61,6 +61,7 @@ def test_friction_of_a_smooth_body_is_taken_off():
     }
     (fit,) = FITS
     assert float(fit.compute(series)["power_exponent"]) == pytest.approx(EXPONENT, abs=0.02)
+    assert fit.compute(dict(reversed(series.items()))).equals(fit.compute(series))
     alone = fit.compute({"rough": series["rough"]})
     assert abs(float(alone["power_exponent"]) - EXPONENT) > 0.02
 

@@ -32,6 +32,7 @@ def test_the_line_has_rms_height_and_gradient_of_the_map(hurst):
     """1024 x 1024 points, 8 for the shortest wave, periodic: within 1 %, as the issue of accuracy asks."""
     heights, _ = surface(hurst, (1024, 1024), longest=LENGTH / 8, shortest=LENGTH / 128)
     found = spectrum_of_map(heights, hann=False)
+    assert found.independent == 1  # amplitudes of a periodic map that are independent, of each
     line, q = found.spectrum().line(LENGTH, 512), 2 * np.pi / LENGTH * np.arange(1, 513)
     assert found.rms_height == pytest.approx(heights.height.std(), rel=1e-12)
     assert np.sqrt(np.sum(line**2) / 2) == pytest.approx(heights.height.std(), rel=0.01)
