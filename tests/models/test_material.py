@@ -234,3 +234,10 @@ def test_a_study_is_told_how_its_frequencies_meet_the_data(tmp_path):
     assert "extrapolated" in cold
     assert "decades above" in warm
     assert "at 56.85 degC" in warm
+
+
+def test_a_temperature_beyond_those_measured_is_told(tmp_path):
+    file = shifted_table(tmp_path / "dma.csv", (280.0, 300.0, 330.0))
+    at = {t: material(dma_table={"file": file}, temperature=t, wlf=LAW).notes() for t in (280.0, 330.0, 350.0)}
+    told = f"table {file}: measured at 6.85 degC to 56.85 degC; 76.85 degC is reached by shift factors alone"
+    assert [told in notes for notes in at.values()] == [False, False, True]

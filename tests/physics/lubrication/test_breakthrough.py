@@ -7,7 +7,7 @@ from scipy.special import ndtr
 from mdr_dask.physics.lubrication import breakthrough as bt
 from mdr_dask.physics.lubrication import film_formulas as film
 from mdr_dask.physics.lubrication import oil
-from mdr_dask.physics.lubrication.clusters import find_clusters
+from mdr_dask.physics.lubrication.clusters import find_clusters, total
 from mdr_dask.physics.surfaces.splines import through_heights
 
 E_STAR = 210e9 / (2 * (1 - 0.3**2))
@@ -51,6 +51,14 @@ def test_clusters_come_in_the_order_of_their_starts_and_one_across_the_seam_ends
     np.testing.assert_allclose(found.start, [15, 35, 55], atol=1e-4)
     np.testing.assert_allclose(found.end, [25, 45, 65], atol=1e-4)
     np.testing.assert_allclose(found.total * step, 2 / 3, rtol=1e-3)
+
+
+def test_the_integral_of_a_closed_line_does_not_depend_on_where_it_is_closed():
+    """Ends before, on and after the seam, and in the first cell beyond it."""
+    line = np.random.default_rng(3).normal(size=40)
+    for end in (38.5, 39.0, 39.6, 40.0, 40.3, 41.0, 42.7):
+        turned = total(find_clusters(through_heights(np.roll(line, -20)), 0.0, 1.0, 1.0).overlap, 14.5, end - 20)
+        assert total(find_clusters(through_heights(line), 0.0, 1.0, 1.0).overlap, 34.5, end) == pytest.approx(turned)
 
 
 def test_peaks_between_the_points_are_seen():
