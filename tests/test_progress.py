@@ -35,6 +35,13 @@ def test_compiling_is_no_pace(count):
     assert after_blocks(count).seconds_left == pytest.approx(left, rel=0.1)
 
 
+def test_time_left_is_told_from_the_first_block_on_however_short():
+    counts = tuple(int(state == Status.DONE) for state in Status)
+    progress = Progress(total=10, estimated=1e-3).after(Outcome(counts, 1, 1e-4, 2e-4, 0.0, 0.0), 2e-4)
+    assert progress.seconds_left == pytest.approx(9 * 2e-4)
+    assert Progress(total=10, estimated=1e-3).seconds_left is None
+
+
 def test_a_line_tells_share_time_and_time_left_first(monkeypatch):
     assert describe(None, 7.3) == "preparing, 7 s"
     progress = Progress(total=1000)
