@@ -39,7 +39,7 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     more = np.minimum(growth[growth > 1], MOST_GROWTH)
     if not more.size:
         return count
-    times = max(float(np.median(more)), LEAST_GROWTH)
+    times = max(float(np.quantile(more, 0.5, method="lower")), LEAST_GROWTH)
     return min(replication.at_least * math.ceil(times * count / replication.at_least), replication.at_most)
 
 

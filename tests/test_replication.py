@@ -13,7 +13,7 @@ from mdr_dask.replication import growth_needed, mean_and_error, next_round
     [
         (10, 500, 40, [1.0, 0.2], 40),  # nobody needs more
         (10, 500, 40, [1.01, 0.2], 50),  # a quarter more at least
-        (10, 500, 40, [2.0, 3.0, 1.5, 0.5], 80),  # enough for half of those that need more
+        (10, 500, 40, [3.0, 2.0, 1.5, 0.5], 80),  # enough for half of those that need more
         (10, 500, 40, [2.01, 2.01], 90),  # whole multiples of the first round
         (10, 500, 40, [np.inf, 9.0], 160),  # four times at most: what few results say of themselves is uncertain
         (10, 90, 40, [np.inf, 9.0], 90),

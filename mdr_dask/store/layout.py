@@ -289,4 +289,4 @@ def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> byte
         "attributes": attrs,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": members},
     }
-    return json.dumps(held, indent=1).encode()
+    return json.dumps(held).encode()
