@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import platform
 from collections.abc import Iterable, Mapping
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from zarr.abc.store import Store
 from zarr.core.buffer import Buffer
+from zarr.core.sync import sync
 from zarr.storage import WrapperStore
 
 from mdr_dask.errors import StoreError
@@ -77,12 +79,15 @@ def write_block(
         What it has to tell besides its numbers.
     """
     arrays = _arrays(place.url, place.series, place.layout)
-    chunks: dict[str, tuple[str, bytes]] = {}
-    for name, array in {**values, "status": status}.items():
-        with guarded(place.url, f"encoding {name}"):
-            arrays[name][place.region] = array
-        key = chunk_name(arrays[name], place.index)
-        chunks[name] = key, arrays[name].store.taken(key)
+    keys = {name: chunk_name(arrays[name], place.index) for name in (*values, "status")}
+
+    async def encode() -> None:
+        given = {**values, "status": status}.items()
+        await asyncio.gather(*[arrays[name].async_array.setitem(place.region, array) for name, array in given])
+
+    with guarded(place.url, f"encoding block {place.index}"):
+        sync(encode())
+    chunks = {name: (key, arrays[name].store.taken(key)) for name, key in keys.items()}
     told = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
     with holding(place.url, place.hold):

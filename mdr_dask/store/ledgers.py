@@ -83,6 +83,8 @@ class Ledger:
         """Return the array that the metadata of its group tell of; its contents are decoded as chunks of one array."""
         status = held["consolidated_metadata"]["metadata"]["status"]
         shape, chunk = status["shape"], status["chunk_grid"]["configuration"]["chunk_shape"]
+        if self.different == (None,):
+            return np.full(shape, Status.MISSING, dtype=np.int8)
         buffer = default_buffer_prototype().buffer
         below = "/0" * (len(chunk) - 1)
         files = {f"c/{i}{below}": buffer.from_bytes(one) for i, one in enumerate(self.different) if one is not None}
