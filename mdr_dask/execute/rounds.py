@@ -34,9 +34,10 @@ PAUSE = 4.0
 
 @dataclass(frozen=True)
 class _Job:
-    """What is to be run, and who is told."""
+    """What is to be run, and who is told; `seen` is the store before the run, by its `layout_mark`, and its shape."""
 
     stage: Stage
+    seen: tuple[str | None, tuple[Template, ...], Places]
     url: str
     hold: Hold
     resources: Resources
@@ -110,10 +111,11 @@ def run(
         from mdr_dask.fits.answers import require_known
 
         require_known(campaign)
-    stored_layout(Stage.first(campaign), url)
+    stage = Stage.first(campaign)
+    seen = store.layout_mark(url), *stored_layout(stage, url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
-        job = _Job(Stage.first(campaign), url, hold, resources, part, retry_failed, report, tell)
+        job = _Job(stage, seen, url, hold, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
             progress = _run_stages(job, execute)
         _settle(job, progress, sealed)
@@ -254,8 +256,7 @@ def _behind(job: _Job, count: int) -> _Round:
 def _lay_out(job: _Job, last: _Round | None) -> _Round:
     """Lay the next round out, if any case takes part in it, while no other part does."""
     with store.entrance(job.url):
-        alone = last if not job.part else None  # other parts may have changed the store
-        layout, places = (alone.layout, alone.places) if alone else stored_layout(job.stage, job.url)
+        layout, places = _layout_before(job, last)
         asked = cases_of(job.stage, layout, places, job.stage.new)
         before, count = 0, job.stage.campaign.replication.at_least
         needed = asked
@@ -274,6 +275,16 @@ def _lay_out(job: _Job, last: _Round | None) -> _Round:
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
     return _Round(layout, places, asked, needed, (before, count), taken)
+
+
+def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...], Places]:
+    """Return the shape of the store, and where the cases of a stage lie in it."""
+    if last and not job.part:  # other parts may have changed the store
+        return last.layout, last.places
+    mark, layout, places = job.seen
+    if not job.stage.is_adaptive and store.layout_mark(job.url) == mark:
+        return layout, places
+    return stored_layout(job.stage, job.url)
 
 
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:

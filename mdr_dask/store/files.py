@@ -95,10 +95,15 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
     """Return a JSON document, or None if there is none of that name."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
-        try:
-            return None if content is None else json.loads(content)
-        except RecursionError:
-            raise ValueError("nested too deep") from None
+        return None if content is None else parsed(content)
+
+
+def parsed(content: bytes) -> Any:
+    """Return what a JSON document says; ValueError says why it is none."""
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
