@@ -316,9 +316,7 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
     goal = _block_seconds(template, chunks)
     for dim in reversed(whole):
-        while chunks[dim] > 1 and (
-            math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)
-        ):
+        while chunks[dim] > 1 and (math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)):
             chunks[dim] = math.ceil(chunks[dim] / 2)
 
     def room() -> int:

@@ -18,8 +18,6 @@ LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 GROWTH = 1.5
 #: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
 FEWEST = 10
-#: From so many on, the scatter is known well enough to tell that a standard error is below this part of the tolerance.
-FEW, CLEARLY = 6, 0.5
 #: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
 NEGLIGIBLE = 1e-3
 
@@ -76,7 +74,7 @@ def growth_needed(
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
         enough = count * _ratio(error, allowed) ** 2
-        ways = [np.maximum(FEWEST, enough), np.maximum(FEW, enough / CLEARLY**2), enough / NEGLIGIBLE**2]
+        ways = [np.maximum(FEWEST, enough), enough / NEGLIGIBLE**2]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
             ways.append(np.maximum(enough, count * _ratio(within, allowed) ** 2))

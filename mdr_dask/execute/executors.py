@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
+
 from mdr_dask.execute.events import Settle, Tell, of_block
 from mdr_dask.execute.resources import Resources
 from mdr_dask.task import Outcome, Work, run_block

@@ -210,7 +210,7 @@ def _run_rounds(
     Returns the last round; None if this part leaves while others are not done with it.
     """
     replication = job.stage.campaign.replication
-    while current is None or replication.goes_on and current.realisations[1] < replication.at_most:
+    while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
         further = _lay_out(job, current)
         if not any(mask.any() for mask in further.needed):
             break
@@ -264,7 +264,9 @@ def _lay_out(job: _Job, last: _Round | None) -> _Round:
             before = last.realisations[1]
             growth = _growth(job, layout, places, last)
             needed = [each > 1 for each in growth]
-            count = next_round(job.stage.campaign.replication, before, np.concatenate([each.ravel() for each in growth]))
+            count = next_round(
+                job.stage.campaign.replication, before, np.concatenate([each.ravel() for each in growth])
+            )
         if any(mask.any() for mask in needed):
             job.tell(Event("laying out", {"realisations": count}))
             layout = _grow(layout, count)

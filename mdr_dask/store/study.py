@@ -38,7 +38,7 @@ def document(url: str, series: str = "") -> Mapping[str, Any] | None:
 
 
 @lru_cache(maxsize=16)
-def _looked_through(content: bytes) -> tuple[Any, str | None]:
+def _looked_through(content: bytes) -> tuple[dict[str, Any], str | None]:
     """Return the metadata of a group, and the first thing that is wrong with them; a run reads them many times."""
     found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
