@@ -34,6 +34,10 @@ def test_what_is_needed_follows_from_the_standard_error():
         assert growth * 20 == pytest.approx(needed)
 
 
+def needs_more(*given):
+    return growth_needed(*given) > 1
+
+
 def test_only_results_that_are_done_count():
     values = np.array([[1.0, 2.0, np.nan, 3.0]])
     mean, error = mean_and_error(values, np.array([[True, True, False, True]]))
@@ -52,23 +56,10 @@ def test_few_results_are_enough_only_where_they_hardly_scatter():
     scatter = np.array([0.0, 1e-6, 1e-3, 1e-3])[:, None]
     values = {"y": 1 + scatter * generator.standard_normal((4, 10))}
     status = np.full((4, 10), Status.DONE, dtype=np.int8)
-    status[2, 5:] = Status.FAILED
+    status[2, 0] = Status.FAILED
     until = {"y": Tolerance(relative=0.01)}
     assert needs_more({"y": values["y"][:, :3]}, status[:, :3], until).tolist() == [False, False, True, True]
     assert needs_more(values, status, until).tolist() == [False, False, True, False]
-
-
-def test_from_six_on_less_than_half_of_the_tolerance_is_enough():
-    """A scatter of 0.1 times the root of six gives a standard error of 0.1."""
-    values = {"y": 1.0 + 0.1 * np.sqrt(5.0) * np.array([[1.0, -1.0, 1.0, -1.0, 1.0, -1.0]])}
-    status = np.full((1, 6), Status.DONE, dtype=np.int8)
-    for asked, growth in ((0.201, 1.0), (0.19, (0.2 / 0.19) ** 2), (0.12, 10 / 6), (0.05, 4.0)):
-        assert growth_needed(values, status, {"y": Tolerance(absolute=asked)}) == pytest.approx(growth)
-    assert growth_needed({"y": values["y"][:, :5]}, status[:, :5], {"y": Tolerance(absolute=0.5)}) > 1
-
-
-def needs_more(*given):
-    return growth_needed(*given) > 1
 
 
 CAMPAIGNS = 4000
@@ -128,7 +119,7 @@ def test_the_scatter_within_realisations_is_of_the_mean():
     """The standard error of n realisations is that of one over the root of n."""
     status = np.full((2, 9), Status.DONE, dtype=np.int8)
     values = {"y": np.ones((2, 9))}
-    values["y"][:, 0] += 0.06  # scatters by 0.0067, so that less than ten would not do
+    values["y"][:, 0] += 0.009  # scatters, so that it does not count as all the same
     for asked, more in ((0.0101, [False, False]), (0.0099, [True, False])):
         scatter = {"y": np.array([[0.03] * 9, [0.029] * 9])}
         assert needs_more(values, status, {"y": Tolerance(relative=asked)}, scatter).tolist() == more
