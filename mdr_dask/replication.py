@@ -73,20 +73,20 @@ def growth_needed(
     for name, tolerance in until.items():
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
-        enough = count * _ratio(error, allowed) ** 2
-        ways = [np.maximum(FEWEST, enough), enough / NEGLIGIBLE**2]
+        enough = count * _times(error, allowed)
+        ways = [np.maximum(FEWEST, enough), count * _times(error, NEGLIGIBLE * allowed)]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
-            ways.append(np.maximum(enough, count * _ratio(within, allowed) ** 2))
+            ways.append(np.maximum(enough, count * _times(within, allowed)))
         needed = np.maximum(needed, np.minimum.reduce(ways))
     return np.asarray(np.where(done.any(axis=-1), needed / count, 0.0))
 
 
-def _ratio(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return errors over what is allowed, none where there is none, and infinite where it is not known."""
-    found = np.where(error > 0, error, 0.0)
-    with np.errstate(divide="ignore"):
-        found = np.divide(found, allowed, out=np.zeros(found.shape), where=found > 0)
+def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how many times as many results bring an error to what is allowed; infinite where it is not known."""
+    known = np.where(error > 0, error, 0.0)
+    with np.errstate(divide="ignore", over="ignore"):
+        found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
     return np.where(np.isnan(error), np.inf, found)
 
 

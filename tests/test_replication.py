@@ -29,7 +29,7 @@ def test_what_is_needed_follows_from_the_standard_error():
     """With a scatter of 0.3 a mean to 0.1 needs nine results, but ten to know the scatter; to 0.05 it needs 36."""
     values = {"y": 1.0 + 0.3 * np.resize([1.0, -1.0], 20)[None] * np.sqrt(19 / 20)}
     status = np.full((1, 20), Status.DONE, dtype=np.int8)
-    for asked, needed in ((0.1, 10), (0.05, 36), (0.0, np.inf)):
+    for asked, needed in ((0.1, 10), (0.05, 36), (1e-200, np.inf), (0.0, np.inf)):
         growth = growth_needed(values, status, {"y": Tolerance(absolute=asked)})
         assert growth * 20 == pytest.approx(needed)
 
