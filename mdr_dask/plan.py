@@ -179,11 +179,25 @@ class Template:
 
     def sample(self, chunks: Mapping[str, int], position: float) -> Block[Any]:
         """Return a block of the given lengths at a relative position (0 first, 1 last), for estimates."""
-        region = {}
-        for dim, size in self.sizes.items():
-            start = round(position * (size - chunks[dim]))
-            region[dim] = slice(start, start + chunks[dim])
-        return self._block(region)
+        starts = self._starts(chunks, position)
+        return self._block({dim: slice(start, start + chunks[dim]) for dim, start in starts.items()})
+
+    def _starts(self, chunks: Mapping[str, int], position: float) -> dict[str, int]:
+        return {dim: round(position * (size - chunks[dim])) for dim, size in self.sizes.items()}
+
+    def mean_seconds(self, chunks: Mapping[str, int]) -> float:
+        """Return the model's estimate of blocks of the given lengths, first, middle and last; equal ones are one."""
+        known, model, found = self._means, models.load(self.campaign.model), []
+        for position in (0.0, 0.5, 1.0):
+            key = tuple(self._starts(chunks, position).values()), tuple(chunks.values())
+            if key not in known:
+                known[key] = model.seconds(self.sample(chunks, position))
+            found.append(known[key])
+        return float(np.mean(found))
+
+    @cached_property
+    def _means(self) -> dict[tuple[BlockIndex, BlockIndex], float]:
+        return {}
 
 
 def _as_array(axis: Axis) -> NDArray[Any]:
@@ -300,15 +314,13 @@ def _choose_chunks(template: Template, model: Model[Any]) -> dict[str, int]:
     whole = _whole_dims(template, model)
     chunks = {dim: size if dim in whole else 1 for dim, size in template.sizes.items()}
     limit = max(1, CHUNK_BYTES // _bytes_per_result(template))
-    goal = _block_seconds(template, model, chunks)
+    goal = _block_seconds(template, chunks)
     for dim in reversed(whole):
-        while chunks[dim] > 1 and (
-            math.prod(chunks.values()) > limit or _is_cut(template, model, chunks, dim, 4 * goal)
-        ):
+        while chunks[dim] > 1 and (math.prod(chunks.values()) > limit or _is_cut(template, chunks, dim, 4 * goal)):
             chunks[dim] = math.ceil(chunks[dim] / 2)
 
     def room() -> int:
-        return int(min(goal / max(_mean_seconds(template, model, chunks), 1e-9), limit / math.prod(chunks.values())))
+        return int(min(goal / max(template.mean_seconds(chunks), 1e-9), limit / math.prod(chunks.values())))
 
     for dim in ("realisation", *reversed([dim for dim in template.dims[:-1] if dim not in whole])):
         chunks[dim] = _part(template, dim, max(1, min(template.sizes[dim], room())))
@@ -327,22 +339,22 @@ def _whole_dims(template: Template, model: Model[Any]) -> list[str]:
     return list(dict.fromkeys(dims))
 
 
-def _is_cut(template: Template, model: Model[Any], chunks: Mapping[str, int], dim: str, most: float) -> bool:
+def _is_cut(template: Template, chunks: Mapping[str, int], dim: str, most: float) -> bool:
     """Return whether blocks of more than `most` seconds are halved along a dimension.
 
     Not where the halves would repeat much of each other's work, unless a block lasts very long.
     """
-    now = _mean_seconds(template, model, chunks)
+    now = template.mean_seconds(chunks)
     if now <= most or now > SHARED_SECONDS:
         return now > most
     half = math.ceil(chunks[dim] / 2)
-    growth = _mean_seconds(template, model, {**chunks, dim: half}) / now * chunks[dim] / half
+    growth = template.mean_seconds({**chunks, dim: half}) / now * chunks[dim] / half
     return growth < REPEATED_WORK
 
 
-def _block_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
+def _block_seconds(template: Template, chunks: Mapping[str, int]) -> float:
     parts = math.prod(template.sizes.values()) / math.prod(chunks.values())
-    total = parts * _mean_seconds(template, model, chunks)
+    total = parts * template.mean_seconds(chunks)
     return min(BLOCK_SECONDS, max(LEAST_SECONDS, total / FEW_BLOCKS))
 
 
@@ -365,10 +377,6 @@ def _part(template: Template, dim: str, most: int) -> int:
 
 def _bytes_per_result(template: Template) -> int:
     return 8 * max((math.prod(template.extra_shape(output)) for output in template.outputs), default=1)
-
-
-def _mean_seconds(template: Template, model: Model[Any], chunks: Mapping[str, int]) -> float:
-    return float(np.mean([model.seconds(template.sample(chunks, position)) for position in (0.0, 0.5, 1.0)]))
 
 
 def estimate(campaign: Campaign) -> Estimate:

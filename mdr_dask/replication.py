@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,31 +11,43 @@ from numpy.typing import NDArray
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Status
 
-#: Each round adds about this share of the realisations there are.
-GROWTH = 0.5
+#: A round goes to the number that is enough for half of its cases by what is known, within these times the last one:
+#: ``python -m benchmarks friction rounds``.
+LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
+#: Where nobody knows how many are needed, for a fitted constant.
+GROWTH = 1.5
 #: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
 FEWEST = 10
 #: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
 NEGLIGIBLE = 1e-3
 
 
-def rounds(replication: Replication) -> Iterator[int]:
-    """Yield the number of realisations after each round: multiples of ``at_least``, the last one ``at_most``."""
-    count = replication.at_least
-    yield count
-    while replication.goes_on and count < replication.at_most:
-        count += replication.at_least * math.ceil(GROWTH * count / replication.at_least)
-        count = min(count, replication.at_most)
-        yield count
+def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
+    """Return the number of realisations after the next round, a multiple of ``at_least`` or ``at_most``.
+
+    Parameters
+    ----------
+    replication : Replication
+        What the campaign says.
+    count : int
+        Number of realisations so far.
+    growth : float array, shape (cases,)
+        How many times as many each case needs; those of at most 1 take no part.
+    """
+    more = np.minimum(growth[growth > 1], MOST_GROWTH)
+    if not more.size:
+        return count
+    times = max(float(np.quantile(more, 0.5, method="lower")), LEAST_GROWTH)
+    return min(replication.at_least * math.ceil(times * count / replication.at_least), replication.at_most)
 
 
-def needs_more(
+def growth_needed(
     values: Mapping[str, NDArray[np.float64]],
     status: NDArray[np.int8],
     until: Mapping[str, Tolerance],
     scatter: Mapping[str, NDArray[np.float64]] | None = None,
-) -> NDArray[np.bool_]:
-    """Say which cases need another round.
+) -> NDArray[np.float64]:
+    """Say how many times as many results each case needs as it has.
 
     Parameters
     ----------
@@ -50,21 +62,32 @@ def needs_more(
 
     Returns
     -------
-    bool array, shape (...)
-        True where the standard error of some output is above its tolerance or not known well yet: from fewer than
-        `FEWEST` it counts only with what they know of themselves. A case that never succeeds is not tried for ever.
+    float array, shape (...)
+        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, a part
+        of it with fewer, or each result knows its own scatter and that meets it, too. A case that never succeeds is
+        not tried for ever.
     """
     done = status == Status.DONE
-    count = done.sum(axis=-1)
-    wide = np.zeros(count.shape, dtype=bool)
+    count = np.maximum(done.sum(axis=-1), 1)
+    needed = np.zeros(count.shape)
     for name, tolerance in until.items():
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
-        known = count >= FEWEST
+        enough = count * _times(error, allowed)
+        ways = [np.maximum(FEWEST, enough), count * _times(error, NEGLIGIBLE * allowed)]
         if scatter and name in scatter:
-            known |= _error_from_within(scatter[name], done) <= allowed
-        wide |= ~(error <= np.where(known, 1.0, NEGLIGIBLE) * allowed)
-    return np.asarray(wide & (count > 0))
+            within = _error_from_within(scatter[name], done)
+            ways.append(np.maximum(enough, count * _times(within, allowed)))
+        needed = np.maximum(needed, np.minimum.reduce(ways))
+    return np.asarray(np.where(done.any(axis=-1), needed / count, 0.0))
+
+
+def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how many times as many results bring an error to what is allowed; infinite where it is not known."""
+    known = np.where(error > 0, error, 0.0)
+    with np.errstate(divide="ignore", over="ignore"):
+        found = np.divide(known, allowed, out=np.zeros(known.shape), where=known > 0) ** 2
+    return np.where(np.isnan(error), np.inf, found)
 
 
 def _error_from_within(scatter: NDArray[np.float64], done: NDArray[np.bool_]) -> NDArray[np.float64]:

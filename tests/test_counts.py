@@ -16,7 +16,7 @@ from planted import SLIDING, make
 
 from mdr_dask import store
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.execute import Resources, run
+from mdr_dask.execute import Resources, run, stages
 from mdr_dask.models import load
 from mdr_dask.models.base import Block
 from mdr_dask.physics.sliding import accuracy, kelvin, steady
@@ -24,7 +24,7 @@ from mdr_dask.physics.surfaces import roughness, waves
 from mdr_dask.physics.surfaces.cubic_line import cut, periodic_line
 from mdr_dask.physics.transients import ends
 from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
-from mdr_dask.store import files
+from mdr_dask.store import files, study
 
 HEAVY = {"dask", "distributed", "matplotlib", "numba", "pandas", "pint", "scipy", "xarray", "zarr"}
 STORE = HEAVY - {"pandas", "xarray", "zarr"}  # what a reader of stores has no need of
@@ -126,6 +126,20 @@ def test_a_round_writes_what_changes_and_reads_no_block(toy, url, monkeypatch):
     coordinates = {name for name, count in layout.items() if name.endswith("/zarr.json") and count > 1}
     assert coordinates == {"height/zarr.json", "status/zarr.json", "realisation/zarr.json"}
     assert Counter(path.relative_to(url).parts[0] for path in written if "/c/" in str(path))["position"] == 1
+
+
+def test_a_run_looks_through_metadata_once_for_each_shape_and_lays_out_once(toy, url, monkeypatch):
+    """Two rounds, two shapes; the first is known from looking whether the campaign fits."""
+    looked, laid_out = [], []
+    whole, templates = study.faults, stages.templates
+    monkeypatch.setattr(study, "faults", lambda found: looked.append(found) or whole(found))
+    monkeypatch.setattr(stages, "templates", lambda *given: laid_out.append(given) or templates(*given))
+    study._looked_through.cache_clear()
+    tolerance = {"height": Tolerance(absolute=1.0)}
+    campaign = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 20, tolerance))
+    assert run(campaign, url, Resources(threads=1), lambda _: None).blocks == 2
+    assert len(looked) == 2
+    assert len(laid_out) == 1
 
 
 def test_rounds_of_a_cheap_study_go_on_in_one_block(toy, url, tmp_path):

@@ -11,7 +11,7 @@ import xarray as xr
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.errors import StoreBusyError, StoreError
-from mdr_dask.execute import Progress, Resources
+from mdr_dask.execute import Part, Progress, Resources
 from mdr_dask.models.base import Status
 from mdr_dask.store import layout
 
@@ -241,6 +241,36 @@ def test_rounds_go_on_for_the_cases_that_need_them(toy, url):
     run(fixed, url)
     run(fixed, url + "2")
     np.testing.assert_array_equal(values(url)[..., : done.max().item()], values(url + "2"))
+
+
+@pytest.mark.parametrize("blocks", [{}, {"realisation": 5, "noise": 1}])
+def test_rounds_have_the_same_bytes_however_often_they_stop_and_whoever_works(toy, tmp_path, blocks):
+    """The number of realisations of a round follows from the rounds before alone."""
+    axes = toy.axis("position", [1.0, 2.0]), toy.axis("noise", [0.01, 0.05, 0.2])
+    tolerance = {"height": Tolerance(relative=0.01)}
+    campaign = replace(toy.campaign(*axes, realisations=Replication(10, 400, tolerance)), blocks=blocks)
+    whole, broken, parts = (str(tmp_path / name) for name in ("a.zarr", "b.zarr", "c.zarr"))
+    run(campaign, whole)
+    stopped = 0
+    while True:
+        told = iter(range(1))
+
+        def stop(progress, left=told):
+            if progress.blocks and next(left, None) is None:
+                raise KeyboardInterrupt
+
+        try:
+            execute.run(campaign, broken, Resources(threads=1), stop)
+            break
+        except KeyboardInterrupt:
+            stopped += 1
+    for _ in range(8):
+        for number in (1, 2):
+            run(campaign, parts, part=Part(number, 2))
+    run(campaign, parts)
+    assert stopped > 1
+    assert digests(whole) == digests(broken) == digests(parts)
+    assert run(campaign, whole).done == 0
 
 
 def test_a_tighter_tolerance_goes_on_where_the_wider_one_stopped(toy, tmp_path):

@@ -88,6 +88,19 @@ def test_whole_axes_stay_whole_until_a_block_is_far_too_long(toy, costs):
     assert template.chunks["slope"] <= 4
 
 
+def test_blocks_that_are_alike_are_estimated_once(toy, costs):
+    """Laying out asks the model for the time of each different block, and of no block twice."""
+    asked = []
+
+    def seconds(block):
+        asked.append((block.realisations, *(tuple(column.tolist()) for column in block.columns.values())))
+        return SLOW_CASE * block.cases * len(block.realisations)
+
+    costs(SLOW_CASE, seconds=seconds, whole=("position",))
+    plan.templates(study(toy, (9, 7), 12), 12)
+    assert len(asked) == len(set(asked)) > 3
+
+
 def test_rounds_fill_whole_blocks(toy, costs):
     costs(SLOW_CASE)
     until = {"height": Tolerance(relative=0.01)}

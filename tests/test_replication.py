@@ -5,21 +5,37 @@ import pytest
 
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Status
-from mdr_dask.replication import mean_and_error, needs_more, rounds
+from mdr_dask.replication import growth_needed, mean_and_error, next_round
 
 
 @pytest.mark.parametrize(
-    ("replication", "expected"),
+    ("at_least", "at_most", "count", "growth", "expected"),
     [
-        (Replication(20, 20, {}), [20]),
-        (Replication(20, 100, {}), [20]),
-        (Replication(20, 100, {"y": Tolerance(0.01)}), [20, 40, 60, 100]),
-        (Replication(1, 4, {"y": Tolerance(0.01)}), [1, 2, 3, 4]),
+        (10, 500, 40, [1.0, 0.2], 40),  # nobody needs more
+        (10, 500, 40, [1.01, 0.2], 50),  # a quarter more at least
+        (10, 500, 40, [3.0, 2.0, 1.5, 0.5], 80),  # enough for half of those that need more
+        (10, 500, 40, [2.01, 2.01], 90),  # whole multiples of the first round
+        (10, 500, 40, [np.inf, 9.0], 160),  # four times at most: what few results say of themselves is uncertain
+        (10, 90, 40, [np.inf, 9.0], 90),
+        (1, 4, 1, [np.inf], 4),
     ],
 )
-def test_rounds(replication, expected):
-    found = list(rounds(replication))
-    assert found == expected
+def test_the_next_round_goes_where_half_of_the_cases_have_enough(at_least, at_most, count, growth, expected):
+    plan = Replication(at_least, at_most, {"y": Tolerance(0.01)})
+    assert next_round(plan, count, np.array(growth)) == expected
+
+
+def test_what_is_needed_follows_from_the_standard_error():
+    """With a scatter of 0.3 a mean to 0.1 needs nine results, but ten to know the scatter; to 0.05 it needs 36."""
+    values = {"y": 1.0 + 0.3 * np.resize([1.0, -1.0], 20)[None] * np.sqrt(19 / 20)}
+    status = np.full((1, 20), Status.DONE, dtype=np.int8)
+    for asked, needed in ((0.1, 10), (0.05, 36), (1e-200, np.inf), (0.0, np.inf)):
+        growth = growth_needed(values, status, {"y": Tolerance(absolute=asked)})
+        assert growth * 20 == pytest.approx(needed)
+
+
+def needs_more(*given):
+    return growth_needed(*given) > 1
 
 
 def test_only_results_that_are_done_count():
@@ -55,12 +71,17 @@ def coverage(at_least, tolerance, values):
 
     most = values.shape[1]
     plan = Replication(at_least, most, {"y": Tolerance(relative=tolerance)})
-    used = np.full(len(values), most)
-    running = np.arange(len(values))
-    for count in rounds(plan):
-        status = np.full((running.size, count), Status.DONE, dtype=np.int8)
-        used[running] = count
-        running = running[needs_more({"y": values[running, :count]}, status, plan.until)]
+    used = np.full(len(values), at_least)
+    while True:
+        further = used.copy()
+        for count in np.unique(used[used < most]):
+            some = np.flatnonzero(used == count)
+            status = np.full((some.size, count), Status.DONE, dtype=np.int8)
+            growth = growth_needed({"y": values[some, :count]}, status, plan.until)
+            further[some] = [next_round(plan, int(count), each) for each in growth[:, None]]
+        if (further == used).all():
+            break
+        used = further
     mean, error = mean_and_error(values, np.arange(most) < used[:, None])
     assert (error[used < most] <= tolerance * mean[used < most]).all()
     return np.mean(np.abs(mean - 1.0) <= t.ppf(0.975, used - 1) * error)

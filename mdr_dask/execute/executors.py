@@ -9,14 +9,10 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING
 
 from mdr_dask.execute.events import Settle, Tell, of_block
 from mdr_dask.execute.resources import Resources
 from mdr_dask.task import Outcome, Work, run_block
-
-if TYPE_CHECKING:
-    from dask.delayed import Delayed
 
 #: Blocks handed to the threads at a time: the graph never grows with the study.
 THREAD_WINDOW = 64
@@ -62,7 +58,6 @@ def _run_threads(threads: int, tell: Tell, works: Iterable[Work], settle: Settle
 
     However it ends, the blocks that have begun are finished first, for the store is still ours.
     """
-    import dask
     from dask import threaded  # its name alone would load the distributed scheduler
     from dask.callbacks import Callback
 
@@ -74,11 +69,8 @@ def _run_threads(threads: int, tell: Tell, works: Iterable[Work], settle: Settle
         tell(of_block("begun", work))
         return work, run_block(work)
 
-    def task(work: Work) -> Delayed:
-        """Make a task that Dask does not look into for tasks to wait for, which takes longer than all the rest."""
-        return dask.delayed(partial(compute, work), name=f"block-{uuid.uuid4().hex}", traverse=False)()
-
     remaining = iter(works)
     with ThreadPoolExecutor(threads) as pool, Callback(posttask=finished):
         while window := list(itertools.islice(remaining, THREAD_WINDOW * threads)):
-            dask.compute([task(work) for work in window], scheduler=threaded.get, pool=pool, optimize_graph=False)
+            graph = {f"block-{uuid.uuid4().hex}": (partial(compute, work),) for work in window}
+            threaded.get(graph, list(graph), pool=pool)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models, store
-from mdr_dask.arrays import IntArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import StoreError
 from mdr_dask.execute.cells import Cells, find_cells, owners, tasks
@@ -21,7 +21,7 @@ from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Stage
-from mdr_dask.replication import needs_more, rounds
+from mdr_dask.replication import GROWTH, growth_needed, next_round
 from mdr_dask.store import Hold, Part
 from mdr_dask.task import Outcome, Work
 
@@ -34,9 +34,10 @@ PAUSE = 4.0
 
 @dataclass(frozen=True)
 class _Job:
-    """What is to be run, and who is told."""
+    """What is to be run, and who is told; `seen` is the store before the run, by its `layout_mark`, and its shape."""
 
     stage: Stage
+    seen: tuple[str | None, tuple[Template, ...], Places]
     url: str
     hold: Hold
     resources: Resources
@@ -110,10 +111,11 @@ def run(
         from mdr_dask.fits.answers import require_known
 
         require_known(campaign)
-    stored_layout(Stage.first(campaign), url)
+    stage = Stage.first(campaign)
+    seen = store.layout_mark(url), *stored_layout(stage, url)
     with store.alone(url) if part is None else store.beside(url, part) as hold:
         sealed = store.exists(url) and store.require_sound(url, store.series_names(url))
-        job = _Job(Stage.first(campaign), url, hold, resources, part, retry_failed, report, tell)
+        job = _Job(stage, seen, url, hold, resources, part, retry_failed, report, tell)
         with executor(resources, tell) as execute:
             progress = _run_stages(job, execute)
         _settle(job, progress, sealed)
@@ -148,7 +150,7 @@ def outlook(campaign: Campaign, url: str) -> Progress:
         If the campaign is too large to be run.
     """
     stage: Stage | None = Stage.first(campaign)
-    count = next(rounds(campaign.replication))
+    count = campaign.replication.at_least
     progress = Progress()
     while stage is not None:
         layout, places = stored_layout(stage, url)
@@ -208,15 +210,13 @@ def _run_rounds(
     Returns the last round; None if this part leaves while others are not done with it.
     """
     replication = job.stage.campaign.replication
-    for count in rounds(replication):
-        if current and count <= current.realisations[1]:
-            continue
-        further = _lay_out(job, current, count)
+    while current is None or (replication.goes_on and current.realisations[1] < replication.at_most):
+        further = _lay_out(job, current)
         if not any(mask.any() for mask in further.needed):
             break
         current = further
         run_round(current, _find(job, current))
-        is_last = count == replication.at_most and not job.stage.is_adaptive
+        is_last = current.realisations[1] == replication.at_most and not job.stage.is_adaptive
         if job.part and not is_last and not _others_are_done(job, job.part, current):
             return None
     if current and (short := _unanswered(job, current)):
@@ -253,20 +253,20 @@ def _behind(job: _Job, count: int) -> _Round:
     return _Round(layout, places, asked, asked, (0, count), tuple(np.where(mask, count, 0) for mask in asked))
 
 
-def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
+def _lay_out(job: _Job, last: _Round | None) -> _Round:
     """Lay the next round out, if any case takes part in it, while no other part does."""
     with store.entrance(job.url):
-        alone = last if not job.part else None  # other parts may have changed the store
-        layout, places = (alone.layout, alone.places) if alone else stored_layout(job.stage, job.url)
+        layout, places = _layout_before(job, last)
         asked = cases_of(job.stage, layout, places, job.stage.new)
-        before = last.realisations[1] if last else 0
+        before, count = 0, job.stage.campaign.replication.at_least
         needed = asked
         if last:
-            narrow = _narrow(job, layout, places, last)
-            needed = [
-                mask & _still_wide(job.url, template, before) | cases
-                for mask, template, cases in zip(last.needed, layout, narrow, strict=True)
-            ]
+            before = last.realisations[1]
+            growth = _growth(job, layout, places, last)
+            needed = [each > 1 for each in growth]
+            count = next_round(
+                job.stage.campaign.replication, before, np.concatenate([each.ravel() for each in growth])
+            )
         if any(mask.any() for mask in needed):
             job.tell(Event("laying out", {"realisations": count}))
             layout = _grow(layout, count)
@@ -277,6 +277,24 @@ def _lay_out(job: _Job, last: _Round | None, count: int) -> _Round:
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
     return _Round(layout, places, asked, needed, (before, count), taken)
+
+
+def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...], Places]:
+    """Return the shape of the store, and where the cases of a stage lie in it."""
+    if last and not job.part:  # other parts may have changed the store
+        return last.layout, last.places
+    mark, layout, places = job.seen
+    if not job.stage.is_adaptive and store.layout_mark(job.url) == mark:
+        return layout, places
+    return stored_layout(job.stage, job.url)
+
+
+def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
+    """Return how many times as many realisations each case of a round needs; at most 1 where it has enough."""
+    narrow = _narrow(job, layout, places, last)
+    growth = [_growth_of(job.url, template, last.realisations[1]) for template in layout]
+    own = [np.where(mask, each, 0.0) for mask, each in zip(last.needed, growth, strict=True)]
+    return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
 
 
 def _narrow(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[NDArray[np.bool_]]:
@@ -352,7 +370,7 @@ def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ..
     )
 
 
-def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
+def _growth_of(url: str, template: Template, count: int) -> FloatArray:
     until, name = template.campaign.replication.until, template.series.name
     model = models.load(template.campaign.model)
     scatter = {output: model.output(output).scatter for output in until}
@@ -361,7 +379,7 @@ def _still_wide(url: str, template: Template, count: int) -> NDArray[np.bool_]:
         {output: store.values(url, name, array)[..., :count] for output, array in arrays.items()}
         for arrays in (dict(zip(until, until, strict=True)), known)
     )
-    return needs_more(values, store.ledger(url, name, template.shape)[..., :count], until, within)
+    return growth_needed(values, store.ledger(url, name, template.shape)[..., :count], until, within)
 
 
 def _begin_round(progress: Progress, groups: list[Cells]) -> Progress:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import platform
 from collections.abc import Iterable, Mapping
@@ -10,10 +11,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import zarr
 from numpy.typing import NDArray
 from zarr.abc.store import Store
 from zarr.core.buffer import Buffer
-from zarr.storage import WrapperStore
+from zarr.core.sync import sync
 
 from mdr_dask.errors import StoreError
 from mdr_dask.plan import BlockIndex
@@ -76,13 +78,16 @@ def write_block(
     record : mapping
         What it has to tell besides its numbers.
     """
-    arrays = _arrays(place.url, place.series, place.layout)
-    chunks: dict[str, tuple[str, bytes]] = {}
-    for name, array in {**values, "status": status}.items():
-        with guarded(place.url, f"encoding {name}"):
-            arrays[name][place.region] = array
-        key = chunk_name(arrays[name], place.index)
-        chunks[name] = key, arrays[name].store.taken(key)
+    arrays, encoded = _in_memory(place.url, place.series, place.layout)
+    given = {**values, "status": status}
+
+    async def encode() -> None:
+        await asyncio.gather(*[arrays[name].async_array.setitem(place.region, array) for name, array in given.items()])
+
+    with guarded(place.url, f"encoding block {place.index}"):
+        sync(encode())
+    keys = {name: chunk_name(arrays[name], place.index) for name in given}
+    chunks = {name: (key, encoded.pop(key).to_bytes()) for name, key in keys.items()}
     told = sealed({**record, "chunks": {name: digest(content) for name, (_, content) in chunks.items()}})
     ledger = dict([chunks.pop("status")])
     with holding(place.url, place.hold):
@@ -104,10 +109,13 @@ def is_written(place: Place, record: Mapping[str, Any]) -> bool:
 def read_block(place: Place, outputs: tuple[str, ...]) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
     """Return what stands in a block: its values and its part of the ledger, as arrays that may be changed."""
     arrays = _arrays(place.url, place.series, place.layout)
+
+    async def read() -> list[Any]:
+        return await asyncio.gather(*[arrays[name].async_array.getitem(place.region) for name in (*outputs, "status")])
+
     with guarded(place.url, f"reading block {place.index}"):
-        return {name: np.array(arrays[name][place.region]) for name in outputs}, np.array(
-            arrays["status"][place.region]
-        )
+        *values, status = map(np.array, sync(read()))
+    return dict(zip(outputs, values, strict=True)), status
 
 
 def values(url: str, series: str, output: str) -> NDArray[np.float64]:
@@ -127,30 +135,22 @@ def _opened(url: str, series: str, store: Store, names: Iterable[str] = ()) -> d
     return {name: array_of(shown[name], store, group_name(series, name)) for name in wanted}
 
 
-class Staged(WrapperStore[Store]):
-    """A store that reads what is there, and keeps what is written until it is taken: each task its own chunks."""
-
-    def __init__(self, store: Store) -> None:
-        super().__init__(store)
-        self._kept: dict[str, bytes] = {}
-
-    async def set(self, key: str, value: Buffer) -> None:
-        """Keep what would be written."""
-        self._kept[key] = value.to_bytes()
-
-    def taken(self, key: str) -> bytes:
-        """Return what was written, once."""
-        return self._kept.pop(key)
-
-
 @lru_cache(maxsize=64)
 def _arrays(url: str, series: str, layout: str) -> dict[str, Any]:
     """Hold the arrays of a group open for as long as its layout stands."""
     seen = layout_mark(url)
     if seen != layout:
         raise StoreError(f"{url}: {_other_store(seen)}")
-    opened = _opened(url, series, Staged(bytes_of(url)))
-    return {name: array.with_config({"write_empty_chunks": True}) for name, array in opened.items()}
+    return _opened(url, series, bytes_of(url))
+
+
+@lru_cache(maxsize=64)
+def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict[str, Buffer]]:
+    """Return the same arrays with nothing in them, and their chunks as they are written: each task takes its own."""
+    shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
+    memory = zarr.storage.MemoryStore(encoded)
+    empty = {name: array_of(array.metadata.to_dict(), memory, array.path) for name, array in shown.items()}
+    return {name: array.with_config({"write_empty_chunks": True}) for name, array in empty.items()}, encoded
 
 
 def _other_store(seen: str | None) -> str:

@@ -9,7 +9,7 @@ import itertools
 import json
 import os
 import uuid
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import lru_cache
@@ -36,6 +36,8 @@ KEPT = ("zarr.json", CLAIMS.rstrip("/"))
 GONE, EMPTY, MOST = 0, 1, 2**63 - 1
 #: Requests to a server at a time.
 AT_ONCE = 64
+#: Threads that wait for a disk.
+FLUSHERS = 8
 
 #: Raised when the layout changes so that older code cannot go on with it. 2: chunks have digests, records lie together.
 LAYOUT = 2
@@ -93,10 +95,15 @@ def read_json(url: str, name: str) -> dict[str, Any] | None:
     """Return a JSON document, or None if there is none of that name."""
     content = read_bytes(url, name)
     with guarded(url, f"reading {name}"):
-        try:
-            return None if content is None else json.loads(content)
-        except RecursionError:
-            raise ValueError("nested too deep") from None
+        return None if content is None else parsed(content)
+
+
+def parsed(content: bytes) -> Any:
+    """Return what a JSON document says; ValueError says why it is none."""
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
 
 
 def read_many(url: str, files: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
@@ -192,18 +199,20 @@ def write_stages(url: str, stages: Iterable[Mapping[str, bytes]]) -> None:
 def _write_local(url: str, root: Path, files: list[tuple[str, bytes]]) -> None:
     unnamed: dict[Path, Path] = {}
     folders: dict[Path, None] = {}
+    mark = uuid.uuid4().hex
     try:
         for name, content in files:
             target = root / name
-            unnamed[target] = target.with_name(f"{target.name}.{uuid.uuid4().hex}.partial")
+            unnamed[target] = Path(f"{target}.{mark}.partial")
             with guarded(url, f"writing {name}"):
-                folders |= dict.fromkeys([*_make(target.parent), target.parent])
+                if (folder := target.parent) not in folders:
+                    folders |= dict.fromkeys([*_make(folder), folder])
                 put(unnamed[target], content)
         with guarded(url, f"writing {', '.join(name for name, _ in files)}"):
-            _flush(unnamed.values())
+            _flush([*unnamed.values()])
             for target, leftover in unnamed.items():
                 give_name(leftover, target)
-            _flush(folders)
+            _flush([*folders])
     except BaseException:
         for leftover in unnamed.values():
             with suppress(OSError):  # what went wrong first is what has to be told
@@ -213,12 +222,13 @@ def _write_local(url: str, root: Path, files: list[tuple[str, bytes]]) -> None:
 
 def put(path: Path, content: bytes) -> None:
     """Write bytes to a new file."""
-    path.write_bytes(content)
+    with open(path, "wb") as file:  # noqa: PTH123 (of many, Path.open takes longer)
+        file.write(content)
 
 
 def give_name(leftover: Path, target: Path) -> None:
     """Make a file that is complete take the place of what stands under a name."""
-    leftover.replace(target)
+    os.replace(leftover, target)  # noqa: PTH105 (of many)
 
 
 def _make(folder: Path) -> list[Path]:
@@ -230,9 +240,15 @@ def _make(folder: Path) -> list[Path]:
     return above
 
 
-def _flush(paths: Iterable[Path]) -> None:
+def _flush(paths: Sequence[Path]) -> None:
     """Wait until files, and the names in folders, are on the disk; together, since a disk writes them together."""
-    list(_flushers().map(flush, paths))
+    shares = (paths[first::FLUSHERS] for first in range(min(FLUSHERS, len(paths))))
+    list(_flushers().map(_flush_in_turn, shares))
+
+
+def _flush_in_turn(paths: Sequence[Path]) -> None:
+    for path in paths:
+        flush(path)
 
 
 def flush(path: Path) -> None:
@@ -249,7 +265,7 @@ def flush(path: Path) -> None:
 
 @lru_cache(maxsize=1)
 def _flushers() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(8, thread_name_prefix="flush")
+    return ThreadPoolExecutor(FLUSHERS, thread_name_prefix="flush")
 
 
 def create(url: str, name: str, content: bytes) -> bool:
@@ -281,13 +297,18 @@ def conditional(url: str) -> bool:
 
 def remove(url: str, files: Iterable[str]) -> None:
     """Remove files by name; those that are gone are no matter."""
+    path = local(url)
 
     async def delete() -> None:
         for name in files:
             await bytes_of(url).delete(name)
 
     with guarded(url, "removing files"):
-        sync(delete())
+        if path is None:
+            sync(delete())
+        else:
+            for name in files:
+                (path / name).unlink(missing_ok=True)
 
 
 def set_aside(url: str, files: Iterable[str]) -> None:

@@ -59,7 +59,7 @@ def lay_out(url: str, layout: Sequence[Template]) -> None:
         write_bytes(url, "zarr.json", group_document({}, {"mdr_dask_layout": LAYOUT}))
     elif only_claimed(held["attributes"]):
         clear(url)
-    members: dict[str, Any] = held["consolidated_metadata"]["metadata"] if held else {}
+    members = dict(held["consolidated_metadata"]["metadata"]) if held else {}
     study = _study_attributes(layout[0].campaign, held["attributes"] if held else {})
     root = {name: held["attributes"][name] for name in OF_SERIES if name in held["attributes"]} if held else {}
     copies = [_copy(url, template, study) for template in layout]
@@ -103,17 +103,15 @@ def laid_out_files(template: Template) -> dict[str, bytes]:
     """Return the files of a group before anything is computed: metadata of all arrays, chunks of the coordinates."""
     coordinates = _coordinates(template)
     held = [_coordinate_files(name, _Numbers.of(*coordinate)) for name, coordinate in coordinates.items()]
-    files: dict[str, Any] = {}
-    group = zarr.create_group(zarr.storage.MemoryStore(files))
     along = " ".join(name for name, (dims, _, _) in coordinates.items() if dims != (name,))
+    arrays = {}
     for output in template.outputs:
-        dims = (*template.dims, *output.dims)
         attrs = {"units": output.unit, "long_name": output.long_name, "coordinates": along}
         if output.has_error and output.error in template.outputs:
             attrs["ancillary_variables"] = output.error.name
         if output.comment:
             attrs["comment"] = output.comment
-        _create_array(group, output.name, template, dims, template.extra_shape(output), "float64", attrs)
+        arrays[output.name] = _array_file(template, output.dims, template.extra_shape(output), "float64", attrs)
     flags: dict[str, Any] = {
         "long_name": "state of the case",
         "units": "1",
@@ -121,8 +119,9 @@ def laid_out_files(template: Template) -> dict[str, bytes]:
         "flag_values": [int(status) for status in Status],
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
-    _create_array(group, "status", template, template.dims, (), "int8", flags)
-    return {name: content for each in (*held, _contents(files)) for name, content in each.items()}
+    arrays["status"] = _array_file(template, (), (), "int8", flags)
+    files = {f"{name}/zarr.json": content for name, content in arrays.items()}
+    return {name: content for each in (*held, files) for name, content in each.items()}
 
 
 def _contents(files: dict[str, Any]) -> dict[str, bytes]:
@@ -131,25 +130,30 @@ def _contents(files: dict[str, Any]) -> dict[str, bytes]:
     return {name: content.to_bytes() for name, content in files.items()}
 
 
-def _create_array(
-    group: zarr.Group,
-    name: str,
-    template: Template,
-    dims: tuple[str, ...],
-    extra: tuple[int, ...],
-    dtype: str,
-    attrs: dict[str, Any],
-) -> None:
-    group.create_array(
-        name,
-        shape=(*template.shape, *extra),
-        chunks=tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra)),
+def _array_file(
+    template: Template, further: tuple[str, ...], extra: tuple[int, ...], dtype: str, attrs: dict[str, Any]
+) -> bytes:
+    """Return the metadata of an array of blocks."""
+    chunks = tuple(max(1, length) for length in (*(template.chunks[dim] for dim in template.dims), *extra))
+    held = json.loads(_one_block(chunks, (*template.dims, *further), dtype, json.dumps(attrs)))
+    return json.dumps({**held, "shape": [*template.shape, *extra]}, indent=2).encode()
+
+
+@lru_cache(maxsize=64)
+def _one_block(chunks: tuple[int, ...], dims: tuple[str, ...], dtype: str, attrs: str) -> bytes:
+    """Return the metadata of an array that is one block; a round changes nothing of them but the shape."""
+    files: dict[str, Any] = {}
+    zarr.create_array(
+        zarr.storage.MemoryStore(files),
+        shape=chunks,
+        chunks=chunks,
         dtype=dtype,
         fill_value=np.nan if dtype == "float64" else int(Status.MISSING),
         compressors=[ZstdCodec(level=1), Crc32cCodec()],
         dimension_names=dims,
-        attributes=attrs,
+        attributes=json.loads(attrs),
     )
+    return bytes(files["zarr.json"].to_bytes())
 
 
 class _Numbers(NamedTuple):
@@ -289,4 +293,4 @@ def group_document(members: Mapping[str, Any], attrs: Mapping[str, Any]) -> byte
         "attributes": attrs,
         "consolidated_metadata": {"kind": "inline", "must_understand": False, "metadata": members},
     }
-    return json.dumps(held, indent=1).encode()
+    return json.dumps(held).encode()

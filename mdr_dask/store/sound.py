@@ -215,7 +215,7 @@ def _unsound(url: str, series: Sequence[str]) -> Iterator[str]:
         yield "zarr.json is damaged"
 
 
-def has_digests(root: dict[str, Any], series: str) -> bool:
+def has_digests(root: Mapping[str, Any], series: str) -> bool:
     """Say whether a group was laid out by a version that keeps a copy of its layout."""
     members = root.get("consolidated_metadata", {}).get("metadata", {})
     attributes = root["attributes"] if series in ("", ROOT) else members.get(series, {}).get("attributes", {})
@@ -229,7 +229,7 @@ def unsound_files(url: str, copy: Copy) -> Iterator[tuple[str, str, bytes | None
             yield name, "missing" if content is None else "damaged", content
 
 
-def is_root_sound(root: dict[str, Any], copies: list[Copy]) -> bool:
+def is_root_sound(root: Mapping[str, Any], copies: list[Copy]) -> bool:
     """Say whether the root's metadata are those of the copies, or of a layout that was not finished after it."""
     try:
         held = root["consolidated_metadata"]["metadata"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import zarr
@@ -12,11 +13,13 @@ from zarr.storage import StorePath
 from mdr_dask.errors import StoreError
 from mdr_dask.store.copies import groups_laid_out, groups_with
 from mdr_dask.store.expected import faults
-from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, local, read_json
+from mdr_dask.store.files import KEPT, LAYOUT, ROOT, group_name, guarded, local, parsed, read_bytes
 
 
-def document(url: str, series: str = "") -> dict[str, Any] | None:
+def document(url: str, series: str = "") -> Mapping[str, Any] | None:
     """Return the metadata of a group, or None if there are none; Zarr opens nothing that has not passed here.
+
+    They are shared by all who read them.
 
     Raises
     ------
@@ -24,18 +27,28 @@ def document(url: str, series: str = "") -> dict[str, Any] | None:
         If they are not such as this program writes.
     """
     name = group_name(series, "zarr.json")
-    found = read_json(url, name)
-    if found is None:
+    content = read_bytes(url, name)
+    if content is None:
         return None
+    with guarded(url, f"reading {name}"):
+        found, fault = _looked_through(content)
+    if fault is not None:
+        raise StoreError(f"{url}: {name}{fault}; {_remedy(url)}")
+    return found
+
+
+@lru_cache(maxsize=16)
+def _looked_through(content: bytes) -> tuple[dict[str, Any], str | None]:
+    """Return the metadata of a group, and the first thing that is wrong with them; a run reads them many times."""
+    found = parsed(content)
     if not isinstance(found, dict) or not isinstance(found.get("attributes", {}), dict):
-        raise StoreError(f"{url}: {name} is damaged; {_remedy(url)}")
+        return found, " is damaged"
     attributes = found.get("attributes", {})
     layout = attributes.get("mdr_dask_layout")
     is_newer = isinstance(layout, int) and layout > LAYOUT  # which is said in its own words
     if "mdr_dask_layout" in attributes and not only_claimed(attributes) and not is_newer:
-        for fault in faults(found):
-            raise StoreError(f"{url}: {name}: {fault}; {_remedy(url)}")
-    return found
+        return found, next((f": {fault}" for fault in faults(found)), None)
+    return found, None
 
 
 def array_of(shown: Mapping[str, Any], store: Store, path: str = "") -> Any:
