@@ -200,4 +200,6 @@ def test_curves_of_a_relaxation_are_those_of_its_constants():
     assert left["two"] < 0.5 * left["one"]
     rate = -np.polyfit(found["t"], np.log(found["one"]), 1)[0]
     assert rate == pytest.approx(found["rate"].item())
+    alike = -np.polyfit(found["t"], np.log(found["alike"]), 1)[0]
+    assert alike == pytest.approx(found["rate_unweighted"].item())
     assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))

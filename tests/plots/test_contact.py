@@ -88,6 +88,8 @@ def test_lines_have_the_height_of_the_campaign_and_the_same_phases(groups):
     figure = DRAW["lines"].figure({"plane": groups["plane"]})
     lines = [axes.lines[0].get_ydata() for axes in figure.axes]
     assert [np.std(line) for line in lines] == pytest.approx([5, 5], rel=1e-6)
+    assert "5 µm" in figure.get_suptitle()
+    assert "20 mm" in figure.get_suptitle()
     phases = [np.angle(np.fft.rfft(line)[1:100]) for line in lines]
     np.testing.assert_allclose(phases[0], phases[1], atol=1e-9)
 

@@ -132,6 +132,16 @@ def random_line(generator, points, hurst):
     return RoughLine(Waves(share * np.exp(2j * np.pi * generator.uniform(size=points // 2)), points), None)
 
 
+def test_planes_are_solved_from_node_to_node(monkeypatch):
+    """An ordinary plane is not swept through, which takes several times as long, and finds what sweeps find."""
+    surface, deborah, loads = random_line(np.random.default_rng(4), 400, 0.7), *np.array([[1e-2, 0.1], [0.3, 3.0]])
+    swept = truth(surface, deborah, loads)
+    monkeypatch.setattr(sliding, "steady_sliding", None)
+    steady, errors = Ladder(surface, "hermite", deborah, loads, COLUMNS).to_accuracy(0.01)
+    assert np.all(np.abs(steady.drag - swept.drag) <= errors.drag)
+    assert np.all(errors.drag <= 0.01 * steady.drag)
+
+
 def truth(surface, deborah, loads, oversampling=128):
     count = surface.points * oversampling
     line = periodic_line(surface.heights(count), surface.slopes(count))

@@ -31,6 +31,8 @@ def test_checked_figures(checked):
     assert first.wear_volume == pytest.approx(0.310754, abs=4e-6)
     assert second.contact_radius == pytest.approx(1.240150, abs=2e-6)
     assert second.wear_volume == pytest.approx(0.872404, abs=4e-6)
+    beyond = second.contact_radius * np.array([1.0 + 1e-9, 1.01, 1.1, 3.0])
+    np.testing.assert_array_equal(second.height(beyond), PARABOLA.height(beyond))
     limit = wear.limit(PARABOLA, 0.455)
     assert np.max(np.abs(last.height(RADII) - limit.height(RADII))) < 1.5e-4
 
