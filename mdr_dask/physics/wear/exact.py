@@ -16,6 +16,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile
+from mdr_dask.physics.wear.approach import nearly_limit
 from mdr_dask.physics.wear.evolution import Dense, NotConvergedError, Resolution, integral_along, march
 from mdr_dask.physics.wear.forced import (
     border_moves,
@@ -84,21 +85,31 @@ def exact(
     >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
     0.131 0.759
     """
-    solve: Solver
+    wanted = sorted({float(amount) for amount in amounts})
     if stick_radius == 0.0:
-        solve = _slid_under_force if constant_force else _slid
+        solve: Solver = _slid_under_force if constant_force else _slid
+        done: dict[float, Worn] = {}
     else:
         check_stick_radius(stick_radius)
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
-    wanted = sorted({float(amount) for amount in amounts})
-    resolutions: dict[Solver, Callable[[float], Resolution]] = {
-        forced_contacts: forced_resolution,
-        _fretted: partial(fretted_resolution, stick_radius),
-    }
-    resolution = resolutions.get(solve, Resolution)(min(accuracy, COARSEST))
-    found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
+        done = nearly_limit(profile, stick_radius, wanted, accuracy) if solve is _fretted else {}
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
-    judged = {
+    if left := [amount for amount in wanted if amount not in done]:
+        done |= _evolved(
+            partial(solve, profile, stick_radius, left),
+            _resolution(solve, stick_radius, accuracy),
+            least,
+            errors=errors,
+        )
+    return [done[float(amount)] for amount in amounts]
+
+
+def _evolved(
+    solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, least: float, *, errors: bool
+) -> dict[float, Worn]:
+    """Return contacts with what tells their errors."""
+    found, *rougher = _solutions(solve, resolution, errors)
+    return {
         amount: replace(
             one,
             rougher=tuple(other[amount] for other in rougher),
@@ -108,7 +119,6 @@ def exact(
         )
         for amount, one in found.items()
     }
-    return [judged[float(amount)] for amount in amounts]
 
 
 def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
@@ -149,6 +159,14 @@ def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) 
         except NotConvergedError:
             continue
     return solve(ways[-1])
+
+
+def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resolution:
+    """Return the resolution that a way of solving needs for an accuracy."""
+    at_most = min(accuracy, COARSEST)
+    if solve is forced_contacts:
+        return forced_resolution(at_most)
+    return fretted_resolution(stick_radius, at_most) if solve is _fretted else Resolution(at_most)
 
 
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:

@@ -68,7 +68,8 @@ def forced_contacts(
 ) -> dict[float, Worn]:
     """Solve once and describe every wanted time."""
     moving, first = _until_jump(profile, stick_radius, resolution)
-    _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
+    if np.isfinite(profile.largest_radius):
+        _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
     standing, start = moving.stand(first[-1])
     second = march(standing, max(wanted), resolution.step, _first(moving, resolution), start)
     early, late = Dense(first), Dense(second)
