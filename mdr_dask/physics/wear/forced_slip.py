@@ -11,6 +11,7 @@ depth from 1 in units of eta: all unknowns are of the order of one, next to full
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -217,13 +218,15 @@ class ForcedSlip:
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return s - known - theta (p / eta) s at the nodes; then continuity at the edge, force, and y = 0 at b."""
-        size = self.panels.nodes.size
-        slip = self.slip(unknowns)
+        size, y, place = self.panels.nodes.size, self.image(unknowns), self.place(unknowns)
+        root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
+        slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
+        rate[-1] = 0.0
         rows = np.empty(unknowns.size)
-        rows[:size] = slip - known[:size] - theta * self.rate(unknowns) * slip
-        rows[size] = known[-1] + self.slipping_load(unknowns) - self.virgin_load
+        rows[:size] = slip * (1.0 - theta / root * rate) - known[:size]
+        rows[size] = known[-1] + 0.5 * root * (self.panels.weights @ ((1.0 - y) * factor)) - self.virgin_load
         if self.border is None:
-            rows[-1] = self.at_border @ self.image(unknowns)
+            rows[-1] = self.at_border @ y
         return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
