@@ -40,6 +40,8 @@ class Settings(NamedTuple):
         Step of the differences by the edge and what follows it.
     first : float
         Longest first step, over the time in which a contact changes: little wear is right to 2 %.
+    shortest : float
+        Step over the first one at which a march gives up. No march that got through took one below 0.13.
     """
 
     most_steps: int = 20000
@@ -49,6 +51,7 @@ class Settings(NamedTuple):
     theta_ratio: float = 1.7
     difference: float = 1e-7
     first: float = 1e-3
+    shortest: float = 1e-4
 
 
 SETTINGS = Settings()
@@ -224,12 +227,12 @@ def march(
         if len(history) > SETTINGS.most_steps:
             raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {SETTINGS.most_steps}")
         time = history[-1].time
+        if time + step == time or step < SETTINGS.shortest * first:
+            raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
         power = 1.0 / (min(len(history), 3) + 1)
         if moment is None or error > tolerance:
             step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
-            if time + step == time or step < 1e-9 * first:
-                raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
             continue
         history.append(moment)
         growth = min(SETTINGS.growth, 0.85 * (tolerance / max(error, 1e-300)) ** power)
@@ -339,7 +342,7 @@ class _Newton:
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(SETTINGS.most_iterations):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
-            if not np.all(np.isfinite(residual)):
+            if not np.isfinite(residual).all():
                 return None
             if renew:
                 self._renew(unknowns, theta, known, residual)
@@ -347,7 +350,7 @@ class _Newton:
                 return None
             change = self.factors.solve(residual)
             unknowns = unknowns - change
-            size = float(np.max(np.abs(change)))
+            size = float(np.abs(change).max())
             if not (np.isfinite(size) and self.problem.holds(unknowns)):
                 return None
             rate = size / last

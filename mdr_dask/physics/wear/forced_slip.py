@@ -79,9 +79,9 @@ class ForcedSlip:
     border: float | None = None
     stood: int = 0
     frozen: float = np.nan
-    newton: ClassVar[float] = 1e-5
+    newton: ClassVar[float] = 1e-3
 
-    @property
+    @cached_property
     def panels(self) -> Panels:
         """The panels between the border and the edge."""
         return self.virgin.panels
@@ -97,6 +97,11 @@ class ForcedSlip:
         return self.virgin.eta
 
     @cached_property
+    def size(self) -> int:
+        """The number of nodes."""
+        return self.panels.nodes.size
+
+    @cached_property
     def body(self) -> VirginBody:
         """The virgin body for compiled code."""
         return VirginBody(self.virgin.virgin_slip, self.virgin.inner_radius**2, self.virgin.virgin_width)
@@ -108,15 +113,14 @@ class ForcedSlip:
 
     def image(self, unknowns: FloatArray) -> FloatArray:
         """Return y at all nodes."""
-        y = unknowns[: self.panels.nodes.size].copy()
+        y = unknowns[: self.size].copy()
         y[-1] = 1.0
         return y
 
     def place(self, unknowns: FloatArray) -> Place:
         """Return where the contact stands."""
-        size = self.panels.nodes.size
         border = float(unknowns[-1]) if self.border is None else self.border
-        return Place(border, float(unknowns[size - 1]), float(unknowns[size]))
+        return Place(border, float(unknowns[self.size - 1]), float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
         """Tell whether unknowns describe a contact."""
@@ -160,7 +164,7 @@ class ForcedSlip:
         )
 
         def known(unknowns: FloatArray) -> FloatArray:
-            result = np.empty(2 * self.panels.nodes.size + 1)
+            result = np.empty(2 * self.size + 1)
             remember(self.mesh, self.body, remembered, self.place(unknowns), result)
             return result
 
@@ -218,7 +222,7 @@ class ForcedSlip:
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return s - known - theta (p / eta) s at the nodes; then continuity at the edge, force, and y = 0 at b."""
-        size, y, place = self.panels.nodes.size, self.image(unknowns), self.place(unknowns)
+        size, y, place = self.size, self.image(unknowns), self.place(unknowns)
         root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
         rate[-1] = 0.0
@@ -232,7 +236,7 @@ class ForcedSlip:
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives by y."""
         place = self.place(unknowns)
-        size, root, factor = self.panels.nodes.size, np.sqrt(self.body.width * place.width), self._factor(place)
+        size, root, factor = self.size, np.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.slip(unknowns), self.rate(unknowns)
         slip[-1] = 0.0
         result = np.zeros((unknowns.size, unknowns.size))
@@ -257,14 +261,14 @@ class ForcedSlip:
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return s at the nodes, the depth, and the border: what the error of a step is judged by."""
         weight = BORDER_WEIGHT * (1.0 - self.virgin.inner_radius) / self.eta
-        tail = unknowns[self.panels.nodes.size :] * ([1.0, weight] if self.border is None else 1.0)
+        tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
 
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Pressed]
     ) -> Pressed:
         """Return the moment that a solved step ends in; its worn depth is what came before and what the step wore."""
-        size, place, before = self.panels.nodes.size, self.place(unknowns), past[0]
+        size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = onward(before.path, place)
         moved = self.plateau_rise(path[:, : self._turn(path) + 1], place.border + place.width * self.mesh.nodes)
