@@ -48,6 +48,7 @@ def nearly_limit(profile: Profile, stick_radius: float, cycles: Sequence[float],
     if not late:
         return {}
     end = limit(profile, c)
+    end = replace(end, energy_volume=end.wear_volume)  # all of the energy has gone into wear
     found = {number: replace(end, relative_error=_bound(profile, end, number)) for number in late}
     return {number: one for number, one in found.items() if one.relative_error <= accuracy}
 

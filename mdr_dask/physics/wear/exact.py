@@ -33,7 +33,9 @@ from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_p
 COARSEST = 1e-2
 #: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
 #: solution; ``python -m benchmarks accuracy measure wear``.
-WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 4.0), (1e-2, 2.0)), 0.1, 0.25
+WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
+#: In gross slip at constant depth: the same; all of the error is that of the edge where panels are fine enough.
+SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
 #: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Found = TypeVar("Found")
@@ -166,7 +168,14 @@ def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resoluti
     at_most = min(accuracy, COARSEST)
     if solve is forced_contacts:
         return forced_resolution(at_most)
+    if solve is _slid:
+        return Resolution(at_most, wider=_wider(at_most, SLID_WIDER))
     return fretted_resolution(stick_radius, at_most) if solve is _fretted else Resolution(at_most)
+
+
+def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float = 1.0) -> float:
+    """Return how much wider steps are at an accuracy, by a table in logarithms."""
+    return float(np.exp(power * np.interp(np.log(accuracy), *np.log(table).T)))
 
 
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
@@ -175,8 +184,8 @@ def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
     Steep bodies need more nodes a panel. A thin annulus of slip is worn off in few steps.
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
-    wider = np.exp(min((1.0 - stick_radius) / THIN, 1.0) * np.interp(np.log(accuracy), *np.log(WIDER).T))
-    return Resolution(accuracy, wider=float(wider), order=order, second=SECOND)
+    wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
+    return Resolution(accuracy, wider=wider, order=order, second=SECOND)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
