@@ -50,7 +50,7 @@ class Settings(NamedTuple):
 
     safety: float = 1.5
     step: float = 0.2
-    shape: float = 0.1
+    shape: float = 0.15
     volumes: float = 0.14
     reach: int = 5
     floor: float = 0.02
