@@ -40,8 +40,9 @@ class Settings(NamedTuple):
         Step of the differences by the edge and what follows it.
     first : float
         Longest first step, over the time in which a contact changes: little wear is right to 2 %.
-    shortest : float
-        Step over the first one at which a march gives up. No march that got through took one below 0.13.
+    shortest, beginning : float
+        Step at which a march gives up, over the longest so far, or the first one if that is shorter; and over the first
+        one while none has been taken. Of those that got through, none took one below 0.13 later, some 1e-5 to begin.
     """
 
     most_steps: int = 20000
@@ -52,6 +53,7 @@ class Settings(NamedTuple):
     difference: float = 1e-7
     first: float = 1e-3
     shortest: float = 1e-4
+    beginning: float = 1e-9
 
 
 SETTINGS = Settings()
@@ -222,12 +224,13 @@ def march(
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
-    step = first
+    step, longest = first, 0.0
     while history[-1].time < end and not stops(history[-1]):
         if len(history) > SETTINGS.most_steps:
             raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {SETTINGS.most_steps}")
         time = history[-1].time
-        if time + step == time or step < SETTINGS.shortest * first:
+        least = max(SETTINGS.beginning * first, SETTINGS.shortest * min(longest, first))
+        if time + step == time or step < least:
             raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
         power = 1.0 / (min(len(history), 3) + 1)
@@ -235,6 +238,7 @@ def march(
             step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
             continue
         history.append(moment)
+        longest = max(longest, step)
         growth = min(SETTINGS.growth, 0.85 * (tolerance / max(error, 1e-300)) ** power)
         step *= growth if growth > 1.1 or growth < 0.9 else 1.0
     return history

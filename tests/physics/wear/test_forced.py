@@ -278,6 +278,13 @@ def test_a_march_whose_steps_shrink_without_end_gives_up(monkeypatch):
     assert len(tries) < 100
 
 
+def test_a_march_may_begin_with_steps_as_short_as_it_needs():
+    """Next to gross slip a steep body moves its border at once: the first step is a ten-thousandth and less."""
+    profile, c = PowerProfile(4.916810571353128), 0.10792076652241178
+    (worn,) = exact(profile, c, [0.04], 2e-5, constant_force=True, errors=False)
+    assert worn.stick_border > c
+
+
 def count_steps(monkeypatch):
     """Return a list that grows with every step tried."""
     tried, step = [], evolution._try_step
