@@ -80,6 +80,8 @@ class Resolution(NamedTuple):
         How much more slowly than usual the error falls from them.
     second : float
         Share of the distance from the second of them, which counts where the first is close by chance.
+    newton : float
+        Under constant force, error of the solution of a step's equations over that of the step.
     """
 
     accuracy: float
@@ -90,6 +92,7 @@ class Resolution(NamedTuple):
     rough: tuple[float, float] = (8.0, 64.0)
     slowness: float = 1.0
     second: float = 0.5
+    newton: float = 1e-3
 
     @property
     def step(self) -> float:
@@ -115,8 +118,8 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * (halvings + 1)), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
-        """Return the resolution for a finer accuracy."""
-        return self._replace(accuracy=self.accuracy / factor)
+        """Return the resolution for a finer accuracy where a march failed: equations are solved more closely, too."""
+        return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
 
     def halfway_to(self, finer: Resolution) -> Resolution:
         """Return a resolution with steps between those of two."""

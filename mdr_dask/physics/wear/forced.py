@@ -142,7 +142,7 @@ def _until_jump(
     """March while the border moves, or to an end; return problem and moments."""
     near = round(-2.0 * np.log2(max(stick_radius, SETTINGS.nearest)))
     panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
-    problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
+    problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius), resolution.newton)
     moving, start = problem.move(settled(problem))
     last, size = panels.mesh.order - 1, panels.nodes.size
 

@@ -15,7 +15,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
@@ -70,7 +69,7 @@ class ForcedSlip:
 
     Unknowns: y = 1 - (d - g) / eta at the nodes but the last, the width of the panels, the depth, and the border unless
     `border` says where it stands; `stood` is then the number of the pair of the path that it stands from, and
-    `frozen` the worn depth at it. Loads are half
+    `frozen` the worn depth at it; `newton` is the error of a step's equations over that of the step. Loads are half
     forces over eta; `virgin_load` is that of the virgin slip zone.
     """
 
@@ -79,7 +78,7 @@ class ForcedSlip:
     border: float | None = None
     stood: int = 0
     frozen: float = np.nan
-    newton: ClassVar[float] = 1e-3
+    newton: float = 1e-5
 
     @cached_property
     def panels(self) -> Panels:
@@ -283,12 +282,14 @@ class ForcedSlip:
         return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
 
 
-def forced_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> ForcedSlip:
+def forced_slip(
+    profile: Profile, stick_radius: float, panels: Panels, reach: float, newton: float = 1e-5
+) -> ForcedSlip:
     """Prepare partial slip under the force of the virgin contact."""
     virgin = partial_slip(profile, stick_radius, panels, reach)
     y, factor = virgin.image(settled(virgin).unknowns)
     load = 0.5 * np.sqrt(virgin.virgin_width) * panels.weights @ ((1.0 - y) * factor)
-    return ForcedSlip(virgin, float(load), 0.0, frozen=0.0)
+    return ForcedSlip(virgin, float(load), 0.0, frozen=0.0, newton=newton)
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:
