@@ -88,8 +88,8 @@ def _last(profile: PowerProfile, block: LoadBlock, cells: int):
 def wear(short: bool) -> Iterator[Point]:
     """Yield the worn profile of ten bodies by every rule; cycles one by one share nothing with them but matrices.
 
-    The truth is the exact evolution at 1e-5, which those cycles tend to, or the limit after many. Errors are over what can wear, as `accuracy`
-    is: the largest of the profile at any radius.
+    The truth is the exact evolution at 1e-5, which those cycles tend to, or the limit after many. Errors are over what
+    can wear, as `accuracy` is: the largest of the profile at any radius.
     """
     for case, worn in list(WORN.items())[: 1 if short else None]:
         for like, rounder, more in neighbours(short):
