@@ -309,7 +309,7 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
 
 @pytest.mark.parametrize(
     ("hold", "accuracy", "finer"),
-    [("depth", 1e-2, 1e-3), ("depth", 1e-3, 3e-5), ("depth", 1e-4, 1e-5), ("force", 1e-4, 3e-5)],
+    [("depth", 1e-2, 1e-3), ("depth", 1e-3, 3e-5), ("depth", 1e-4, 1e-5), ("force", 2e-4, 3e-5)],
 )
 def test_an_accuracy_is_met_by_the_first_solution_and_its_two_rougher_ones(monkeypatch, hold, accuracy, finer):
     """It took six marches at constant depth and nine under constant force: volumes stated ten times their error."""
