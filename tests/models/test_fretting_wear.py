@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -261,6 +263,16 @@ def test_distinct_and_seconds_are_cheap_estimates():
     assert 0 < MODEL.seconds(block) < 0.1
 
 
+def test_the_time_of_worn_volumes_is_not_that_of_all_outputs():
+    """They begin at a coarser accuracy, which the estimate left out: 1e-4 was told as 2.5 times what it took."""
+
+    def seconds(outputs):
+        block = Block(FrettingWear(stick_radius=0.5), {"stick_radius": np.array([0.3, 0.55, 0.8])}, 3, (0,), 1, outputs)
+        return MODEL.seconds(replace(block, accuracy=1e-4))
+
+    assert seconds(("wear_volume",)) < 0.75 * seconds(("wear_volume", "contact_radius"))
+
+
 @pytest.mark.parametrize("hold", ["depth", "force"])
 @pytest.mark.parametrize("c", [0.9999, 1 - 1e-6, 1 - 1e-9])
 def test_next_to_full_stick_little_is_worn_and_nothing_fails(hold, c):
@@ -297,7 +309,7 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
 
 @pytest.mark.parametrize(
     ("hold", "accuracy", "finer"),
-    [("depth", 1e-2, 1e-3), ("depth", 1e-3, 3e-5), ("depth", 1e-4, 1e-5), ("force", 1e-4, 3e-5)],
+    [("depth", 1e-2, 1e-3), ("depth", 1e-3, 3e-5), ("depth", 1e-4, 1e-5), ("force", 2e-4, 3e-5)],
 )
 def test_an_accuracy_is_met_by_the_first_solution_and_its_two_rougher_ones(monkeypatch, hold, accuracy, finer):
     """It took six marches at constant depth and nine under constant force: volumes stated ten times their error."""

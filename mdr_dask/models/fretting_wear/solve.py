@@ -24,6 +24,7 @@ from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import rules
 from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.forced import SETTINGS as FORCED
 from mdr_dask.physics.wear.forced_rule import fast_forced
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn
@@ -39,6 +40,8 @@ _USUAL, _FINEST, _FINER, _ENOUGH = 1e-3, 1e-5, 0.5, 0.7
 _BEGIN = {"depth": 0.2, "force": 0.6}
 #: The same over 1 - c where only volumes are wanted: `python -m benchmarks accuracy measure campaigns_of_wear`.
 _VOLUME = 0.9
+#: 1 - c where time is estimated.
+_TYPICAL_ANNULUS = 0.5
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -92,15 +95,23 @@ def seconds(block: Block[FrettingWear]) -> float:
         return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
-    finer = (_USUAL / _first_accuracy(parameters.accuracy, block.accuracy, _BEGIN[parameters.hold])) ** 0.6
-    each = {"limit": 1e-3, "fast": 1e-3, "exact": 0.03 * finer}[parameters.wear_rule]
-    if parameters.hold == "force":
-        each = {"limit": 0.3 * finer, "fast": 0.03, "exact": 0.5 * finer}[parameters.wear_rule]
+    thickness = _TYPICAL_ANNULUS if _only_volumes(parameters.wear_rule, parameters.hold, _judged(block)) else None
+    accuracy = _first_accuracy(parameters.accuracy, block.accuracy, _beginning(parameters.hold, thickness))
+    followed, forced = _followed(parameters.hold, accuracy), parameters.hold == "force"
+    rules_take = {"limit": followed if forced else 1e-3, "fast": 0.03 if forced else 1e-3, "exact": followed}
+    each = rules_take[parameters.wear_rule]
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
     solves = moments if parameters.wear_rule == "fast" else _count(numbers.exponent, numbers.level)
     moment = 4e-3 if parameters.wear_rule == "exact" else 7e-4
     return float(0.01 + each * solves + moment * moments + 5e-5 * size)
+
+
+def _followed(hold: str, accuracy: float) -> float:
+    """Estimate the time of one evolution with its errors, but for what describes its moments."""
+    if hold == "force":
+        return 0.09 * float(max(FORCED.coarsest / accuracy, 1.0) ** 1.1)
+    return 0.012 * float((_USUAL / accuracy) ** 0.6)
 
 
 def _reduced(block: Block[FrettingWear]) -> tuple[Numbers, dict[tuple[int, int], str], NDArray[np.int8]]:
@@ -230,12 +241,17 @@ def _answer(records: Sequence[Worn], name: str, places: FloatArray) -> float | F
     return np.array(answers) if name.startswith("block_") else answers[0]
 
 
+def _judged(block: Block[FrettingWear]) -> list[str]:
+    """Return the outputs that an accuracy holds for."""
+    return [name for name in block.outputs if name in MODEL.companions]
+
+
 class _Demand:
     """What a block asks of the accuracy of a solution."""
 
     def __init__(self, block: Block[FrettingWear], places: FloatArray) -> None:
         self.accuracy, self.places = block.accuracy, places
-        self.outputs = [name for name in block.outputs if name in MODEL.companions]
+        self.outputs = _judged(block)
         self.errors = self.accuracy is not None or any(_plain_name(name)[1] for name in block.outputs)
 
     def missed(self, records: Sequence[Worn]) -> tuple[str, float]:
@@ -313,11 +329,14 @@ def _first_accuracy(given: float | None, asked: float | None, share: float) -> f
     return max(min(needed, np.inf if given is None else given), _FINEST)
 
 
-def _beginning(task: Task, demand: _Demand) -> float:
-    """Return the accuracy that a task begins at over that asked: the thinner the slip annulus, the faster it wears."""
-    if demand.outputs != ["wear_volume"] or (task.rule, task.hold) != ("exact", "depth"):
-        return _BEGIN[task.hold]
-    return min(_VOLUME * (1.0 - task.profile.inside(task.level)), 1.0)
+def _only_volumes(rule: str, hold: str, outputs: Sequence[str]) -> bool:
+    """Tell whether nothing is judged but volumes worn at constant depth: thin annuli wear faster."""
+    return list(outputs) == ["wear_volume"] and (rule, hold) == ("exact", "depth")
+
+
+def _beginning(hold: str, thickness: float | None) -> float:
+    """Return the accuracy that a case begins at over that asked, by the annulus's thickness if only volumes count."""
+    return _BEGIN[hold] if thickness is None else min(_VOLUME * thickness, 1.0)
 
 
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
@@ -325,7 +344,9 @@ def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand
 
     How finely depends on the case alone; those that want the same are solved together.
     """
-    first = _first_accuracy(task.accuracy, demand.accuracy, _beginning(task, demand))
+    volumes = _only_volumes(task.rule, task.hold, demand.outputs)
+    share = _beginning(task.hold, 1.0 - task.profile.inside(task.level) if volumes else None)
+    first = _first_accuracy(task.accuracy, demand.accuracy, share)
     left = dict.fromkeys(range(len(wanted)), first)
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:

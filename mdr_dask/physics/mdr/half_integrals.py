@@ -7,7 +7,7 @@ integrals of polynomials. One set of matrices, on [0, 1], serves every contact t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -74,7 +74,7 @@ class Panels:
     slope: FloatArray
     weights: FloatArray
 
-    @property
+    @cached_property
     def nodes(self) -> FloatArray:
         """All nodes, increasing."""
         return self.mesh.nodes

@@ -40,6 +40,9 @@ class Settings(NamedTuple):
         Step of the differences by the edge and what follows it.
     first : float
         Longest first step, over the time in which a contact changes: little wear is right to 2 %.
+    shortest, beginning : float
+        Step at which a march gives up, over the longest so far, or the first one if that is shorter; and over the first
+        one while none has been taken. Of those that got through, none took one below 0.13 later, some 1e-5 to begin.
     """
 
     most_steps: int = 20000
@@ -49,6 +52,8 @@ class Settings(NamedTuple):
     theta_ratio: float = 1.7
     difference: float = 1e-7
     first: float = 1e-3
+    shortest: float = 1e-4
+    beginning: float = 1e-9
 
 
 SETTINGS = Settings()
@@ -75,6 +80,8 @@ class Resolution(NamedTuple):
         How much more slowly than usual the error falls from them.
     second : float
         Share of the distance from the second of them, which counts where the first is close by chance.
+    newton : float
+        Under constant force, error of the solution of a step's equations over that of the step.
     """
 
     accuracy: float
@@ -85,6 +92,7 @@ class Resolution(NamedTuple):
     rough: tuple[float, float] = (8.0, 64.0)
     slowness: float = 1.0
     second: float = 0.5
+    newton: float = 1e-3
 
     @property
     def step(self) -> float:
@@ -110,8 +118,8 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * (halvings + 1)), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
-        """Return the resolution for a finer accuracy."""
-        return self._replace(accuracy=self.accuracy / factor)
+        """Return the resolution for a finer accuracy where a march failed: equations are solved more closely, too."""
+        return self._replace(accuracy=self.accuracy / factor, newton=0.01 * self.newton)
 
     def halfway_to(self, finer: Resolution) -> Resolution:
         """Return a resolution with steps between those of two."""
@@ -219,19 +227,21 @@ def march(
     """
     newton = _Newton(problem, tolerance)
     history = [settled(problem) if start is None else start]
-    step = first
+    step, longest = first, 0.0
     while history[-1].time < end and not stops(history[-1]):
         if len(history) > SETTINGS.most_steps:
             raise NotConvergedError(f"{Outcome.TOO_MANY_STEPS.sentence} of the wear law: {SETTINGS.most_steps}")
         time = history[-1].time
+        least = max(SETTINGS.beginning * first, SETTINGS.shortest * min(longest, first))
+        if time + step == time or step < least:
+            raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
         moment, error = _try_step(problem, newton, history, time + step)
         power = 1.0 / (min(len(history), 3) + 1)
         if moment is None or error > tolerance:
             step *= 0.25 if moment is None else max(0.2, 0.8 * (tolerance / error) ** power)
-            if time + step == time or step < 1e-9 * first:
-                raise NotConvergedError(f"{Outcome.STEP_TOO_SMALL.sentence} in the wear law at {time:.6g}")
             continue
         history.append(moment)
+        longest = max(longest, step)
         growth = min(SETTINGS.growth, 0.85 * (tolerance / max(error, 1e-300)) ** power)
         step *= growth if growth > 1.1 or growth < 0.9 else 1.0
     return history
@@ -339,7 +349,7 @@ class _Newton:
         unknowns, last, renew = guess.copy(), np.inf, fresh
         for _ in range(SETTINGS.most_iterations):
             residual = self.problem.residual(unknowns, theta, known(unknowns))
-            if not np.all(np.isfinite(residual)):
+            if not np.isfinite(residual).all():
                 return None
             if renew:
                 self._renew(unknowns, theta, known, residual)
@@ -347,7 +357,7 @@ class _Newton:
                 return None
             change = self.factors.solve(residual)
             unknowns = unknowns - change
-            size = float(np.max(np.abs(change)))
+            size = float(np.abs(change).max())
             if not (np.isfinite(size) and self.problem.holds(unknowns)):
                 return None
             rate = size / last

@@ -16,6 +16,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.mdr.half_integrals import interpolate
 from mdr_dask.physics.mdr.revolution import Profile
+from mdr_dask.physics.wear.approach import nearly_limit
 from mdr_dask.physics.wear.evolution import Dense, NotConvergedError, Resolution, integral_along, march
 from mdr_dask.physics.wear.forced import (
     border_moves,
@@ -32,7 +33,9 @@ from mdr_dask.physics.wear.worn import Scar, Worn, check_stick_radius, contact_p
 COARSEST = 1e-2
 #: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
 #: solution; ``python -m benchmarks accuracy measure wear``.
-WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 4.0), (1e-2, 2.0)), 0.1, 0.25
+WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
+#: In gross slip at constant depth: the same; all of the error is that of the edge where panels are fine enough.
+SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
 #: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
 Found = TypeVar("Found")
@@ -84,21 +87,31 @@ def exact(
     >>> print(f"{few.wear_volume:.3f} {many.wear_volume:.3f}")
     0.131 0.759
     """
-    solve: Solver
+    wanted = sorted({float(amount) for amount in amounts})
     if stick_radius == 0.0:
-        solve = _slid_under_force if constant_force else _slid
+        solve: Solver = _slid_under_force if constant_force else _slid
+        done: dict[float, Worn] = {}
     else:
         check_stick_radius(stick_radius)
         solve = forced_contacts if constant_force and border_moves(stick_radius, accuracy) else _fretted
-    wanted = sorted({float(amount) for amount in amounts})
-    resolutions: dict[Solver, Callable[[float], Resolution]] = {
-        forced_contacts: forced_resolution,
-        _fretted: partial(fretted_resolution, stick_radius),
-    }
-    resolution = resolutions.get(solve, Resolution)(min(accuracy, COARSEST))
-    found, *rougher = _solutions(lambda one: solve(profile, stick_radius, wanted, one), resolution, errors)
+        done = nearly_limit(profile, stick_radius, wanted, accuracy) if solve is _fretted else {}
     least = least_edge_error(stick_radius, accuracy) if constant_force and stick_radius > 0.0 else 0.0
-    judged = {
+    if left := [amount for amount in wanted if amount not in done]:
+        done |= _evolved(
+            partial(solve, profile, stick_radius, left),
+            _resolution(solve, stick_radius, accuracy),
+            least,
+            errors=errors,
+        )
+    return [done[float(amount)] for amount in amounts]
+
+
+def _evolved(
+    solve: Callable[[Resolution], dict[float, Worn]], resolution: Resolution, least: float, *, errors: bool
+) -> dict[float, Worn]:
+    """Return contacts with what tells their errors."""
+    found, *rougher = _solutions(solve, resolution, errors)
+    return {
         amount: replace(
             one,
             rougher=tuple(other[amount] for other in rougher),
@@ -108,7 +121,6 @@ def exact(
         )
         for amount, one in found.items()
     }
-    return [judged[float(amount)] for amount in amounts]
 
 
 def limit_under_force(profile: Profile, stick_radius: float, accuracy: float = 1e-3, *, errors: bool = True) -> Worn:
@@ -151,14 +163,29 @@ def _first_of(solve: Callable[[Resolution], Found], ways: Sequence[Resolution]) 
     return solve(ways[-1])
 
 
+def _resolution(solve: Solver, stick_radius: float, accuracy: float) -> Resolution:
+    """Return the resolution that a way of solving needs for an accuracy."""
+    at_most = min(accuracy, COARSEST)
+    if solve is forced_contacts:
+        return forced_resolution(at_most)
+    if solve is _slid:
+        return Resolution(at_most, wider=_wider(at_most, SLID_WIDER))
+    return fretted_resolution(stick_radius, at_most) if solve is _fretted else Resolution(at_most)
+
+
+def _wider(accuracy: float, table: tuple[tuple[float, float], ...], power: float = 1.0) -> float:
+    """Return how much wider steps are at an accuracy, by a table in logarithms."""
+    return float(np.exp(power * np.interp(np.log(accuracy), *np.log(table).T)))
+
+
 def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
     """Return the resolution for an accuracy at constant depth: the error falls as the root of that of the steps.
 
     Steep bodies need more nodes a panel. A thin annulus of slip is worn off in few steps.
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
-    wider = np.exp(min((1.0 - stick_radius) / THIN, 1.0) * np.interp(np.log(accuracy), *np.log(WIDER).T))
-    return Resolution(accuracy, wider=float(wider), order=order, second=SECOND)
+    wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
+    return Resolution(accuracy, wider=wider, order=order, second=SECOND)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:

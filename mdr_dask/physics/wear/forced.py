@@ -67,8 +67,11 @@ def forced_contacts(
     profile: Profile, stick_radius: float, wanted: Sequence[float], resolution: Resolution
 ) -> dict[float, Worn]:
     """Solve once and describe every wanted time."""
-    moving, first = _until_jump(profile, stick_radius, resolution)
-    _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
+    tabulated = bool(np.isfinite(profile.largest_radius))
+    until = SETTINGS.latest_jump if tabulated else max(wanted)
+    moving, first = _until_jump(profile, stick_radius, resolution, until)
+    if tabulated:
+        _end(moving, first[-1])  # the table must hold it, however few cycles are wanted
     standing, start = moving.stand(first[-1])
     second = march(standing, max(wanted), resolution.step, _first(moving, resolution), start)
     early, late = Dense(first), Dense(second)
@@ -90,7 +93,7 @@ def forced_end(profile: Profile, stick_radius: float, resolution: Resolution) ->
     What sticks is frozen and carries the force alone: g = d beyond the border b, with d = (F/2 + int_0^b g dx) / b, and
     the scar's radius from int_0^a (g - g0) / sqrt(a^2 - x^2) dx = 0.
     """
-    problem, moments = _until_jump(profile, stick_radius, resolution)
+    problem, moments = _until_jump(profile, stick_radius, resolution, SETTINGS.latest_jump)
     return _end(problem, moments[-1])
 
 
@@ -133,11 +136,13 @@ def _first(problem: ForcedSlip, resolution: Resolution) -> float:
     return resolution.first * float(np.sqrt(problem.virgin.virgin_width))
 
 
-def _until_jump(profile: Profile, stick_radius: float, resolution: Resolution) -> tuple[ForcedSlip, list[Pressed]]:
-    """March while the border moves; return problem and moments."""
+def _until_jump(
+    profile: Profile, stick_radius: float, resolution: Resolution, end: float
+) -> tuple[ForcedSlip, list[Pressed]]:
+    """March while the border moves, or to an end; return problem and moments."""
     near = round(-2.0 * np.log2(max(stick_radius, SETTINGS.nearest)))
     panels = resolution.panels(near + SETTINGS.finer, fewest_digits=3.0)
-    problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius))
+    problem = forced_slip(profile, stick_radius, panels, farthest_contact(profile, stick_radius), resolution.newton)
     moving, start = problem.move(settled(problem))
     last, size = panels.mesh.order - 1, panels.nodes.size
 
@@ -150,7 +155,7 @@ def _until_jump(profile: Profile, stick_radius: float, resolution: Resolution) -
         beyond = problem.radius(moment.border + moment.unknowns[size - 1]) > profile.largest_radius
         return bool(jumps or beyond or is_torn(moment))
 
-    moments = march(moving, SETTINGS.latest_jump, resolution.step, _first(problem, resolution), start, stops)
+    moments = march(moving, end, resolution.step, _first(problem, resolution), start, stops)
     return moving, moments[:-1] if is_torn(moments[-1]) else moments
 
 

@@ -11,10 +11,10 @@ depth from 1 in units of eta: all unknowns are of the order of one, next to full
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class ForcedSlip:
 
     Unknowns: y = 1 - (d - g) / eta at the nodes but the last, the width of the panels, the depth, and the border unless
     `border` says where it stands; `stood` is then the number of the pair of the path that it stands from, and
-    `frozen` the worn depth at it. Loads are half
+    `frozen` the worn depth at it; `newton` is the error of a step's equations over that of the step. Loads are half
     forces over eta; `virgin_load` is that of the virgin slip zone.
     """
 
@@ -78,9 +78,9 @@ class ForcedSlip:
     border: float | None = None
     stood: int = 0
     frozen: float = np.nan
-    newton: ClassVar[float] = 1e-5
+    newton: float = 1e-5
 
-    @property
+    @cached_property
     def panels(self) -> Panels:
         """The panels between the border and the edge."""
         return self.virgin.panels
@@ -96,6 +96,11 @@ class ForcedSlip:
         return self.virgin.eta
 
     @cached_property
+    def size(self) -> int:
+        """The number of nodes."""
+        return self.panels.nodes.size
+
+    @cached_property
     def body(self) -> VirginBody:
         """The virgin body for compiled code."""
         return VirginBody(self.virgin.virgin_slip, self.virgin.inner_radius**2, self.virgin.virgin_width)
@@ -107,15 +112,14 @@ class ForcedSlip:
 
     def image(self, unknowns: FloatArray) -> FloatArray:
         """Return y at all nodes."""
-        y = unknowns[: self.panels.nodes.size].copy()
+        y = unknowns[: self.size].copy()
         y[-1] = 1.0
         return y
 
     def place(self, unknowns: FloatArray) -> Place:
         """Return where the contact stands."""
-        size = self.panels.nodes.size
         border = float(unknowns[-1]) if self.border is None else self.border
-        return Place(border, float(unknowns[size - 1]), float(unknowns[size]))
+        return Place(border, float(unknowns[self.size - 1]), float(unknowns[self.size]))
 
     def holds(self, unknowns: FloatArray) -> bool:
         """Tell whether unknowns describe a contact."""
@@ -159,7 +163,7 @@ class ForcedSlip:
         )
 
         def known(unknowns: FloatArray) -> FloatArray:
-            result = np.empty(2 * self.panels.nodes.size + 1)
+            result = np.empty(2 * self.size + 1)
             remember(self.mesh, self.body, remembered, self.place(unknowns), result)
             return result
 
@@ -217,19 +221,21 @@ class ForcedSlip:
 
     def residual(self, unknowns: FloatArray, theta: float, known: FloatArray) -> FloatArray:
         """Return s - known - theta (p / eta) s at the nodes; then continuity at the edge, force, and y = 0 at b."""
-        size = self.panels.nodes.size
-        slip = self.slip(unknowns)
+        size, y, place = self.size, self.image(unknowns), self.place(unknowns)
+        root, factor = math.sqrt(self.body.width * place.width), self._factor(place)
+        slip, rate = self.panels.inner @ (y * factor), self.panels.outer @ y
+        rate[-1] = 0.0
         rows = np.empty(unknowns.size)
-        rows[:size] = slip - known[:size] - theta * self.rate(unknowns) * slip
-        rows[size] = known[-1] + self.slipping_load(unknowns) - self.virgin_load
+        rows[:size] = slip * (1.0 - theta / root * rate) - known[:size]
+        rows[size] = known[-1] + 0.5 * root * (self.panels.weights @ ((1.0 - y) * factor)) - self.virgin_load
         if self.border is None:
-            rows[-1] = self.at_border @ self.image(unknowns)
+            rows[-1] = self.at_border @ y
         return rows
 
     def jacobian(self, unknowns: FloatArray, theta: float) -> FloatArray:
         """Return the derivatives by y."""
         place = self.place(unknowns)
-        size, root, factor = self.panels.nodes.size, np.sqrt(self.body.width * place.width), self._factor(place)
+        size, root, factor = self.size, np.sqrt(self.body.width * place.width), self._factor(place)
         slip, rate = self.slip(unknowns), self.rate(unknowns)
         slip[-1] = 0.0
         result = np.zeros((unknowns.size, unknowns.size))
@@ -254,14 +260,14 @@ class ForcedSlip:
     def worn(self, unknowns: FloatArray) -> FloatArray:
         """Return s at the nodes, the depth, and the border: what the error of a step is judged by."""
         weight = BORDER_WEIGHT * (1.0 - self.virgin.inner_radius) / self.eta
-        tail = unknowns[self.panels.nodes.size :] * ([1.0, weight] if self.border is None else 1.0)
+        tail = unknowns[self.size :] * ([1.0, weight] if self.border is None else 1.0)
         return np.append(self.slip(unknowns), tail)
 
     def moment(
         self, time: float, unknowns: FloatArray, theta: float, known: FloatArray, past: Sequence[Pressed]
     ) -> Pressed:
         """Return the moment that a solved step ends in; its worn depth is what came before and what the step wore."""
-        size, place, before = self.panels.nodes.size, self.place(unknowns), past[0]
+        size, place, before = self.size, self.place(unknowns), past[0]
         worn = known[size : 2 * size] + theta * self.rate(unknowns) * self.slip(unknowns)
         path = onward(before.path, place)
         moved = self.plateau_rise(path[:, : self._turn(path) + 1], place.border + place.width * self.mesh.nodes)
@@ -276,12 +282,14 @@ class ForcedSlip:
         return float(self.eta * root * self.panels.weights @ (y * (1.0 - y) * self._factor(place)))
 
 
-def forced_slip(profile: Profile, stick_radius: float, panels: Panels, reach: float) -> ForcedSlip:
+def forced_slip(
+    profile: Profile, stick_radius: float, panels: Panels, reach: float, newton: float = 1e-5
+) -> ForcedSlip:
     """Prepare partial slip under the force of the virgin contact."""
     virgin = partial_slip(profile, stick_radius, panels, reach)
     y, factor = virgin.image(settled(virgin).unknowns)
     load = 0.5 * np.sqrt(virgin.virgin_width) * panels.weights @ ((1.0 - y) * factor)
-    return ForcedSlip(virgin, float(load), 0.0, frozen=0.0)
+    return ForcedSlip(virgin, float(load), 0.0, frozen=0.0, newton=newton)
 
 
 def rising(path: FloatArray) -> tuple[FloatArray, FloatArray]:

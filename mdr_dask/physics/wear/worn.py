@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ Function = Callable[[FloatArray], FloatArray]
 FUNCTIONS = {"worn_profile": "height", "worn_image": "image", "pressure": "pressure"}
 
 VOLUMES = ("wear_volume", "energy_volume")
+#: Numbers that solutions of wrong shape agree on by chance, at the depth of the virgin contact.
+SHAPED, KEPT_DEPTH = ("normal_force", "worn_depth"), 1.0
 NOWHERE = np.zeros(0)
 
 
@@ -35,6 +38,8 @@ class Settings(NamedTuple):
         Error over the distance from rougher solutions.
     step : float
         Error of the contact radius over the way that it moves in a step, at least.
+    shape : float
+        Share of the profile's largest error that force and worn depth have at constant depth, at least.
     volumes : float
         Share of the distances of shape and energy that counts for volumes, beside that between the two.
     reach : int
@@ -44,7 +49,8 @@ class Settings(NamedTuple):
     """
 
     safety: float = 1.5
-    step: float = 0.15
+    step: float = 0.2
+    shape: float = 0.15
     volumes: float = 0.14
     reach: int = 5
     floor: float = 0.02
@@ -140,9 +146,16 @@ class Worn:
             apart = sum(float(self._distance(name)) for name in VOLUMES)
             return self.slowness * abs(self.wear_volume - self.energy_volume) + SETTINGS.volumes * apart
         error = SETTINGS.safety * float(self._distance(output))
+        if output in SHAPED and self.depth == KEPT_DEPTH:
+            return max(error, SETTINGS.shape * self._error_of_shape)
         if output == "contact_radius":
             return max(error, self.least_edge_error, SETTINGS.step * self.edge_step)
         return max(error, self.least_edge_error) if output == "stick_border" else error
+
+    @cached_property
+    def _error_of_shape(self) -> float:
+        """The largest error of the profile."""
+        return SETTINGS.safety * float(np.max(self._distance("worn_profile", self._crowd(0.0))))
 
     def _distance(self, output: str, places: FloatArray = NOWHERE) -> FloatArray:
         """Return the distance from the rougher solutions, the larger where there are both."""

@@ -67,6 +67,21 @@ def test_little_wear_is_of_the_first_order(exponent, c, accuracy):
         np.testing.assert_allclose((worn.height(radii) - profile.height(radii)) / n, first, rtol=0.02, atol=2e-16 / n)
 
 
+@pytest.mark.parametrize(
+    ("exponent", "c", "cycles", "accuracy", "output"),
+    [
+        (2.8409861917323287, 0.38276379851571146, 0.7382542805630963, 1e-3, "normal_force"),
+        (1.414987831938601, 0.8357478290019276, 0.05237050450723277, 1e-4, "normal_force"),
+        (2.977630556812393, 0.7351932292384221, 1.6135374146295387, 1e-3, "worn_depth"),
+        (3.5364244328201946, 0.11509030076629206, 2.5838600413720765, 1e-3, "worn_depth"),
+    ],
+)
+def test_solutions_of_wrong_shape_do_not_agree_by_chance(exponent, c, cycles, accuracy, output):
+    """Rougher solutions had nearly the same number: it was off by 3.6 to 3.9 times its stated error."""
+    worn, true = (exact(PowerProfile(exponent), c, [cycles], one)[0] for one in (accuracy, 1e-5))
+    assert abs(worn.value(output, PLACES) - true.value(output, PLACES)) < 2.0 * worn.error(output, PLACES)
+
+
 @pytest.fixture(scope="module", params=["depth", "force"])
 def slid(request):
     """Random bodies, blunt and sharp, slid at constant depth or force, with what a far finer solution says."""
