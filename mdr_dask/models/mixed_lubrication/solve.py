@@ -160,7 +160,7 @@ def _realise(
 def _errors(turn: Turn, solve: Callable[[int], Turn], block: Block[MixedLubrication]) -> FloatArray:
     """Return the errors of a turn from its first parts on other lines, or from all parts where those miss the accuracy.
 
-    All parts know the scatter better, and cost a part of what a turn on more points does.
+    All parts know change and scatter better, and cost less than a turn on more points.
     """
     other = solve(SETTINGS.sample)
     errors = turn.errors(other)

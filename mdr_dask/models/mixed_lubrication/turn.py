@@ -27,7 +27,8 @@ class Settings(NamedTuple):
     Parameters
     ----------
     change, scatter : float
-        Shares of the change from the other lines, and of its standard error as the parts of the turn tell it.
+        Shares of the change from the other lines, and of its standard deviation from part to part of the turn. This
+        share is the same however many parts are compared, so that more of them only know both better.
     ends : float
         Standard errors of a sum of as many places, each known to a step, as where contact begins or ends.
     clusters : float
@@ -38,7 +39,7 @@ class Settings(NamedTuple):
     """
 
     change: float = 1.0
-    scatter: float = 1.5
+    scatter: float = 0.75
     ends: float = 2.0
     clusters: float = 18.0
     parts: int = 16
@@ -93,8 +94,7 @@ class Turn:
         changes = self._means()[:, : other.parts] - other._means()
         change = np.abs(changes.mean(axis=1))
         if self.parts >= SETTINGS.fewest:
-            scatter = changes.std(axis=1, ddof=1) / np.sqrt(other.parts)
-            change = SETTINGS.change * change + SETTINGS.scatter * scatter
+            change = SETTINGS.change * change + SETTINGS.scatter * changes.std(axis=1, ddof=1)
         in_contact = self.length / self.probability if self.length else self.spacing * min(self.per_wave, STRIDES)
         return np.asarray(change + self._unseen() * np.array([1, in_contact]))
 
