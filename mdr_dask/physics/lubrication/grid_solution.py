@@ -17,7 +17,7 @@ _SPIKE = 0.01
 #: Positions between two cells at which the lowest film is looked for.
 _SUBDIVISION = 41
 #: Share of a cell by which the pressures of a grid end too early, where the film ends at a node.
-_TOO_EARLY = 0.1
+_TOO_EARLY = 0.035
 
 
 @dataclass(frozen=True)
@@ -85,14 +85,11 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Where the film ends, from three values of the pressure, which goes out like a square.
-
-        The last value is not used: it depends on where in its cell the film ends.
-        """
+        """Where the film ends, from the last four values of the pressure, which goes out like a square."""
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
-        x, root = self.nodes[max(last - 3, 0) : last], np.sqrt(self.pressure[max(last - 3, 0) : last])
-        if not (root.size == 3 and root[0] > root[1] > root[2] > 0):
+        x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
+        if not (root.size == 4 and np.all(np.diff(root) < 0)):
             return float(behind)
         cell = behind - self.nodes[last]
         end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
@@ -131,6 +128,12 @@ def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> Floa
 
 
 def _at_zero(x: list[float], values: list[float]) -> float:
-    """Return the parabola through three values at x, at zero."""
-    (a, b, c), (at_a, at_b, at_c) = x, values
-    return at_a * b * c / ((a - b) * (a - c)) + at_b * a * c / ((b - a) * (b - c)) + at_c * a * b / ((c - a) * (c - b))
+    """Return the polynomial through values at x, at zero."""
+    total = 0.0
+    for i, value in enumerate(values):
+        share = value
+        for j, other in enumerate(x):
+            if j != i:
+                share *= other / (other - x[i])
+        total += share
+    return total
