@@ -103,6 +103,8 @@ class Settings(NamedTuple):
     adapted_nodes: int = 161
     adaptations: int = 2
     nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
+    apart: float = 1.3
+    order: float = 3.5
     end_order: float = 4.0
     further: float = 0.1
     further_steps: int = 12
@@ -404,7 +406,9 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     """
     outcome, source, steps = _adapted_solution(case, settings)
     failure, found, solved = (outcome, source), None, list[GridSolution]()
-    for count in settings.nodes if outcome == Outcome.CONVERGED else ():
+    ahead = list(settings.nodes) if outcome == Outcome.CONVERGED else []
+    while ahead:
+        count = _next_nodes(ahead, found, accuracy, settings)
         outcome, finer = _refined(case, _nearest(solved, source), source, count, settings)
         steps += finer.steps
         if outcome == Outcome.CONVERGED:
@@ -418,6 +422,15 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
             if found.error <= accuracy:
                 break
     return found or _no_solution(case, *failure, steps)
+
+
+def _next_nodes(ahead: list[int], found: LineSolution | None, accuracy: float, settings: Settings) -> int:
+    """Return the nodes of the next grid, taken from those ahead; or half way there if these are expected to do."""
+    if found is not None and ahead[0] > settings.apart * (last := found.finest.nodes.size):
+        halfway = round(np.sqrt(last * ahead[0]))
+        if found.error * (last / halfway) ** settings.order <= accuracy:
+            return halfway
+    return ahead.pop(0)
 
 
 def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[GridSolution]:
