@@ -16,6 +16,8 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 _SPIKE = 0.01
 #: Positions between two cells at which the lowest film is looked for.
 _SUBDIVISION = 41
+#: Nodes on either side of a position that a polynomial goes through; the lowest film of coarse grids needs more.
+_CUBIC, _QUINTIC = 2, 3
 #: Share of a cell by which the pressures of a grid end too early, where the film ends at a node.
 _TOO_EARLY = 0.035
 
@@ -37,7 +39,7 @@ class GridSolution:
 
     def film_between(self, positions: FloatArray) -> FloatArray:
         """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
-        film = _cubic(self.nodes, self.film, positions)
+        film = _between(self.nodes, self.film, positions, _CUBIC)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
@@ -45,7 +47,7 @@ class GridSolution:
     def pressure_between(self, positions: FloatArray) -> FloatArray:
         """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
-        return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
+        return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     @cached_property
     def density(self) -> FloatArray:
@@ -55,14 +57,17 @@ class GridSolution:
     @cached_property
     def central_film(self) -> float:
         """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
-        return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
+        return float(_between(self.nodes, self.film, np.zeros(1), _CUBIC)[0])
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the lowest film, between the nodes around the lowest one."""
+        """Position and height of the lowest film, between the nodes around the lowest one.
+
+        A cubic there is off by more than what is left of the grids' error.
+        """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
-        heights = _cubic(self.nodes, self.film, positions)
+        heights = _between(self.nodes, self.film, positions, _QUINTIC)
         k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
         left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
         if not right > left:
@@ -105,11 +110,11 @@ class GridSolution:
 
 
 @kernel
-def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the cubic through the two nodes before and the two behind each position."""
+def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
+    """Return the polynomial through as many nodes before as behind each position, `sides` each."""
     result = np.empty(positions.size)
     for k in range(positions.size):
-        low, high = 2, nodes.size - 2  # of the first node that is not before the position
+        low, high = sides, nodes.size - sides  # of the first node that is not before the position
         while low < high:
             middle = (low + high) // 2
             if nodes[middle] < positions[k]:
@@ -117,9 +122,9 @@ def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> Floa
             else:
                 high = middle
         total = 0.0
-        for i in range(low - 2, low + 2):
+        for i in range(low - sides, low + sides):
             share = values[i]
-            for j in range(low - 2, low + 2):
+            for j in range(low - sides, low + sides):
                 if j != i:
                     share *= (positions[k] - nodes[j]) / (nodes[i] - nodes[j])
             total += share
