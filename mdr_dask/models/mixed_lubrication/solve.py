@@ -164,8 +164,9 @@ def _errors(turn: Turn, solve: Callable[[int], Turn], block: Block[MixedLubricat
     """
     other = solve(SETTINGS.sample)
     errors = turn.errors(other)
-    known = other.parts == turn.parts or block.accuracy is None
-    if known or points.miss(turn, errors, block.accuracy, block.outputs) <= 1:
+    if block.accuracy is None or other.parts == turn.parts:
+        return errors
+    if points.miss(turn, errors, block.accuracy, block.outputs) <= 1:
         return errors
     return turn.errors(solve(1))
 
