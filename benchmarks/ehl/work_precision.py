@@ -12,8 +12,8 @@ import sys
 import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
-from mdr_dask.physics.lubrication import grids as ehl_grid
 from mdr_dask.physics.lubrication import film_formulas, line_contact
+from mdr_dask.physics.lubrication import grids as ehl_grid
 from mdr_dask.physics.lubrication.newton import Grid, Pace, newton
 from mdr_dask.physics.outcome import Outcome
 
