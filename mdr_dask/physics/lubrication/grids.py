@@ -128,6 +128,13 @@ def ladder(nodes: Sequence[int]) -> list[int]:
     return sorted((*nodes, *halfway))
 
 
+def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
+    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
+    reach = float(np.sqrt(2 * central))
+    width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
+    return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
+
+
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:
     """Return the second divided differences at the nodes, those at the ends repeated from inside."""
     width = np.diff(nodes)

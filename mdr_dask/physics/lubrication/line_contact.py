@@ -66,6 +66,9 @@ class Settings(NamedTuple):
     leap, order : int, float
         Greatest number of rungs to a grid that is expected to meet the accuracy, on a ladder with one half way between
         each two of `nodes`, and the power of the spacing that the stated error is expected to fall like.
+    smooth : float
+        Logarithm of the viscosity at Hertz' pressure from which on `nodes` follow each other: where the pressure has a
+        spike, grids near each other tell less of what is left.
     end_order : float
         Power of the spacing that the error of a film's end goes like: where a finer grid lets expect it.
     further : float
@@ -106,10 +109,11 @@ class Settings(NamedTuple):
     adaptations: int = 2
     nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
     leap: int = 3
+    smooth: float = 15.0
     order: float = 4.0
     end_order: float = 4.0
     further: float = 0.1
-    further_steps: int = 12
+    further_steps: int = 9
     fourth: float = 2.0
     floor: float = 0.01
     sharpest: float = 50.0
@@ -151,6 +155,11 @@ class LineContact(NamedTuple):
     def film_number(self) -> float:
         """Return ``K = (3 pi^2/4) U/W^2``."""
         return 3 * np.pi**2 / (8 * self.M**2)
+
+    @property
+    def log_viscosity(self) -> float:
+        """Return ``ln(eta/eta0)`` at Hertz' pressure."""
+        return float(log_viscosities(np.ones(1), self.liquid)[0])
 
     @property
     def liquid(self) -> Liquid:
@@ -300,13 +309,6 @@ def _solve_on(
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total, spacing)
 
 
-def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
-    reach = float(np.sqrt(2 * central))
-    width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
-    return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
-
-
 def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution]:
     """Return the solution on a first grid, by the first of the known ways that leads there."""
     for attempt in settings.attempts:
@@ -315,15 +317,10 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
         guess = min(guess, attempt.starved * inlet**2)
         nodes = grids.first_grid(guess, inlet, attempt.nodes)
         pace = Pace(attempt.clip, settings.attempt_steps)
-        outcome, state = _solve_on(case, nodes, _first_pressure(nodes, guess), guess, (pace,))
+        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, (pace,))
         if outcome == Outcome.CONVERGED:
             break
     return outcome, state
-
-
-def _density(source: GridSolution) -> tuple[FloatArray, FloatArray]:
-    """Return positions and the density of nodes there that a solution asks for."""
-    return source.nodes, grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
 
 
 def _refined(
@@ -421,7 +418,8 @@ def _next_rung(rungs: Sequence[int], at: int, found: LineSolution | None, accura
     error = found.error if found else np.inf
     if error <= accuracy or at == len(rungs) - 1:
         return len(rungs)
-    for further in range(at + 1, min(at + 1 + settings.leap, len(rungs))):
+    leap = settings.leap if found and found.case.log_viscosity < settings.smooth else 0
+    for further in range(at + 1, min(at + 1 + leap, len(rungs))):
         if error * (rungs[at] / rungs[further]) ** settings.order <= accuracy:
             return further
     return min(at + 2, len(rungs) - 1)
@@ -434,7 +432,7 @@ def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[G
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
-    viscosity = min(float(log_viscosities(np.ones(1), case.liquid)[0]), SETTINGS.sharpest)
+    viscosity = min(case.log_viscosity, SETTINGS.sharpest)
     narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
     share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
     films = _tends_to(solved, lambda grid: np.array([grid.central_film, grid.minimum[1]]), share, SETTINGS.fourth)
