@@ -118,7 +118,7 @@ class Settings(NamedTuple):
     floor: float = 0.01
     sharpest: float = 50.0
     spike: float = 0.15
-    narrow: float = 0.004
+    narrow: float = 0.008
     thick: float = 30.0
     cut: float = 0.1
     placed: float = 0.1
