@@ -12,8 +12,8 @@ import sys
 import numpy as np
 
 from benchmarks.measures import draw_errors, print_table, timed
+from mdr_dask.physics.lubrication import film_formulas, line_contact
 from mdr_dask.physics.lubrication import grids as ehl_grid
-from mdr_dask.physics.lubrication import line_contact
 from mdr_dask.physics.lubrication.newton import Grid, Pace, newton
 from mdr_dask.physics.outcome import Outcome
 
@@ -40,7 +40,7 @@ def finest_grid(case, accuracy):
 
 def uniform(case, count):
     """Equal spacing from the first guess of the pressure: what the literature's Newton solvers do."""
-    guess = 1.5 * line_contact.expected_film(case.M, case.L)
+    guess = 1.5 * film_formulas.expected_film(case.M, case.L)
     start, end = max(ehl_grid.inlet_position(guess), -20 * np.sqrt(2 * guess) - 1), 1.5
     grid = Grid.of(np.linspace(start, end, count))
     P = np.sqrt(np.maximum(1 - grid.nodes**2, 0))

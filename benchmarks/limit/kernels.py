@@ -206,7 +206,7 @@ def _films() -> tuple[Any, Any, Any]:
 
     case = line_contact.line_contact((2.0452e-5, 1e-11, 5007.0), 115.385e9)
     nodes = grids.first_grid(0.1, grids.inlet_position(0.1), 121)
-    grid, pressure = Grid.of(nodes), line_contact._first_pressure(nodes, 0.1)
+    grid, pressure = Grid.of(nodes), grids.first_pressure(nodes, 0.1)
     return case, _State(nodes, pressure, film_on(grid, pressure, 0.1)), grid
 
 

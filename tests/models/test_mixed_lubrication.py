@@ -15,6 +15,7 @@ from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.mixed_lubrication.operation import operation_of
+from mdr_dask.models.mixed_lubrication.turn import rolling
 from mdr_dask.physics.lubrication import breakthrough, oil
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
 from mdr_dask.units import to_si
@@ -182,7 +183,7 @@ def test_errors_of_a_turn_come_from_other_splines_of_its_waves(force, parts, com
     changes = means[0] - means[1]
     change = abs(changes.mean(axis=0))
     if parts > 3:
-        change = change + 1.5 * changes.std(axis=0, ddof=1) / np.sqrt(compared)
+        change = change + 0.75 * changes.std(axis=0, ddof=1)
     (contact, length), width = turns[0], found["contact_half_width"][0, 0] * 2
     ends = np.count_nonzero(contact != np.roll(contact, 1))
     perimeter, per_wave = 2 * np.pi * 1e-3, 20_000 / int(2 * np.pi * 1e-3 / 1e-5)
@@ -226,8 +227,38 @@ def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
     )
 
 
+def turn_on_its_points(accuracy, realisation, outputs):
+    """Return a block of one case, its turn on the points that the accuracy begins with, and the errors of that turn:
+    from its first parts, and from all."""
+    rollers = {"points": "auto", "shortest_wavelength": 2e-6, "realisations": (realisation,)}
+    asked = dataclasses.replace(block(outputs, **rollers), accuracy=accuracy)
+    operation = points.first(operation_of(asked.case(0), accuracy), accuracy)
+    line, other = (operation.source.together(2013, realisation, which) for which in (False, True))
+    found = rolling(operation, line)
+    return asked, operation, found, *(found.errors(rolling(operation, other, compared)) for compared in (4, 1))
+
+
+def test_a_turn_that_misses_by_its_first_parts_is_judged_by_all_of_them_before_it_has_more_points():
+    asked, _, turn, of_parts, of_all = turn_on_its_points(0.1, 2, ["breakthrough_probability"])
+    assert of_all[0] < 0.1 * turn.probability < of_parts[0]
+    found = MODEL.compute(asked)
+    assert found.values["breakthrough_probability"] == turn.probability
+    assert found.values["breakthrough_probability_error"] == of_all[0]
+    assert not found.messages
+
+
+def test_lengths_ask_for_points_only_where_one_is_asked_for():
+    _, operation, turn, *_ = turn_on_its_points(0.1, 0, ["breakthrough_probability"])
+    errors = np.array(list(points.judged_by(turn).values())) * [0.05, 0.2]
+    finer = {name: points.finer(operation, turn, lambda: errors, 0.1, [name]) for name in ALL}
+    assert points.miss(turn, errors, 0.1, ["breakthrough_probability"]) == pytest.approx(0.5)
+    assert points.miss(turn, errors, 0.1, ALL) == pytest.approx(2.0)
+    assert {name for name, other in finer.items() if other is not None} == points.OF_LENGTH
+    assert points.finer(operation, turn, lambda: 3 * errors, 0.1, ["breakthrough_probability"]) is not None
+
+
 def test_a_case_is_on_the_points_of_its_layer_and_accuracy_whatever_its_neighbours():
-    """Bitwise as on so many points asked for, with all the outputs or one; other layers, other points."""
+    """Bitwise as on so many points asked for, with all the outputs or the length; other layers, other points."""
     columns = {"layer_thickness": np.array([1e-9, 3e-9, 8e-9]), "film_thickness": np.array([4e-7, 3e-7, 7e-7])}
     rollers = {"points": "auto", "shortest_wavelength": 4e-6}
     chosen = set()

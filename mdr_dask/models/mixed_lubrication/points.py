@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -16,6 +16,15 @@ from mdr_dask.models.mixed_lubrication.turn import Turn
 
 #: Relative error where the campaign names none.
 ACCURACY = 0.01
+#: Outputs of a turn that come from the lengths in contact of its windows.
+OF_LENGTH = {
+    "contact_length",
+    "contact_conductance",
+    "contact_resistance",
+    "contact_length_trace",
+    "upper_profile",
+    "lower_profile",
+}
 
 
 class Settings(NamedTuple):
@@ -59,7 +68,11 @@ def first(operation: Operation, accuracy: float | None) -> Operation:
 
 
 def finer(
-    operation: Operation, turn: Turn, errors: Callable[[], FloatArray], accuracy: float | None
+    operation: Operation,
+    turn: Turn,
+    errors: Callable[[], FloatArray],
+    accuracy: float | None,
+    outputs: Collection[str],
 ) -> Operation | None:
     """Return the case on more points if its turn misses an accuracy asked for and may have more, else None."""
     begun, here = first(operation, accuracy).source, operation.source
@@ -68,12 +81,19 @@ def finer(
     most = begun.points * SETTINGS.further
     if here.points >= min(most, MOST_POINTS):
         return None
-    of_probability, of_length = errors() / list(judged_by(turn).values())
-    miss = max(of_probability, of_length) / accuracy
-    if miss <= 1:
+    missed = miss(turn, errors(), accuracy, outputs)
+    if missed <= 1:
         return None
-    wanted = min(miss ** (1 / SETTINGS.slowest) * here.points, most)
+    wanted = min(missed ** (1 / SETTINGS.slowest) * here.points, most)
     return _on(operation, wanted / (LEAST_PER_WAVE * here.modes))
+
+
+def miss(turn: Turn, errors: FloatArray, accuracy: float, outputs: Collection[str]) -> float:
+    """Return the error over what an accuracy allows: that of the probability, or of the length where one is asked for
+    that comes from it and it is larger.
+    """
+    of_probability, of_length = errors / list(judged_by(turn).values())
+    return float(max(of_probability, of_length) if OF_LENGTH & set(outputs) else of_probability) / accuracy
 
 
 def judged_by(turn: Turn) -> dict[str, float]:

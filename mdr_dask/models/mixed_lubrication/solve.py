@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
 import numpy as np
 
+from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
 from mdr_dask.models.mixed_lubrication.turn import (
+    SETTINGS,
     Turn,
     creeping,
     profiles,
@@ -26,16 +28,7 @@ from mdr_dask.models.mixed_lubrication.turn import (
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
 FILM_RATIO_WARNING = 0.5
 #: Outputs of the turn of two lines, beside traces and profiles.
-_OF_TURN = {
-    "breakthrough_probability",
-    "contact_length",
-    "turn_error",
-    "contact_conductance",
-    "contact_resistance",
-    "contact_length_trace",
-    "upper_profile",
-    "lower_profile",
-}
+_OF_TURN = {"breakthrough_probability", "turn_error"} | points.OF_LENGTH
 _PROFILES = {"upper_profile", "lower_profile"}
 
 
@@ -137,16 +130,16 @@ def _realise(
     drawn = block.seed, block.realisations[position]
     lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
 
-    def solve(operation: Operation, other: bool = False) -> Turn:
+    def solve(operation: Operation, compared: int = 0) -> Turn:
         if operation.case.slide_roll_ratio == 0:
-            return rolling(operation, together(other), compared=other)
-        return creeping(operation, lines(other), compared=other)
+            return rolling(operation, together(compared > 0), compared)
+        return creeping(operation, lines(compared > 0), compared)
 
     again: dict[Source, list[tuple[int, Operation]]] = {}
     for index, operation in members:
         turn = solve(operation)
-        errors = cache(lambda turn=turn, operation=operation: turn.errors(solve(operation, other=True)))
-        finer = points.finer(operation, turn, errors, block.accuracy)
+        errors = cache(partial(_errors, turn, partial(solve, operation), block))
+        finer = points.finer(operation, turn, errors, block.accuracy, block.outputs)
         if finer is not None:
             again.setdefault(finer.source, []).append((index, finer))
             continue
@@ -162,6 +155,20 @@ def _realise(
             _store(result, block, index, position, profiles(operation, turn, lines(False)))
     for finer_source, members_again in again.items():
         _realise(result, block, finer_source, members_again, position)
+
+
+def _errors(turn: Turn, solve: Callable[[int], Turn], block: Block[MixedLubrication]) -> FloatArray:
+    """Return the errors of a turn from its first parts on other lines, or from all parts where those miss the accuracy.
+
+    All parts know change and scatter better, and cost less than a turn on more points.
+    """
+    other = solve(SETTINGS.sample)
+    errors = turn.errors(other)
+    if block.accuracy is None or other.parts == turn.parts:
+        return errors
+    if points.miss(turn, errors, block.accuracy, block.outputs) <= 1:
+        return errors
+    return turn.errors(solve(1))
 
 
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:

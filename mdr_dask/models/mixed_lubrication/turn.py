@@ -27,18 +27,19 @@ class Settings(NamedTuple):
     Parameters
     ----------
     change, scatter : float
-        Shares of the change from the other lines, and of its standard error as the parts of the turn tell it.
+        Shares of the change from the other lines, and of its standard deviation from part to part of the turn. This
+        share is the same however many parts are compared, so that more of them only know both better.
     ends : float
         Standard errors of a sum of as many places, each known to a step, as where contact begins or ends.
     clusters : float
         Clusters that other lines would judge otherwise, times the power 3/2 of the points of the shortest wave.
     parts, fewest, sample : int
-        Number of parts at most, one in `sample` of which are compared, and at least `fewest`; with fewer parts, each
-        two windows long, the error is the change.
+        Number of parts at most, one in `sample` of which are compared at first, and at least `fewest`; with fewer
+        parts, each two windows long, the error is the change.
     """
 
     change: float = 1.0
-    scatter: float = 1.5
+    scatter: float = 0.75
     ends: float = 2.0
     clusters: float = 18.0
     parts: int = 16
@@ -93,8 +94,7 @@ class Turn:
         changes = self._means()[:, : other.parts] - other._means()
         change = np.abs(changes.mean(axis=1))
         if self.parts >= SETTINGS.fewest:
-            scatter = changes.std(axis=1, ddof=1) / np.sqrt(other.parts)
-            change = SETTINGS.change * change + SETTINGS.scatter * scatter
+            change = SETTINGS.change * change + SETTINGS.scatter * changes.std(axis=1, ddof=1)
         in_contact = self.length / self.probability if self.length else self.spacing * min(self.per_wave, STRIDES)
         return np.asarray(change + self._unseen() * np.array([1, in_contact]))
 
@@ -119,19 +119,19 @@ class _Course(NamedTuple):
     parts: int
 
 
-def _course(operation: Operation, points: int, compared: bool) -> _Course:
+def _course(operation: Operation, points: int, compared: int) -> _Course:
     """Return the course of a turn in parts two windows long or longer, or of the first of them to be compared."""
     spacing = operation.length / points
     parts = whole = max(1, min(SETTINGS.parts, int(operation.length / (2 * operation.width))))
     if compared:
-        parts = max(min(SETTINGS.fewest, whole), whole // SETTINGS.sample)
+        parts = max(min(SETTINGS.fewest, whole), whole // compared)
     return _Course(spacing, operation.width / spacing, parts * points // whole, parts)
 
 
-def rolling(operation: Operation, line: FloatArray, compared: bool = False) -> Turn:
+def rolling(operation: Operation, line: FloatArray, compared: int = 0) -> Turn:
     """Return a turn of pure rolling, from the spline of both lines together, of any number of nodes.
 
-    Where it is only `compared` with another, the first parts of the turn do.
+    Where another one is to be `compared` with it, the first parts of the turn do: one in so many.
     """
     course = _course(operation, line.size, compared)
     stretch = line[: course.positions + int(course.width) + 2] if compared else line
@@ -141,7 +141,7 @@ def rolling(operation: Operation, line: FloatArray, compared: bool = False) -> T
     return Turn(contact, course.spacing, per_wave, apart, course.parts, clusters.start.size > 0)
 
 
-def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], compared: bool = False) -> Turn:
+def creeping(operation: Operation, lines: tuple[FloatArray, FloatArray], compared: int = 0) -> Turn:
     """Return a turn with creep, from windows an eighth of their width apart, of the splines of both lines."""
     points = lines[0].size
     course = _course(operation, points, compared)

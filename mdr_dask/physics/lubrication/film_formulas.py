@@ -268,6 +268,12 @@ def limiting_films(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> FloatArray:
     )
 
 
+def expected_film(M: float, L: float) -> float:
+    """Return the film in ``a^2/R`` that the four limiting regimes let expect; good for a first guess."""
+    rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
+    return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
+
+
 def regime(W: ArrayLike, U: ArrayLike, G: ArrayLike) -> NDArray[np.intp]:
     """Return the index in `REGIMES` of the regime of each point.
 

@@ -16,8 +16,10 @@ from mdr_dask.physics.lubrication.grids import adapted_density
 _SPIKE = 0.01
 #: Positions between two cells at which the lowest film is looked for.
 _SUBDIVISION = 41
+#: Nodes on either side of a position that a polynomial goes through; the lowest film of coarse grids needs more.
+_CUBIC, _QUINTIC = 2, 3
 #: Share of a cell by which the pressures of a grid end too early, where the film ends at a node.
-_TOO_EARLY = 0.1
+_TOO_EARLY = 0.035
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class GridSolution:
 
     def film_between(self, positions: FloatArray) -> FloatArray:
         """Return the film in ``a^2/R`` at any positions in half widths; NaN upstream of the oil."""
-        film = _cubic(self.nodes, self.film, positions)
+        film = _between(self.nodes, self.film, positions, _CUBIC)
         behind = positions > self.nodes[-1]
         film[behind] = film_at(positions[behind], self.nodes, self.pressure, self.central)
         return np.where(positions < self.nodes[0], np.nan, film)
@@ -45,7 +47,7 @@ class GridSolution:
     def pressure_between(self, positions: FloatArray) -> FloatArray:
         """Return the pressure in p0 at any positions in half widths; zero where there is no film."""
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
-        return np.where(inside, np.maximum(_cubic(self.nodes, self.pressure, positions), 0.0), 0.0)
+        return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
     @cached_property
     def density(self) -> FloatArray:
@@ -55,14 +57,17 @@ class GridSolution:
     @cached_property
     def central_film(self) -> float:
         """Film at ``X = 0`` in ``a^2/R``, between the nodes around it."""
-        return float(_cubic(self.nodes, self.film, np.zeros(1))[0])
+        return float(_between(self.nodes, self.film, np.zeros(1), _CUBIC)[0])
 
     @cached_property
     def minimum(self) -> tuple[float, float]:
-        """Position and height of the lowest film, between the nodes around the lowest one."""
+        """Position and height of the lowest film, between the nodes around the lowest one.
+
+        A cubic there is off by more than what is left of the grids' error.
+        """
         i = int(np.clip(np.argmin(self.film), 1, self.film.size - 2))
         positions = np.linspace(self.nodes[i - 1], self.nodes[i + 1], _SUBDIVISION)
-        heights = _cubic(self.nodes, self.film, positions)
+        heights = _between(self.nodes, self.film, positions, _QUINTIC)
         k = int(np.clip(np.argmin(heights), 1, _SUBDIVISION - 2))
         left, right = heights[k] - heights[k - 1], heights[k + 1] - heights[k]
         if not right > left:
@@ -85,14 +90,11 @@ class GridSolution:
 
     @cached_property
     def rupture(self) -> float:
-        """Where the film ends, from three values of the pressure, which goes out like a square.
-
-        The last value is not used: it depends on where in its cell the film ends.
-        """
+        """Where the film ends, from the last four values of the pressure, which goes out like a square."""
         last = int(np.flatnonzero(self.pressure)[-1])
         behind = self.nodes[min(last + 1, self.nodes.size - 1)]
-        x, root = self.nodes[max(last - 3, 0) : last], np.sqrt(self.pressure[max(last - 3, 0) : last])
-        if not (root.size == 3 and root[0] > root[1] > root[2] > 0):
+        x, root = self.nodes[max(last - 3, 0) : last + 1], np.sqrt(self.pressure[max(last - 3, 0) : last + 1])
+        if not (root.size == 4 and np.all(np.diff(root) < 0)):
             return float(behind)
         cell = behind - self.nodes[last]
         end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
@@ -108,11 +110,11 @@ class GridSolution:
 
 
 @kernel
-def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the cubic through the two nodes before and the two behind each position."""
+def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
+    """Return the polynomial through as many nodes before as behind each position, `sides` each."""
     result = np.empty(positions.size)
     for k in range(positions.size):
-        low, high = 2, nodes.size - 2  # of the first node that is not before the position
+        low, high = sides, nodes.size - sides  # of the first node that is not before the position
         while low < high:
             middle = (low + high) // 2
             if nodes[middle] < positions[k]:
@@ -120,9 +122,9 @@ def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> Floa
             else:
                 high = middle
         total = 0.0
-        for i in range(low - 2, low + 2):
+        for i in range(low - sides, low + sides):
             share = values[i]
-            for j in range(low - 2, low + 2):
+            for j in range(low - sides, low + sides):
                 if j != i:
                     share *= (positions[k] - nodes[j]) / (nodes[i] - nodes[j])
             total += share
@@ -131,6 +133,12 @@ def _cubic(nodes: FloatArray, values: FloatArray, positions: FloatArray) -> Floa
 
 
 def _at_zero(x: list[float], values: list[float]) -> float:
-    """Return the parabola through three values at x, at zero."""
-    (a, b, c), (at_a, at_b, at_c) = x, values
-    return at_a * b * c / ((a - b) * (a - c)) + at_b * a * c / ((b - a) * (b - c)) + at_c * a * b / ((c - a) * (c - b))
+    """Return the polynomial through values at x, at zero."""
+    total = 0.0
+    for i, value in enumerate(values):
+        share = value
+        for j, other in enumerate(x):
+            if j != i:
+                share *= other / (other - x[i])
+        total += share
+    return total

@@ -6,6 +6,9 @@ errors compare (Richardson). Positions in half widths, films in ``a^2/R``.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
@@ -117,6 +120,19 @@ def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:
         distance = np.maximum(0.0, np.abs(positions) - length)
     density = 1 / (0.15 * (distance + 2 * finest))
     return sample(positions, np.maximum(density, np.where(np.abs(positions) < 1.5 * length, 8 / length, 0.0)), count)
+
+
+def ladder(nodes: Sequence[int]) -> list[int]:
+    """Return these numbers of nodes, and between each two the one half way in equal ratios."""
+    halfway = [round(np.sqrt(fewer * more)) for fewer, more in pairwise(nodes)]
+    return sorted((*nodes, *halfway))
+
+
+def first_pressure(nodes: FloatArray, central: float) -> FloatArray:
+    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
+    reach = float(np.sqrt(2 * central))
+    width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
+    return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
 
 
 def second_derivative(nodes: FloatArray, values: FloatArray) -> FloatArray:

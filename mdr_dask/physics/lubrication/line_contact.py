@@ -16,7 +16,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.lubrication import grids
-from mdr_dask.physics.lubrication.film_formulas import limiting_films, moes_parameters
+from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution
 from mdr_dask.physics.lubrication.limits import Limit, extrapolate
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
@@ -63,6 +63,12 @@ class Settings(NamedTuple):
     nodes : tuple of int
         Nodes of the grids that are compared, as many as the accuracy needs, three at least. The last is a cap: its
         dense equations take some 30 ms a step.
+    leap, order : int, float
+        Greatest number of rungs to a grid that is expected to meet the accuracy, on a ladder with one half way between
+        each two of `nodes`, and the power of the spacing that the stated error is expected to fall like.
+    smooth : float
+        Logarithm of the viscosity at Hertz' pressure from which on `nodes` follow each other: where the pressure has a
+        spike, grids near each other tell less of what is left.
     end_order : float
         Power of the spacing that the error of a film's end goes like: where a finer grid lets expect it.
     further : float
@@ -80,11 +86,10 @@ class Settings(NamedTuple):
         Added to that share for each such logarithm, times the square of the spacing: what the spike leaves of the
         square of the spacing goes like the fourth power.
     narrow, thick : float
-        Added to it for each such logarithm, whatever the spacing, where M is below `thick` (half of it there): the
-        spike stands in the narrowest place.
+        Added to it for each such logarithm where M is below `thick` (half of it there): the spike stands in the
+        narrowest place.
     cut : float
-        Added to that share for a film that ends a whole cell from the nearest node: where in its cell it ends makes
-        the minimum film scatter.
+        Added to that share for a film that ends a whole cell from the nearest node: the minimum film scatters.
     placed : float
         Least error of a position, in cells there.
     spiked : float
@@ -103,14 +108,17 @@ class Settings(NamedTuple):
     adapted_nodes: int = 161
     adaptations: int = 2
     nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
+    leap: int = 3
+    smooth: float = 15.0
+    order: float = 4.0
     end_order: float = 4.0
     further: float = 0.1
-    further_steps: int = 12
-    fourth: float = 3.0
+    further_steps: int = 9
+    fourth: float = 2.0
     floor: float = 0.01
     sharpest: float = 50.0
-    spike: float = 0.2
-    narrow: float = 0.004
+    spike: float = 0.15
+    narrow: float = 0.008
     thick: float = 30.0
     cut: float = 0.1
     placed: float = 0.1
@@ -147,6 +155,11 @@ class LineContact(NamedTuple):
     def film_number(self) -> float:
         """Return ``K = (3 pi^2/4) U/W^2``."""
         return 3 * np.pi**2 / (8 * self.M**2)
+
+    @property
+    def log_viscosity(self) -> float:
+        """Return ``ln(eta/eta0)`` at Hertz' pressure."""
+        return float(log_viscosities(np.ones(1), self.liquid)[0])
 
     @property
     def liquid(self) -> Liquid:
@@ -274,12 +287,6 @@ def _tends_to(
     return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least, fourth)
 
 
-def expected_film(M: float, L: float) -> float:
-    """Return the film in ``a^2/R`` that the four limiting regimes let expect; good for a first guess."""
-    rigid_iso, rigid_piezo, elastic_iso, elastic_piezo = limiting_films(M, 0.5, L) * np.pi / (8 * M)
-    return float(max(min(rigid_piezo, elastic_piezo), max(rigid_iso, elastic_iso)))
-
-
 def _solve_on(
     case: LineContact,
     nodes: FloatArray,
@@ -302,13 +309,6 @@ def _solve_on(
     return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total, spacing)
 
 
-def _first_pressure(nodes: FloatArray, central: float) -> FloatArray:
-    """Return half an ellipse: Hertz' pressure, or a wider and flatter one upstream for a thick film."""
-    reach = float(np.sqrt(2 * central))
-    width, centre = (1.0, 0.0) if reach < 1 else (max(1.0, 0.8 * reach), -0.4 * reach)
-    return np.sqrt(np.maximum(1 - ((nodes - centre) / width) ** 2, 0.0)) / width
-
-
 def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution]:
     """Return the solution on a first grid, by the first of the known ways that leads there."""
     for attempt in settings.attempts:
@@ -317,15 +317,10 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
         guess = min(guess, attempt.starved * inlet**2)
         nodes = grids.first_grid(guess, inlet, attempt.nodes)
         pace = Pace(attempt.clip, settings.attempt_steps)
-        outcome, state = _solve_on(case, nodes, _first_pressure(nodes, guess), guess, (pace,))
+        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, (pace,))
         if outcome == Outcome.CONVERGED:
             break
     return outcome, state
-
-
-def _density(source: GridSolution) -> tuple[FloatArray, FloatArray]:
-    """Return positions and the density of nodes there that a solution asks for."""
-    return source.nodes, grids.adapted_density(source.nodes, source.pressure, source.film, source.central)
 
 
 def _refined(
@@ -385,7 +380,7 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-        Relative error allowed for the central and the minimum film; the grid is halved until the estimates meet it.
+        Relative error allowed for the central and the minimum film; grids become finer until the estimates meet it.
     settings : Settings
         Numbers of the solver.
 
@@ -404,20 +399,30 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     """
     outcome, source, steps = _adapted_solution(case, settings)
     failure, found, solved = (outcome, source), None, list[GridSolution]()
-    for count in settings.nodes if outcome == Outcome.CONVERGED else ():
-        outcome, finer = _refined(case, _nearest(solved, source), source, count, settings)
+    rungs, at = grids.ladder(settings.nodes), 0
+    while outcome == Outcome.CONVERGED and at < len(rungs):
+        outcome, finer = _refined(case, _nearest(solved, source), source, rungs[at], settings)
         steps += finer.steps
         if outcome == Outcome.CONVERGED:
             solved.append(finer)
-        elif solved:
-            break
-        else:  # a grid before the first solution is too coarse for this film
-            failure = outcome, finer
-        if len(solved) > 2:
+        elif not solved:  # this grid is too coarse for this film
+            failure, outcome = (outcome, finer), Outcome.CONVERGED
+        if outcome == Outcome.CONVERGED and len(solved) > 2:
             found = _solution(case, solved, steps)
-            if found.error <= accuracy:
-                break
+        at = _next_rung(rungs, at, found, accuracy, settings)
     return found or _no_solution(case, *failure, steps)
+
+
+def _next_rung(rungs: Sequence[int], at: int, found: LineSolution | None, accuracy: float, settings: Settings) -> int:
+    """Return which grid is next: the first of some that is expected to meet the accuracy, two rungs on, or none."""
+    error = found.error if found else np.inf
+    if error <= accuracy or at == len(rungs) - 1:
+        return len(rungs)
+    leap = settings.leap if found and found.case.log_viscosity < settings.smooth else 0
+    for further in range(at + 1, min(at + 1 + leap, len(rungs))):
+        if error * (rungs[at] / rungs[further]) ** settings.order <= accuracy:
+            return further
+    return min(at + 2, len(rungs) - 1)
 
 
 def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[GridSolution]:
@@ -427,7 +432,7 @@ def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[G
 
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
-    viscosity = min(float(log_viscosities(np.ones(1), case.liquid)[0]), SETTINGS.sharpest)
+    viscosity = min(case.log_viscosity, SETTINGS.sharpest)
     narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
     share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
     films = _tends_to(solved, lambda grid: np.array([grid.central_film, grid.minimum[1]]), share, SETTINGS.fourth)

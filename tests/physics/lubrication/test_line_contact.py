@@ -319,6 +319,34 @@ def test_two_grids_let_expect_the_next(numbers: tuple[float, float, float]) -> N
     assert all(grid.steps <= 3 and grid.cut < 0.1 for grid in found.grids[1:])
 
 
+@pytest.mark.parametrize(("M", "L"), [(317.0, 0.5), (446.0, 0.5), (243.0, 0.4)])
+def test_coarse_grids_know_where_the_film_ends_and_how_low_it_is(M: float, L: float) -> None:
+    """The end to a few hundredths of a cell, where it was off by a third; the lowest film, where it was off by 9e-5."""
+    case = LineContact(M, L)
+    found, fine = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[:4])), solve_film(case, 1e-5)
+    for grid in found.grids[1:]:
+        after = np.searchsorted(grid.nodes, fine.finest.rupture)
+        assert abs(grid.rupture - fine.finest.rupture) < 0.06 * (grid.nodes[after] - grid.nodes[after - 1])
+    assert found.minimum_film.value == pytest.approx(float(fine.minimum_film.value), rel=3e-5)
+
+
+def test_the_next_grid_is_the_first_that_is_expected_to_do() -> None:
+    """Behind 161 nodes for small oils: the one half way, or three rungs up; none is left out on a longer way."""
+    case = LineContact(446.0, 0.5)
+    here = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[:3])).error
+    for part, last in ((0.9, (161, 191)), (0.2, (161, 270)), (0.08, (227, 321))):
+        found = solve_film(case, part * here)
+        assert found.error <= part * here
+        assert [grid.nodes.size for grid in found.grids[-2:]] == pytest.approx(last, abs=2)
+    assert ehl_grid.ladder((57, 114, 161)) == [57, 81, 114, 135, 161]
+
+
+def test_grids_of_a_film_with_a_spike_follow_each_other() -> None:
+    """On grids half way the change from grid to grid would tell more error than there is."""
+    found = solve_film(line_contact((1e-4, 1e-11, 5007.0), E_STAR), 3e-4)
+    assert [grid.nodes.size for grid in found.grids] == pytest.approx((114, 161, 227, 321), abs=2)
+
+
 def test_a_spike_that_moves_is_not_expected_where_it_was() -> None:
     """From what two grids let expect here Newton's method finds no solution on the next; from the last one it does."""
     found = solve_film(LineContact(5.88, 11.4), accuracy=1e-4)
