@@ -10,14 +10,12 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
+from mdr_dask.physics.transients.contact_loss import Leavings, grip_at, loss, overtaking, with_cell
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
     foreseen,
-    left_before,
-    losing,
     meeting,
-    next_free_place,
     spread_over,
     wake_at,
     worth_keeping,
@@ -41,7 +39,7 @@ CLEAR = 8.0  # ranges of the depth by which the line stays below elements where 
 CANDIDATES = 64  # most places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
-GUARD_CELLS = 200.0  # travelled, until which elements that the jump found free are told apart
+ROUNDING = 1e-9  # of a displacement
 VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
 
 
@@ -101,21 +99,6 @@ def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) ->
     return i + 1.0
 
 
-@inlined
-def _leaving(now: Instant, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
-    """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones.
-
-    At `until` the force vanishes, or the part ends.
-    """
-    if until < next_free:
-        return until, False, next_free
-    w = depth + height_at(now.track, until)[0]
-    next_free = next_free_place(now, until)
-    if next_free == until and w < left_before(now, until)[0] * (1 - 1e-14):
-        return losing(now, depth, low, until), True, next_free
-    return until, False, next_free
-
-
 @compiled
 def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
@@ -147,8 +130,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     known, found, edges, edges_drag = 0, 0, 0.0, 0.0
     n, finish = int(track.cells), track.cells + track.origin
     contact, begin, free_from = True, track.origin, 0.0
-    guard = deborah * now.time < GUARD_CELLS
-    next_free = next_free_place(now, begin) if guard else np.inf
+    grip, leavings = grip_at(now), Leavings(0.0, 0.0)
     window = WINDOW_CELLS
     write_spreads(now, window, spreads)
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
@@ -170,9 +152,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
             if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
                 i += 1
                 continue
-            if contact and positive and begin <= i and i + 1 < next_free:
-                whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
-                i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1
+            if contact and positive and begin <= i and barriers.cell[np.uintp(i)] < grip.firm:
+                whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n
+                i += BLOCK if whole and barriers.block[i // BLOCK] < grip.firm else 1
                 continue
             cell, x1 = i, min(i + 1.0, finish)
             i += 1
@@ -186,19 +168,25 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                         pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
                         place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
                     pulls = cell + place < x1
-                    until, lost, next_free = _leaving(now, depth, x, cell + place if pulls else x1, next_free)
+                    until, wakes = cell + place if pulls else x1, Wakes(places, farthest, known)
+                    leavings = with_cell(leavings, grip, (c0, c1, c2, c3), deborah, float(cell))
+                    u, place = overtaking(now, wakes, grip, begin, leavings, until)
+                    lost = depth + height_at(track, until)[0] < u * (1 - ROUNDING)
                     if not (pulls or lost):
                         break
+                    if lost:
+                        until, place = loss(now, wakes, grip, begin, leavings, x, until)
                     if found + 1 >= start.size:
                         return -1
                     add_patch(track, begin, until, lift, deborah, sums)
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, Wakes(places, farthest, known), until, w, spreads, window)
+                    known = worth_keeping(now, wakes, until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    if not lost:
-                        known = _remember(until, _farthest(now, until, highest, barriers), work, known)
+                    if not lost or place >= 0:
+                        left = place if lost else until
+                        known = _remember(left, _farthest(now, left, highest, barriers), work, known)
                     contact, free_from, x = False, until, until
                     if lost:
                         break
@@ -224,8 +212,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     h, slope, _ = height_at(track, begin)
                     edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
-                    contact, x = True, begin
-                    next_free = next_free_place(now, begin) if guard else np.inf
+                    contact, x, leavings = True, begin, Leavings(0.0, 0.0)
                     continue
                 if not pulls:
                     break

@@ -86,7 +86,14 @@ def _follows(history: History, t: float) -> float:
 
 
 @inlined
-def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
+def _in_turn(now: Instant, s: float) -> float:
+    """Return the place in the turn that a line is of a place in any turn."""
+    track = now.track
+    return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
+
+
+@inlined
+def left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place` after the jump, its slope, its derivative by depth.
 
     An element leaves where its load vanished then, between the place where it vanishes now and the farthest one so far.
@@ -101,7 +108,7 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
             break
         since = (x - s) * pace
         d, rate, change = _depth_at(now.history, max(now.time - since, 0.0))
-        h, slope, curvature = height_at(now.track, s)
+        h, slope, curvature = height_at(now.track, s if s > 0 else _in_turn(now, s))
         force = d + h + rate + deborah * slope
         falls = (rate + change) * pace + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
@@ -124,14 +131,19 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
 
 
 @inlined
+def pressed_then(now: Instant, x: float, s: float) -> float:
+    """Return what is left at x of the displacement to which the line can have pressed an element when it was at s."""
+    since = (x - s) / now.deborah
+    return float((_depth_at(now.history, now.time - since)[0] + height_at(now.track, s)[0]) * np.exp(-since))
+
+
+@inlined
 def left_before(now: Instant, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
-    track, first = now.track, now.first
-    s = x - now.deborah * now.time
-    s -= np.floor((s - track.origin) / track.cells) * track.cells
+    first, s = now.first, _in_turn(now, x - now.deborah * now.time)
     low = patch_before(first, s)
     if s <= first.end[low]:
-        h, slope, _ = height_at(track, s)
+        h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left
     u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * now.left
     return u, -u / first.deborah
@@ -142,7 +154,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
-        value, value_slope, value_gain = _left_from(now, x, wakes.places[k], wakes.farthest[k])
+        value, value_slope, value_gain = left_from(now, x, wakes.places[k], wakes.farthest[k])
         if value > u:
             u, slope, gain = value, value_slope, value_gain
     if now.first.depth * now.left > u:  # heights count from the highest point
@@ -207,20 +219,6 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
 
 
 @inlined
-def losing(now: Instant, depth: float, low: float, high: float) -> float:
-    """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
-    while high - low > 1e-12:
-        x = 0.5 * (low + high)
-        if not low < x < high:
-            break
-        if depth + height_at(now.track, x)[0] > left_before(now, x)[0]:
-            low = x
-        else:
-            high = x
-    return high
-
-
-@inlined
 def write_spreads(now: Instant, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
     history = now.history
@@ -251,25 +249,8 @@ def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads:
     kept = 0
     for k in range(wakes.count):
         place = wakes.places[k]
-        u = _left_from(now, x, place, wakes.farthest[k])[0]
+        u = left_from(now, x, place, wakes.farthest[k])[0]
         if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
             wakes.places[kept], wakes.farthest[kept] = place, wakes.farthest[k]
             kept += 1
     return kept
-
-
-@inlined
-def next_free_place(now: Instant, x: float) -> float:
-    """Return the first place from x on whose element was free at the jump."""
-    track, first = now.track, now.first
-    travel = now.deborah * now.time
-    s = x - travel
-    turns = np.floor((s - track.origin) / track.cells) * track.cells
-    s -= turns
-    low = patch_before(first, s)
-    if not first.start[low] <= s <= first.end[low]:
-        return x
-    until = first.end[low]
-    if low == first.count - 1:
-        until = first.end[0] + track.cells
-    return float(until + turns + travel)
