@@ -2,7 +2,7 @@
 
 Along the line D u' + u of elements in flight is what the rate of the depth took when they left, faded since. While it
 is below w + D h' the gap of line and wake cannot close. So contact is lost only where w + D h' is below the largest of
-those, the `push`, and only to elements that come from before the patch, were free in it at the jump, or left it since.
+those, the `push`: to elements that come from before the patch, were free in it at the jump, or left it since.
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.physics.compiling import inlined
-from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, left_from, pressed_then, wake_at
+from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at
 from mdr_dask.physics.transients.patches import height_at
 
 CLOSE = 1e-9  # of a cell: where contact is lost
-FARTHEST = 200  # cells back in which places of leaving are looked for
 
 
 class Grip(NamedTuple):
@@ -34,6 +33,8 @@ class Grip(NamedTuple):
         Most by which the lift has risen until now, by time.
     slowest : float
         Deborah number by which elements in flight fade at least.
+    overflown : bool
+        Whether elements in this turn may have come over the highest point, pressed further than it pressed then.
     """
 
     firm: float
@@ -41,16 +42,7 @@ class Grip(NamedTuple):
     push: float
     rise: float
     slowest: float
-
-
-class Leavings(NamedTuple):
-    """The cells of a patch that elements may have left under a force that is positive now, from the first to the last.
-
-    None where the end is before the start.
-    """
-
-    start: float
-    end: float
+    overflown: bool
 
 
 @inlined
@@ -59,81 +51,62 @@ def grip_at(now: Instant) -> Grip:
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lowest, push, rise = depth + rate, max(-rate, 0.0), 0.0
+    carried, overflown, before = history.depth[0], False, 0.0
     for moment in range(last):
-        since = now.time - history.time[moment]
-        lift = history.depth[moment] + history.rate[moment]
+        time, then = history.time[moment], history.depth[moment]
+        since, lift = now.time - time, then + history.rate[moment]
         lowest, rise = min(lowest, lift), max(rise, (depth + rate - lift) / since)
         push = max(push, -history.rate[moment] * np.exp(-since))
+        carried, before = carried * np.exp(before - time), time
+        overflown |= carried > then and deborah * since < now.track.cells
+        carried = max(carried, then)
+    overflown |= carried * np.exp(before - now.time) > depth
     if last > 0:
         step = history.time[last] - history.time[last - 1]
         fallen = (history.depth[last - 1] - depth) / step
         rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
     if now.first.deborah > deborah:
         push = max(push, min(depth, now.first.depth * now.left) * (1 - deborah / now.first.deborah))
-    return Grip(min(depth - push, lowest), lowest, push, rise, max(deborah, now.first.deborah))
+    return Grip(min(depth - push, lowest), lowest, push, rise, max(deborah, now.first.deborah), overflown)
 
 
 @inlined
-def with_cell(leavings: Leavings, grip: Grip, line: tuple[float, float, float, float], deborah: float, cell: float) -> Leavings:
-    """Return the leavings with a cell that is not firm, unless its force falls faster than the lift can have risen."""
+def may_have_left(line: tuple[float, float, float, float], grip: Grip, deborah: float) -> bool:
+    """Return whether elements can have left a cell where the force is positive now: it falls slower than the lift rises."""
     _, c1, c2, c3 = line
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
-    least = -max(enter, enter + bend, enter + 2 * bend + turn)
-    if least * deborah >= grip.rise:
-        return leavings
-    return Leavings(leavings.start if leavings.start < leavings.end else cell, cell + 1)
+    return bool(-deborah * max(enter, enter + bend, enter + 2 * bend + turn) < grip.rise)
 
 
 @inlined
-def _left_within(now: Instant, leavings: Leavings, x: float) -> tuple[float, float]:
-    """Return the displacement at x of elements that left the patch since the jump, and about where they left."""
-    high = min(leavings.end, np.ceil(x) - 1)
-    low = max(leavings.start, x - now.deborah * now.time, high - FARTHEST)
-    u, place, s = 0.0, x, high
-    while s >= low:
-        value = pressed_then(now, x, s)
-        if value > u:
-            u, place = value, s
-        s -= 1
-    return max(u, left_from(now, x, place, min(place + 1, x))[0]), place
+def overtaking(now: Instant, wakes: Wakes, grip: Grip, held: float, x: float) -> float:
+    """Return a displacement that elements in flight have at x in a patch, or 0 if the line surely presses further.
 
-
-@inlined
-def overtaking(
-    now: Instant, wakes: Wakes, grip: Grip, begin: float, leavings: Leavings, x: float
-) -> tuple[float, float]:
-    """Return a displacement that elements in flight have at x in a patch, and where they left if that was in it.
-
-    The displacement is 0 where they are surely pressed less than the line presses.
+    Parameters
+    ----------
+    now, wakes, grip : Instant, Wakes, Grip
+    held : float
+        A place in the patch up to which contact is known to hold, and from which on none has left.
+    x : float
+        At `held` or beyond.
     """
     depth = now.history.depth[now.history.count - 1]
-    w, u, place = depth + height_at(now.track, x)[0], 0.0, -1.0
-    fade = np.exp((begin - x) / grip.slowest)
-    if w < (depth + height_at(now.track, begin)[0]) * fade + grip.push * (1 - fade):
-        u = wake_at(now, wakes, x)[0]
-    elif x - now.deborah * now.time > begin:
-        u = left_before(now, x)[0]
-    if leavings.start < leavings.end:
-        end = min(leavings.end, x)
-        fade = np.exp((end - x) / grip.slowest)
-        if w <= (depth + height_at(now.track, end)[0]) * fade + grip.push * (1 - fade):
-            value, s = _left_within(now, leavings, x)
-            if value > u:
-                u, place = value, s
-    return u, place
+    w, pressed, fade = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0], 1.0
+    if x > held:
+        fade = np.exp((held - x) / grip.slowest)
+    if x <= held or w < pressed * fade + grip.push * (1 - fade):
+        return wake_at(now, wakes, x)[0]
+    return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
 
 
 @inlined
-def loss(
-    now: Instant, wakes: Wakes, grip: Grip, begin: float, leavings: Leavings, low: float, high: float
-) -> tuple[float, float]:
-    """Return where contact is lost between low and high, by bisection, and the place of leaving of who comes then."""
-    depth, place = now.history.depth[now.history.count - 1], -1.0
+def loss(now: Instant, wakes: Wakes, low: float, high: float) -> float:
+    """Return where contact is lost between low and high, by bisection."""
+    depth = now.history.depth[now.history.count - 1]
     while high - low > CLOSE:
         x = 0.5 * (low + high)
-        u, left = overtaking(now, wakes, grip, begin, leavings, x)
-        if depth + height_at(now.track, x)[0] < u:
-            high, place = x, left
+        if depth + height_at(now.track, x)[0] < wake_at(now, wakes, x)[0]:
+            high = x
         else:
             low = x
-    return high, place
+    return high

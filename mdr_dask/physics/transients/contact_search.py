@@ -7,13 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
-from mdr_dask.physics.transients.contact_loss import Leavings, grip_at, loss, overtaking, with_cell
+from mdr_dask.physics.transients.contact_loss import Grip, grip_at, loss, may_have_left, overtaking
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
+    crest,
     foreseen,
     meeting,
     spread_over,
@@ -36,10 +37,11 @@ from mdr_dask.physics.transients.patches import (
 )
 
 CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
-CANDIDATES = 64  # most places of leaving whose wakes are compared
+CANDIDATES = 256  # most places of leaving whose wakes are compared
 WINDOW_CELLS = 64.0
 WINDOWS = 12
 ROUNDING = 1e-9  # of a displacement
+TURNS = 3  # of the line that an element may fly over
 VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
 
 
@@ -64,6 +66,7 @@ class Workspace(NamedTuple):
     start: FloatArray
     end: FloatArray
     sums: FloatArray
+    earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
     spreads: FloatArray
@@ -74,15 +77,25 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    places, farthest = np.empty((2, CANDIDATES))
-    return Workspace(start, end, np.zeros(SUMS), places, farthest, np.empty(WINDOWS), barriers)
+    earliest, places, farthest = np.empty((3, CANDIDATES))
+    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, np.empty(WINDOWS), barriers)
 
 
 @inlined
 def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
-    """Write down where contact was left, over the last place where there is no more room; count the places."""
-    known = min(known, CANDIDATES - 1)
-    work.places[known], work.farthest[known] = place, farthest
+    """Write down where contact was left; count the places."""
+    work.earliest[known], work.places[known], work.farthest[known] = place, place, farthest
+    return known + 1
+
+
+@inlined
+def _remember_cell(cell: float, work: Workspace, known: int) -> int:
+    """Write down that contact may have been left in a cell where the force is positive now; count the places."""
+    last = known - 1
+    if known > 0 and work.earliest[last] < work.places[last] and work.places[last] == cell:
+        work.places[last], work.farthest[last] = cell + 1, cell + 1
+        return known
+    work.earliest[known], work.places[known], work.farthest[known] = cell, cell + 1, cell + 1
     return known + 1
 
 
@@ -115,24 +128,41 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     Returns
     -------
     int
-        Number of patches, or -1 if a patch does not end within its stretch or there are more than fit.
+        Number of patches, or -1 if a patch does not end within its stretch or there are more, or more places of leaving, than fit.
+    """
+    grip, travel, cells = grip_at(now), now.deborah * now.time, now.track.cells
+    write_spreads(now, WINDOW_CELLS, work.spreads)
+    found, known = _turn(now, grip, reachable, work, 0)
+    if grip.overflown:
+        for _ in range(min(int(travel / cells) + 1, TURNS)):
+            for k in range(known):
+                work.earliest[k] -= cells
+                work.places[k] -= cells
+                work.farthest[k] -= cells
+            found, known = _turn(now, grip, reachable, work, known)
+    return found
+
+
+@nested
+def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
+    """Do what `touch` does on one turn of the line, with some places of leaving known; return how many are known then.
+
+    Where none is, the highest point is taken for touched.
     """
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
     runs, floor = reachable.runs, reachable.floor
-    start, end, sums, places, farthest, spreads, barriers = work
+    start, end, sums, earliest, places, farthest, spreads, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
     deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
     for moment in range(history.count):
         deepest = max(deepest, history.depth[moment])
         highest = max(highest, history.depth[moment] + history.rate[moment])
-    known, found, edges, edges_drag = 0, 0, 0.0, 0.0
-    n, finish = int(track.cells), track.cells + track.origin
-    contact, begin, free_from = True, track.origin, 0.0
-    grip, leavings = grip_at(now), Leavings(0.0, 0.0)
-    window = WINDOW_CELLS
-    write_spreads(now, window, spreads)
+    found, edges, edges_drag, window = 0, 0.0, 0.0, WINDOW_CELLS
+    n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
+    free_from = held = begin
+    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, known), begin)[0]
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
@@ -143,9 +173,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                top = deepest + peak[np.uintp(i)]
+                most = deepest + peak[np.uintp(i)]
                 least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
-                if top <= least or (top < least_free and i + 1 - known_at < window):
+                if most <= least or (most < least_free and i + 1 - known_at < window):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
@@ -156,10 +186,16 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                 whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n
                 i += BLOCK if whole and barriers.block[i // BLOCK] < grip.firm else 1
                 continue
+            if known + VISITS > CANDIDATES:
+                return -1, 0
             cell, x1 = i, min(i + 1.0, finish)
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
-            x = max(float(cell), begin if contact else free_from)
+            leaves = (contact or positive) and (cell == n or barriers.cell[np.uintp(cell)] >= grip.lowest)
+            leaves = leaves and may_have_left((c0, c1, c2, c3), grip, deborah)
+            if leaves:
+                known = _remember_cell(float(cell), work, known)
+            x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:
                     y = x - cell
@@ -168,42 +204,44 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                         pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
                         place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
                     pulls = cell + place < x1
-                    until, wakes = cell + place if pulls else x1, Wakes(places, farthest, known)
-                    leavings = with_cell(leavings, grip, (c0, c1, c2, c3), deborah, float(cell))
-                    u, place = overtaking(now, wakes, grip, begin, leavings, until)
-                    lost = depth + height_at(track, until)[0] < u * (1 - ROUNDING)
+                    pull, wakes = cell + place if pulls else x1, Wakes(earliest, places, farthest, known)
+                    if leaves:
+                        held = pull
+                    u = overtaking(now, wakes, grip, held, pull)
+                    lost, until = depth + height_at(track, pull)[0] < u * (1 - ROUNDING), pull
                     if not (pulls or lost):
                         break
                     if lost:
-                        until, place = loss(now, wakes, grip, begin, leavings, x, until)
+                        until = loss(now, wakes, x, pull)
                     if found + 1 >= start.size:
-                        return -1
+                        return -1, 0
                     add_patch(track, begin, until, lift, deborah, sums)
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, wakes, until, w, spreads, window)
                     least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    if not lost or place >= 0:
-                        left = place if lost else until
-                        known = _remember(left, _farthest(now, left, highest, barriers), work, known)
-                    contact, free_from, x = False, until, until
-                    if lost:
+                    contact, free_from, x, pulled = False, pull, pull, True
+                    if not pulls:
                         break
+                    known = _remember(pull, _farthest(now, pull, highest, barriers), work, known)
                 # the line comes nearer to free elements while the force on them would be positive
                 low, high = x - cell, NONE
                 if not positive:
-                    if x == free_from or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
+                    if pulled or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
                         low = loading(c0, c1, c2, c3, lift, deborah, low)
                     if cell + low >= x1:
                         break
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(places, farthest, known)
+                wakes = Wakes(earliest, places, farthest, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
+                if gap <= 0 and gap > rise * (probe - cell - low):
+                    top, above = crest(now, wakes, cell + low, probe)
+                    probe, gap = (top, above) if above > 0 else (probe, gap)
                 spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
                 if gap > 0:
@@ -212,18 +250,18 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                     h, slope, _ = height_at(track, begin)
                     edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
-                    contact, x, leavings = True, begin, Leavings(0.0, 0.0)
+                    contact, x, held = True, begin, begin
                     continue
                 if not pulls:
                     break
                 known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
-                free_from = x = probe
+                free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:
-            return -1
+            return -1, 0
     begin = begin if contact else finish
     add_patch(track, begin, finish, lift, deborah, sums)
     start[found], end[found] = begin, finish
     sums[STIFFNESS] = sums[LENGTH] * (1 + history.stiff) + edges
     sums[DRAG_STIFFNESS] = sums[TILT] * (1 + history.stiff) + edges_drag
-    return found + 1
+    return found + 1, known

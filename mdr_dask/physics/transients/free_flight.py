@@ -16,13 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined, last_until
+from mdr_dask.physics.compiling import inlined, last_until, nested
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
 MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
+FARTHEST = 200  # cells back in which contact may have been left are looked at
+CREST = 1e-3  # of a cell: where a line that comes near to a wake inside of a cell is nearest
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 
 
@@ -41,8 +43,12 @@ class Instant(NamedTuple):
 
 
 class Wakes(NamedTuple):
-    """Places where contact is left now and the farthest where it was, ``count`` of them."""
+    """Places where contact is left now and the farthest where it was, ``count`` of them.
 
+    Where `earliest` is before a place, contact is not left now, but may have been left in the cells between.
+    """
+
+    earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
     count: int  # type: ignore[assignment]
@@ -93,7 +99,7 @@ def _in_turn(now: Instant, s: float) -> float:
 
 
 @inlined
-def left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
+def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place` after the jump, its slope, its derivative by depth.
 
     An element leaves where its load vanished then, between the place where it vanishes now and the farthest one so far.
@@ -130,11 +136,27 @@ def left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[fl
     return -1.0, 0.0, 0.0
 
 
+@nested
+def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
+    """Return what `_left_from` does, of an element that left somewhere in a stretch of cells: after a look at nodes."""
+    most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
+    low = max(low, x - now.deborah * now.time, s - FARTHEST)
+    while s >= low:
+        since = (x - s) / now.deborah
+        height = now.track.height[int(s if s >= 0 else s + now.track.cells)]
+        u = (_depth_at(now.history, now.time - since)[0] + height) * np.exp(-since)
+        if u > most:
+            most, place = u, s
+        s -= 1
+    return _left_from(now, x, place, place + 1) if most > 0 else (-1.0, 0.0, 0.0)
+
+
 @inlined
-def pressed_then(now: Instant, x: float, s: float) -> float:
-    """Return what is left at x of the displacement to which the line can have pressed an element when it was at s."""
-    since = (x - s) / now.deborah
-    return float((_depth_at(now.history, now.time - since)[0] + height_at(now.track, s)[0]) * np.exp(-since))
+def _left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
+    """Return what `_left_from` does, of the k-th place."""
+    if wakes.earliest[k] < wakes.places[k]:
+        return _left_within(now, x, wakes.earliest[k], wakes.places[k])
+    return _left_from(now, x, wakes.places[k], wakes.farthest[k])
 
 
 @inlined
@@ -154,7 +176,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
-        value, value_slope, value_gain = left_from(now, x, wakes.places[k], wakes.farthest[k])
+        value, value_slope, value_gain = _left(now, wakes, k, x)
         if value > u:
             u, slope, gain = value, value_slope, value_gain
     if now.first.depth * now.left > u:  # heights count from the highest point
@@ -219,6 +241,22 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
 
 
 @inlined
+def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, float]:
+    """Return where the line comes nearest to the wake or above it between two places, falling back at `high`."""
+    depth, x, gap = now.history.depth[now.history.count - 1], high, -1.0
+    while gap <= 0 and high - low > CREST:
+        x = 0.5 * (low + high)
+        u, u_slope, _ = wake_at(now, wakes, x)
+        h, h_slope, _ = height_at(now.track, x)
+        gap = depth + h - u
+        if h_slope > u_slope:
+            low = x
+        else:
+            high = x
+    return x, gap
+
+
+@inlined
 def write_spreads(now: Instant, window: float, spreads: FloatArray) -> None:
     """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
     history = now.history
@@ -246,11 +284,15 @@ def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
 @inlined
 def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
-    kept = 0
+    kept, deepest = 0, now.first.depth
+    for moment in range(now.history.count):
+        deepest = max(deepest, now.history.depth[moment])
     for k in range(wakes.count):
-        place = wakes.places[k]
-        u = left_from(now, x, place, wakes.farthest[k])[0]
+        place, farthest = wakes.places[k], wakes.farthest[k]
+        u = _left(now, wakes, k, x)[0]
+        if u < 0:  # none at x left there; farther ones may have
+            u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(-max(x - farthest, 0.0) / now.deborah)
         if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
-            wakes.places[kept], wakes.farthest[kept] = place, wakes.farthest[k]
+            wakes.earliest[kept], wakes.places[kept], wakes.farthest[kept] = wakes.earliest[k], place, farthest
             kept += 1
     return kept
