@@ -14,89 +14,74 @@ import numpy as np
 from mdr_dask.physics.compiling import inlined
 from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at
 from mdr_dask.physics.transients.patches import height_at
+from mdr_dask.physics.transients.recent import over
 
 CLOSE = 1e-9  # of a cell: where contact is lost
 
 
-class Grip(NamedTuple):
-    """What keeps contact at a moment.
+class Motion(NamedTuple):
+    """How the depth has moved until a moment.
 
     Parameters
     ----------
-    firm : float
-        Cells whose barrier is below do not lose contact, and no element has left them since the jump.
-    lowest : float
-        Least lift so far.
-    push : float
-        Most that D u' + u is in flight.
     rise : float
         Most by which the lift has risen until now, by time.
-    slowest : float
-        Deborah number by which elements in flight fade at least.
     overflown : bool
         Whether elements in this turn may have come over the highest point, pressed further than it pressed then.
     """
 
-    firm: float
-    lowest: float
-    push: float
     rise: float
-    slowest: float
     overflown: bool
 
 
 @inlined
-def grip_at(now: Instant) -> Grip:
-    """Return what keeps contact at a moment."""
+def motion_at(now: Instant) -> Motion:
+    """Return how the depth has moved until a moment."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
-    lowest, push, rise = depth + rate, max(-rate, 0.0), 0.0
-    carried, overflown, before = history.depth[0], False, 0.0
+    rise, carried, overflown, before = 0.0, history.depth[0], False, 0.0
     for moment in range(last):
         time, then = history.time[moment], history.depth[moment]
-        since, lift = now.time - time, then + history.rate[moment]
-        lowest, rise = min(lowest, lift), max(rise, (depth + rate - lift) / since)
-        push = max(push, -history.rate[moment] * np.exp(-since))
+        rise = max(rise, (depth + rate - then - history.rate[moment]) / (now.time - time))
         carried, before = carried * np.exp(before - time), time
-        overflown |= carried > then and deborah * since < now.track.cells
+        overflown |= carried > then and deborah * (now.time - time) < now.track.cells
         carried = max(carried, then)
     overflown |= carried * np.exp(before - now.time) > depth
     if last > 0:
         step = history.time[last] - history.time[last - 1]
         fallen = (history.depth[last - 1] - depth) / step
         rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
-    if now.first.deborah > deborah:
-        push = max(push, min(depth, now.first.depth * now.left) * (1 - deborah / now.first.deborah))
-    return Grip(min(depth - push, lowest), lowest, push, rise, max(deborah, now.first.deborah), overflown)
+    return Motion(rise, overflown)
 
 
 @inlined
-def may_have_left(line: tuple[float, float, float, float], grip: Grip, deborah: float) -> bool:
+def may_have_left(line: tuple[float, float, float, float], rise: float, deborah: float) -> bool:
     """Return whether elements can have left a cell where the force is positive now: it falls slower than the lift rises."""
     _, c1, c2, c3 = line
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
-    return bool(-deborah * max(enter, enter + bend, enter + 2 * bend + turn) < grip.rise)
+    return bool(-deborah * max(enter, enter + bend, enter + 2 * bend + turn) < rise)
 
 
 @inlined
-def overtaking(now: Instant, wakes: Wakes, grip: Grip, held: float, x: float) -> float:
+def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
     """Return a displacement that elements in flight have at x in a patch, or 0 if the line surely presses further.
 
     Parameters
     ----------
-    now, wakes, grip : Instant, Wakes, Grip
+    now, wakes : Instant, Wakes
     held : float
         A place in the patch up to which contact is known to hold, and from which on none has left.
     x : float
         At `held` or beyond.
     """
-    depth = now.history.depth[now.history.count - 1]
-    w, pressed, fade = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0], 1.0
     if x > held:
-        fade = np.exp((held - x) / grip.slowest)
-    if x <= held or w < pressed * fade + grip.push * (1 - fade):
-        return wake_at(now, wakes, x)[0]
-    return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
+        depth = now.history.depth[now.history.count - 1]
+        w, pressed = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0]
+        fade = np.exp((held - x) / max(now.deborah, now.first.deborah))
+        push = wakes.recent.push[over(x - wakes.earliest[0]) if wakes.count > 0 else 0]
+        if w >= pressed * fade + push * (1 - fade):
+            return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
+    return wake_at(now, wakes, x)[0]
 
 
 @inlined

@@ -10,17 +10,15 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
-from mdr_dask.physics.transients.contact_loss import Grip, grip_at, loss, may_have_left, overtaking
+from mdr_dask.physics.transients.contact_loss import Motion, loss, may_have_left, motion_at, overtaking
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
     crest,
     foreseen,
     meeting,
-    spread_over,
     wake_at,
     worth_keeping,
-    write_spreads,
 )
 from mdr_dask.physics.transients.patches import (
     DRAG_STIFFNESS,
@@ -35,11 +33,11 @@ from mdr_dask.physics.transients.patches import (
     loading,
     unloading,
 )
+from mdr_dask.physics.transients.recent import WINDOW, WINDOWS, Recent, over, write_recent
 
 CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
 CANDIDATES = 256  # most places of leaving whose wakes are compared
-WINDOW_CELLS = 64.0
-WINDOWS = 12
+KNOWN_FOR = 64.0  # cells in which what free elements have at least is taken for known
 ROUNDING = 1e-9  # of a displacement
 TURNS = 3  # of the line that an element may fly over
 VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
@@ -69,7 +67,8 @@ class Workspace(NamedTuple):
     earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
-    spreads: FloatArray
+    barrier: FloatArray
+    recent: Recent
     barriers: Barriers
 
 
@@ -77,25 +76,32 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    earliest, places, farthest = np.empty((3, CANDIDATES))
-    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, np.empty(WINDOWS), barriers)
+    earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
+    recent = Recent(*np.empty((3, WINDOWS)))
+    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, barriers)
 
 
 @inlined
 def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
     """Write down where contact was left; count the places."""
-    work.earliest[known], work.places[known], work.farthest[known] = place, place, farthest
+    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = place, place, farthest, np.inf
     return known + 1
 
 
 @inlined
-def _remember_cell(cell: float, work: Workspace, known: int) -> int:
+def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> int:
     """Write down that contact may have been left in a cell where the force is positive now; count the places."""
     last = known - 1
     if known > 0 and work.earliest[last] < work.places[last] and work.places[last] == cell:
         work.places[last], work.farthest[last] = cell + 1, cell + 1
+        work.barrier[last] = max(work.barrier[last], barrier)
         return known
-    work.earliest[known], work.places[known], work.farthest[known] = cell, cell + 1, cell + 1
+    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = (
+        cell,
+        cell + 1,
+        cell + 1,
+        barrier,
+    )
     return known + 1
 
 
@@ -130,21 +136,21 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     int
         Number of patches, or -1 if a patch does not end within its stretch or there are more, or more places of leaving, than fit.
     """
-    grip, travel, cells = grip_at(now), now.deborah * now.time, now.track.cells
-    write_spreads(now, WINDOW_CELLS, work.spreads)
-    found, known = _turn(now, grip, reachable, work, 0)
-    if grip.overflown:
+    motion, travel, cells = motion_at(now), now.deborah * now.time, now.track.cells
+    write_recent(now.history, now.first, now.deborah, work.recent)
+    found, known = _turn(now, motion, reachable, work, 0)
+    if motion.overflown:
         for _ in range(min(int(travel / cells) + 1, TURNS)):
             for k in range(known):
                 work.earliest[k] -= cells
                 work.places[k] -= cells
                 work.farthest[k] -= cells
-            found, known = _turn(now, grip, reachable, work, known)
+            found, known = _turn(now, motion, reachable, work, known)
     return found
 
 
 @nested
-def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
+def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
     """Do what `touch` does on one turn of the line, with some places of leaving known; return how many are known then.
 
     Where none is, the highest point is taken for touched.
@@ -152,17 +158,18 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
     runs, floor = reachable.runs, reachable.floor
-    start, end, sums, earliest, places, farthest, spreads, barriers = work
+    start, end, sums, earliest, places, farthest, barrier, recent, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
     deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
     for moment in range(history.count):
         deepest = max(deepest, history.depth[moment])
         highest = max(highest, history.depth[moment] + history.rate[moment])
-    found, edges, edges_drag, window = 0, 0.0, 0.0, WINDOW_CELLS
+    found, edges, edges_drag = 0, 0.0, 0.0
     n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
     free_from = held = begin
-    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, known), begin)[0]
+    firm, firm_until = 0.0, 0.0
+    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, barrier, recent, known), begin)[0]
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
@@ -175,26 +182,31 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
                 least_free *= fade_of_cell
                 most = deepest + peak[np.uintp(i)]
                 least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
-                if most <= least or (most < least_free and i + 1 - known_at < window):
+                if most <= least or (most < least_free and i + 1 - known_at < KNOWN_FOR):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
             if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
                 i += 1
                 continue
-            if contact and positive and begin <= i and barriers.cell[np.uintp(i)] < grip.firm:
-                whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n
-                i += BLOCK if whole and barriers.block[i // BLOCK] < grip.firm else 1
+            if contact and i + 1 > firm_until:
+                oldest = earliest[0] if known > 0 else begin
+                k = over(2 * (i + 1 - oldest))
+                firm, firm_until = min(depth - recent.push[k], recent.lowest[k]), oldest + WINDOW * 2.0**k
+            if contact and positive and begin <= i and barriers.cell[np.uintp(i)] < firm:
+                whole = i % BLOCK == 0 and i + BLOCK < min(stop, firm_until) and i + BLOCK <= n
+                i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
                 continue
             if known + VISITS > CANDIDATES:
                 return -1, 0
             cell, x1 = i, min(i + 1.0, finish)
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
-            leaves = (contact or positive) and (cell == n or barriers.cell[np.uintp(cell)] >= grip.lowest)
-            leaves = leaves and may_have_left((c0, c1, c2, c3), grip, deborah)
+            leaves = (contact or positive) and may_have_left((c0, c1, c2, c3), motion.rise, deborah)
             if leaves:
-                known = _remember_cell(float(cell), work, known)
+                most = barriers.cell[np.uintp(cell)] if cell < n else lift
+                leaves = most >= recent.lowest[WINDOWS - 1]
+                known = _remember_cell(float(cell), most, work, known) if leaves else known
             x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:
@@ -204,10 +216,13 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
                         pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
                         place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
                     pulls = cell + place < x1
-                    pull, wakes = cell + place if pulls else x1, Wakes(earliest, places, farthest, known)
+                    pull, wakes = (
+                        cell + place if pulls else x1,
+                        Wakes(earliest, places, farthest, barrier, recent, known),
+                    )
                     if leaves:
                         held = pull
-                    u = overtaking(now, wakes, grip, held, pull)
+                    u = overtaking(now, wakes, held, pull)
                     lost, until = depth + height_at(track, pull)[0] < u * (1 - ROUNDING), pull
                     if not (pulls or lost):
                         break
@@ -219,8 +234,8 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, wakes, until, w, spreads, window)
-                    least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
+                    known = worth_keeping(now, wakes, until, w, deepest)
+                    least_free, known_at = (w - CLEAR * recent.spread[over(KNOWN_FOR)]) * fade_of_cell, until
                     contact, free_from, x, pulled = False, pull, pull, True
                     if not pulls:
                         break
@@ -235,14 +250,14 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(earliest, places, farthest, known)
+                wakes = Wakes(earliest, places, farthest, barrier, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
                     probe, gap = (top, above) if above > 0 else (probe, gap)
-                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+                spread = recent.spread[over((2 * (probe - places[0]) if known > 0 else 0.0) + KNOWN_FOR)]
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
@@ -250,11 +265,11 @@ def _turn(now: Instant, grip: Grip, reachable: Reachable, work: Workspace, known
                     h, slope, _ = height_at(track, begin)
                     edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
-                    contact, x, held = True, begin, begin
+                    contact, x, held, firm_until = True, begin, begin, 0.0
                     continue
                 if not pulls:
                     break
-                known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
+                known = worth_keeping(now, wakes, probe, depth + h, deepest)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
                 free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:

@@ -18,12 +18,14 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import inlined, last_until, nested
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
+from mdr_dask.physics.transients.recent import Recent, over
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
 MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
 FARTHEST = 200  # cells back in which contact may have been left are looked at
+KEPT = 64.0  # cells more than twice the way, over which the depth may change what is kept
 CREST = 1e-3  # of a cell: where a line that comes near to a wake inside of a cell is nearest
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 
@@ -45,12 +47,15 @@ class Instant(NamedTuple):
 class Wakes(NamedTuple):
     """Places where contact is left now and the farthest where it was, ``count`` of them.
 
-    Where `earliest` is before a place, contact is not left now, but may have been left in the cells between.
+    Where `earliest` is before a place, contact is not left now. It may have been left in the cells between, when the lift
+    was below their `barrier`.
     """
 
     earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
+    barrier: FloatArray
+    recent: Recent
     count: int  # type: ignore[assignment]
 
 
@@ -155,6 +160,8 @@ def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float
 def _left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
     """Return what `_left_from` does, of the k-th place."""
     if wakes.earliest[k] < wakes.places[k]:
+        if wakes.recent.lowest[over(x - wakes.earliest[k])] > wakes.barrier[k]:
+            return -1.0, 0.0, 0.0
         return _left_within(now, x, wakes.earliest[k], wakes.places[k])
     return _left_from(now, x, wakes.places[k], wakes.farthest[k])
 
@@ -257,42 +264,18 @@ def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, f
 
 
 @inlined
-def write_spreads(now: Instant, window: float, spreads: FloatArray) -> None:
-    """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
-    history = now.history
-    last = history.count - 1
-    lowest = highest = history.depth[last]
-    back = last
-    for k in range(spreads.size):
-        since = now.time - window / now.deborah * 2.0**k
-        while back > 0 and history.time[back] > since:
-            back -= 1
-            lowest, highest = min(lowest, history.depth[back]), max(highest, history.depth[back])
-        spreads[k] = highest - lowest
-
-
-@inlined
-def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
-    """Return the range of the depth while the line went a distance."""
-    k = 0
-    while k < spreads.size - 1 and distance > window:
-        distance *= 0.5
-        k += 1
-    return float(spreads[k])
-
-
-@inlined
-def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
+def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
-    kept, deepest = 0, now.first.depth
-    for moment in range(now.history.count):
-        deepest = max(deepest, now.history.depth[moment])
+    kept = 0
     for k in range(wakes.count):
         place, farthest = wakes.places[k], wakes.farthest[k]
         u = _left(now, wakes, k, x)[0]
         if u < 0:  # none at x left there; farther ones may have
-            u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(-max(x - farthest, 0.0) / now.deborah)
-        if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
+            u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(
+                -max(x - farthest, 0.0) / now.deborah
+            )
+        if u + 2 * wakes.recent.spread[over(2 * (x - place) + KEPT)] >= pressed:
             wakes.earliest[kept], wakes.places[kept], wakes.farthest[kept] = wakes.earliest[k], place, farthest
+            wakes.barrier[kept] = wakes.barrier[k]
             kept += 1
     return kept
