@@ -106,6 +106,20 @@ def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> 
 
 
 @inlined
+def _flying_over(now: Instant, work: Workspace, known: int) -> int:
+    """Keep the places of which elements may fly over the highest point; count them, 0 if the last patch is the only one."""
+    wakes = Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known)
+    depth, deepest = now.history.depth[now.history.count - 1], now.first.depth
+    for moment in range(now.history.count):
+        deepest = max(deepest, now.history.depth[moment])
+    known = worth_keeping(now, wakes, now.track.cells + now.track.origin, depth, deepest)
+    for k in range(known):
+        if work.farthest[k] < now.track.cells:
+            return known
+    return 0
+
+
+@inlined
 def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) -> float:
     """Return how far from where contact is left it can have reached, at the highest of depth and rate so far."""
     i = min(int(place), int(now.track.cells))
@@ -141,6 +155,9 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     found, known = _turn(now, motion, reachable, work, 0)
     if motion.overflown:
         for _ in range(min(int(travel / cells) + 1, TURNS)):
+            known = _flying_over(now, work, known) if found > 0 else 0
+            if known == 0:
+                break
             for k in range(known):
                 work.earliest[k] -= cells
                 work.places[k] -= cells
@@ -158,7 +175,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
     runs, floor = reachable.runs, reachable.floor
-    start, end, sums, earliest, places, farthest, barrier, recent, barriers = work
+    start, end, sums, earliest, places, farthest, least_lift, recent, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
     deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
@@ -169,7 +186,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
     free_from = held = begin
     firm, firm_until = 0.0, 0.0
-    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, barrier, recent, known), begin)[0]
+    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
     fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
@@ -203,10 +220,10 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
             leaves = (contact or positive) and may_have_left((c0, c1, c2, c3), motion.rise, deborah)
-            if leaves:
-                most = barriers.cell[np.uintp(cell)] if cell < n else lift
-                leaves = most >= recent.lowest[WINDOWS - 1]
-                known = _remember_cell(float(cell), most, work, known) if leaves else known
+            barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
+            leaves = leaves and barrier >= recent.lowest[WINDOWS - 1]
+            if leaves and contact:
+                known = _remember_cell(float(cell), barrier, work, known)
             x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:
@@ -218,7 +235,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     pulls = cell + place < x1
                     pull, wakes = (
                         cell + place if pulls else x1,
-                        Wakes(earliest, places, farthest, barrier, recent, known),
+                        Wakes(earliest, places, farthest, least_lift, recent, known),
                     )
                     if leaves:
                         held = pull
@@ -250,7 +267,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(earliest, places, farthest, barrier, recent, known)
+                wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
                 gap, rise = depth + h - u, slope - u_slope
@@ -259,6 +276,8 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     probe, gap = (top, above) if above > 0 else (probe, gap)
                 spread = recent.spread[over((2 * (probe - places[0]) if known > 0 else 0.0) + KNOWN_FOR)]
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
+                if leaves and gap + peak[np.uintp(cell)] - h > -2 * spread:
+                    known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
                     begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
