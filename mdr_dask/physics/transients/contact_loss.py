@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.physics.compiling import inlined
+from mdr_dask.physics.surfaces.cubic_line import cubic
 from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at
-from mdr_dask.physics.transients.patches import height_at
+from mdr_dask.physics.transients.patches import Track, height_at
 from mdr_dask.physics.transients.recent import over
 
 CLOSE = 1e-9  # of a cell: where contact is lost
@@ -24,42 +25,62 @@ class Motion(NamedTuple):
 
     Parameters
     ----------
-    rise : float
-        Most by which the lift has risen until now, by time.
+    rise, fall : float
+        Most by which the lift has risen until now, and by which it has fallen, by time.
     overflown : bool
-        Whether elements in this turn may have come over the highest point, pressed further than it pressed then.
+        Whether elements from before the patch of the highest point may have come over it.
     """
 
     rise: float
+    fall: float
     overflown: bool
 
 
 @inlined
-def motion_at(now: Instant) -> Motion:
-    """Return how the depth has moved until a moment."""
+def motion_at(now: Instant, second: float) -> Motion:
+    """Return how the depth has moved, with the height of the highest point outside of the patch of the highest of all."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
-    rise, carried, overflown, before = 0.0, history.depth[0], False, 0.0
-    for moment in range(last):
+    lift, rise, fall, overflown = depth + rate, 0.0, 0.0, False
+    carried, before, lift_before = -np.inf, 0.0, history.depth[0] + history.rate[0]
+    for moment in range(last + 1):
         time, then = history.time[moment], history.depth[moment]
-        rise = max(rise, (depth + rate - then - history.rate[moment]) / (now.time - time))
-        carried, before = carried * np.exp(before - time), time
+        here = then + history.rate[moment]
+        if moment < last:
+            rise = max(rise, (lift - here) / (now.time - time))
+        if moment > 0:
+            fall = max(fall, (lift_before - here) / (time - before))
+            carried *= np.exp(before - time)
         overflown |= carried > then and deborah * (now.time - time) < now.track.cells
-        carried = max(carried, then)
-    overflown |= carried * np.exp(before - now.time) > depth
+        carried, before, lift_before = max(carried, then + second), time, here
     if last > 0:
         step = history.time[last] - history.time[last - 1]
         fallen = (history.depth[last - 1] - depth) / step
         rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
-    return Motion(rise, overflown)
+    return Motion(rise, fall, overflown)
 
 
 @inlined
-def may_have_left(line: tuple[float, float, float, float], rise: float, deborah: float) -> bool:
-    """Return whether elements can have left a cell where the force is positive now: it falls slower than the lift rises."""
-    _, c1, c2, c3 = line
+def _slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
+    """Return slopes that bound that of the force in a cell: at its start, the control point between, at its end."""
+    _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
     enter, bend, turn = c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, 3 * c3
-    return bool(-deborah * max(enter, enter + bend, enter + 2 * bend + turn) < rise)
+    return enter, enter + bend, enter + 2 * bend + turn
+
+
+@inlined
+def may_have_left(track: Track, motion: Motion, deborah: float, i: int) -> bool:
+    """Return whether elements can have left in cell i or where it begins, where the force is positive now.
+
+    On their way the force on them has fallen through zero and risen again.
+    """
+    start, middle, end = _slopes(track, deborah, i)
+    if deborah * max(start, middle, end) <= -motion.rise:
+        return False
+    least = min(start, middle, end)
+    if i > 0:
+        least = min(least, _slopes(track, deborah, i - 1)[2])
+    return bool(deborah * least < motion.fall)
 
 
 @inlined

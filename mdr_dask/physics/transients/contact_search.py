@@ -52,10 +52,13 @@ class Reachable(NamedTuple):
         First and last node of the stretches in which contact is possible.
     floor : array, shape (n + 2,)
         Displacement that an element has at least, at the nodes.
+    second : float
+        Height of the highest point outside of the patch of the highest of all.
     """
 
     runs: IntArray
     floor: FloatArray
+    second: float
 
 
 class Workspace(NamedTuple):
@@ -106,20 +109,6 @@ def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> 
 
 
 @inlined
-def _flying_over(now: Instant, work: Workspace, known: int) -> int:
-    """Keep the places of which elements may fly over the highest point; count them, 0 if the last patch is the only one."""
-    wakes = Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known)
-    depth, deepest = now.history.depth[now.history.count - 1], now.first.depth
-    for moment in range(now.history.count):
-        deepest = max(deepest, now.history.depth[moment])
-    known = worth_keeping(now, wakes, now.track.cells + now.track.origin, depth, deepest)
-    for k in range(known):
-        if work.farthest[k] < now.track.cells:
-            return known
-    return 0
-
-
-@inlined
 def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) -> float:
     """Return how far from where contact is left it can have reached, at the highest of depth and rate so far."""
     i = min(int(place), int(now.track.cells))
@@ -150,14 +139,11 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     int
         Number of patches, or -1 if a patch does not end within its stretch or there are more, or more places of leaving, than fit.
     """
-    motion, travel, cells = motion_at(now), now.deborah * now.time, now.track.cells
+    motion, travel, cells = motion_at(now, reachable.second), now.deborah * now.time, now.track.cells
     write_recent(now.history, now.first, now.deborah, work.recent)
     found, known = _turn(now, motion, reachable, work, 0)
     if motion.overflown:
         for _ in range(min(int(travel / cells) + 1, TURNS)):
-            known = _flying_over(now, work, known) if found > 0 else 0
-            if known == 0:
-                break
             for k in range(known):
                 work.earliest[k] -= cells
                 work.places[k] -= cells
@@ -219,9 +205,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
             cell, x1 = i, min(i + 1.0, finish)
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
-            leaves = (contact or positive) and may_have_left((c0, c1, c2, c3), motion.rise, deborah)
             barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
-            leaves = leaves and barrier >= recent.lowest[WINDOWS - 1]
+            leaves = (contact or positive) and barrier >= recent.lowest[WINDOWS - 1]
+            leaves = leaves and may_have_left(track, motion, deborah, cell)
             if leaves and contact:
                 known = _remember_cell(float(cell), barrier, work, known)
             x, pulled = max(float(cell), begin if contact else free_from), False
