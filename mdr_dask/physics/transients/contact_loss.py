@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.physics.compiling import inlined
+from mdr_dask.physics.compiling import inlined, nested
 from mdr_dask.physics.surfaces.cubic_line import cubic
-from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at
+from mdr_dask.physics.transients.free_flight import Instant, Wakes, left, left_before, wake_at, worth_keeping
 from mdr_dask.physics.transients.patches import Track, height_at
 from mdr_dask.physics.transients.recent import over
 
@@ -27,25 +27,31 @@ class Motion(NamedTuple):
     ----------
     rise, fall : float
         Most by which the lift has risen until now, and by which it has fallen, by time.
+    deepest, highest : float
+        Largest depth and lift so far.
     overflown : bool
         Whether elements from before the patch of the highest point may have come over it.
     """
 
     rise: float
     fall: float
+    deepest: float
+    highest: float
     overflown: bool
 
 
 @inlined
 def motion_at(now: Instant, second: float) -> Motion:
-    """Return how the depth has moved, with the height of the highest point outside of the patch of the highest of all."""
+    """Return how the depth has moved, with the highest point outside of the patch of the highest of all."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lift, rise, fall, overflown = depth + rate, 0.0, 0.0, False
+    deepest, highest = depth, lift
     carried, before, lift_before = -np.inf, 0.0, history.depth[0] + history.rate[0]
     for moment in range(last + 1):
         time, then = history.time[moment], history.depth[moment]
         here = then + history.rate[moment]
+        deepest, highest = max(deepest, then), max(highest, here)
         if moment < last:
             rise = max(rise, (lift - here) / (now.time - time))
         if moment > 0:
@@ -57,7 +63,7 @@ def motion_at(now: Instant, second: float) -> Motion:
         step = history.time[last] - history.time[last - 1]
         fallen = (history.depth[last - 1] - depth) / step
         rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
-    return Motion(rise, fall, overflown)
+    return Motion(rise, fall, deepest, highest, overflown)
 
 
 @inlined
@@ -116,3 +122,28 @@ def loss(now: Instant, wakes: Wakes, low: float, high: float) -> float:
         else:
             low = x
     return high
+
+
+@inlined
+def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
+    """Shift places by a turn, to before the highest point, and keep those worth it; count them."""
+    for k in range(wakes.count):
+        wakes.earliest[k] -= now.track.cells
+        wakes.places[k] -= now.track.cells
+        wakes.farthest[k] -= now.track.cells
+    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
+
+
+@nested
+def flies_over(now: Instant, wakes: Wakes) -> bool:
+    """Return whether elements from before the patch of the highest point came over it at one of the moments so far."""
+    for moment in range(now.history.count - 1, -1, -1):
+        since, u = now.time - now.history.time[moment], 0.0
+        if now.deborah * since >= now.track.cells:
+            break
+        for k in range(wakes.count):
+            if wakes.farthest[k] < 0:
+                u = max(u, left(now, wakes, k, now.track.origin + now.deborah * since)[0])
+        if u > now.history.depth[moment] * np.exp(-since):
+            return True
+    return False

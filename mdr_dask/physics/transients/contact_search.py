@@ -10,7 +10,15 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
-from mdr_dask.physics.transients.contact_loss import Motion, loss, may_have_left, motion_at, overtaking
+from mdr_dask.physics.transients.contact_loss import (
+    Motion,
+    flies_over,
+    loss,
+    may_have_left,
+    motion_at,
+    overtaking,
+    turned,
+)
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
@@ -137,17 +145,19 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     Returns
     -------
     int
-        Number of patches, or -1 if a patch does not end within its stretch or there are more, or more places of leaving, than fit.
+        Number of patches, or -1 if a patch does not end within its stretch, or if there are more patches or more places
+        of leaving than fit.
     """
-    motion, travel, cells = motion_at(now, reachable.second), now.deborah * now.time, now.track.cells
+    motion = motion_at(now, reachable.second)
     write_recent(now.history, now.first, now.deborah, work.recent)
     found, known = _turn(now, motion, reachable, work, 0)
     if motion.overflown:
-        for _ in range(min(int(travel / cells) + 1, TURNS)):
-            for k in range(known):
-                work.earliest[k] -= cells
-                work.places[k] -= cells
-                work.farthest[k] -= cells
+        for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, TURNS)):
+            known = turned(
+                now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known), motion
+            )
+            if not flies_over(now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known)):
+                break
             found, known = _turn(now, motion, reachable, work, known)
     return found
 
@@ -164,10 +174,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     start, end, sums, earliest, places, farthest, least_lift, recent, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
-    deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
-    for moment in range(history.count):
-        deepest = max(deepest, history.depth[moment])
-        highest = max(highest, history.depth[moment] + history.rate[moment])
+    deepest, highest = motion.deepest, motion.highest  # elements may fly from where the line is no longer touched
     found, edges, edges_drag = 0, 0.0, 0.0
     n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
     free_from = held = begin
@@ -206,9 +213,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
             barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
-            leaves = (contact or positive) and barrier >= recent.lowest[WINDOWS - 1]
-            leaves = leaves and may_have_left(track, motion, deborah, cell)
-            if leaves and contact:
+            weak = (contact or positive) and barrier >= recent.lowest[WINDOWS - 1]
+            leaves = contact and weak and may_have_left(track, motion, deborah, cell)
+            if leaves:
                 known = _remember_cell(float(cell), barrier, work, known)
             x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
@@ -262,7 +269,11 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     probe, gap = (top, above) if above > 0 else (probe, gap)
                 spread = recent.spread[over((2 * (probe - places[0]) if known > 0 else 0.0) + KNOWN_FOR)]
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
-                if leaves and gap + peak[np.uintp(cell)] - h > -2 * spread:
+                if (
+                    weak
+                    and gap + peak[np.uintp(cell)] - h > -2 * spread
+                    and may_have_left(track, motion, deborah, cell)
+                ):
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)

@@ -47,8 +47,8 @@ class Instant(NamedTuple):
 class Wakes(NamedTuple):
     """Places where contact is left now and the farthest where it was, ``count`` of them.
 
-    Where `earliest` is before a place, contact is not left now. It may have been left in the cells between, when the lift
-    was below their `barrier`.
+    Where `earliest` is before a place, contact is not left now. It may have been left in the cells between, when the
+    lift was below their `barrier`.
     """
 
     earliest: FloatArray
@@ -157,7 +157,7 @@ def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float
 
 
 @inlined
-def _left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
+def left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
     """Return what `_left_from` does, of the k-th place."""
     if wakes.earliest[k] < wakes.places[k]:
         if wakes.recent.lowest[over(x - wakes.earliest[k])] > wakes.barrier[k]:
@@ -183,7 +183,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
-        value, value_slope, value_gain = _left(now, wakes, k, x)
+        value, value_slope, value_gain = left(now, wakes, k, x)
         if value > u:
             u, slope, gain = value, value_slope, value_gain
     if now.first.depth * now.left > u:  # heights count from the highest point
@@ -269,7 +269,7 @@ def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest:
     kept = 0
     for k in range(wakes.count):
         place, farthest = wakes.places[k], wakes.farthest[k]
-        u = _left(now, wakes, k, x)[0]
+        u = left(now, wakes, k, x)[0]
         if u < 0:  # none at x left there; farther ones may have
             u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(
                 -max(x - farthest, 0.0) / now.deborah
