@@ -88,7 +88,7 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
     earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
-    recent = Recent(*np.empty((3, WINDOWS)))
+    recent = Recent(*np.empty((4, WINDOWS)))
     return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, barriers)
 
 
@@ -180,7 +180,10 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     free_from = held = begin
     firm, firm_until = 0.0, 0.0
     contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
-    fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
+    slowing = 1 / min(deborah, now.first.deborah)
+    fade_of_cell = np.exp(-slowing)
+    oldest = earliest[0] if known > 0 else begin
+    seen, seen_at = 0.0, begin  # what free elements were seen to have last, and where
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
     for run in range(runs.shape[0]):
@@ -226,18 +229,16 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                         pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
                         place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
                     pulls = cell + place < x1
-                    pull, wakes = (
-                        cell + place if pulls else x1,
-                        Wakes(earliest, places, farthest, least_lift, recent, known),
-                    )
+                    off = cell + place if pulls else x1
+                    wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                     if leaves:
-                        held = pull
-                    u = overtaking(now, wakes, held, pull)
-                    lost, until = depth + height_at(track, pull)[0] < u * (1 - ROUNDING), pull
+                        held = off
+                    u = overtaking(now, wakes, held, off)
+                    lost, until = depth + height_at(track, off)[0] < u * (1 - ROUNDING), off
                     if not (pulls or lost):
                         break
                     if lost:
-                        until = loss(now, wakes, x, pull)
+                        until = loss(now, wakes, x, off)
                     if found + 1 >= start.size:
                         return -1, 0
                     add_patch(track, begin, until, lift, deborah, sums)
@@ -246,10 +247,11 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, wakes, until, w, deepest)
                     least_free, known_at = (w - CLEAR * recent.spread[over(KNOWN_FOR)]) * fade_of_cell, until
-                    contact, free_from, x, pulled = False, pull, pull, True
+                    seen, seen_at, oldest = w, until, earliest[0] if known > 0 else until
+                    contact, free_from, x, pulled = False, off, off, True
                     if not pulls:
                         break
-                    known = _remember(pull, _farthest(now, pull, highest, barriers), work, known)
+                    known = _remember(off, _farthest(now, off, highest, barriers), work, known)
                 # the line comes nearer to free elements while the force on them would be positive
                 low, high = x - cell, NONE
                 if not positive:
@@ -260,14 +262,19 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
+                h, slope, _ = height_at(track, probe)
+                pull = recent.pull[over(probe - oldest)]
+                lowest_free = (seen - pull) * np.exp((seen_at - probe) * slowing) + pull
+                spread = recent.spread[over(2 * (probe - oldest) + KNOWN_FOR)]
+                if not pulls and depth + peak[np.uintp(cell)] + (2 * spread if weak else 0.0) <= lowest_free:
+                    break
                 wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
-                h, slope, _ = height_at(track, probe)
+                seen, seen_at = u, probe
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
                     probe, gap = (top, above) if above > 0 else (probe, gap)
-                spread = recent.spread[over((2 * (probe - places[0]) if known > 0 else 0.0) + KNOWN_FOR)]
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
                 if (
                     weak

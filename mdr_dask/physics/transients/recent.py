@@ -25,11 +25,14 @@ class Recent(NamedTuple):
         Least depth and rate together, the lift.
     push : array, shape (WINDOWS,)
         Most that D u' + u is of elements that left meanwhile, or have been in flight since the jump.
+    pull : array, shape (WINDOWS,)
+        Least that it is, or 0, where D is the lesser of the Deborah numbers before and after the jump.
     """
 
     spread: FloatArray
     lowest: FloatArray
     push: FloatArray
+    pull: FloatArray
 
 
 @inlined
@@ -39,6 +42,7 @@ def write_recent(history: History, first: Patches, deborah: float, recent: Recen
     time, depth, rate = history.time[last], history.depth[last], history.rate[last]
     left, back = np.exp(-time), last
     lowest, highest, least, push = depth, depth, depth + rate, max(-rate, -history.rate[0] * left, 0.0)
+    pull = min(-rate, -history.rate[0] * left, 0.0)
     if first.deborah > deborah:  # what was free at the jump fades more slowly along the line
         push = max(push, min(depth, first.depth * left) * (1 - deborah / first.deborah))
     for k in range(WINDOWS):
@@ -47,9 +51,10 @@ def write_recent(history: History, first: Patches, deborah: float, recent: Recen
             back -= 1
             then, falls = history.depth[back], -history.rate[back]
             lowest, highest, least = min(lowest, then), max(highest, then), min(least, then - falls)
-            if falls > push:
-                push = max(push, falls * np.exp(history.time[back] - time))
-        recent.spread[k], recent.lowest[k], recent.push[k] = highest - lowest, least, push
+            if falls > push or falls < pull:
+                falls *= np.exp(history.time[back] - time)
+                push, pull = max(push, falls), min(pull, falls)
+        recent.spread[k], recent.lowest[k], recent.push[k], recent.pull[k] = highest - lowest, least, push, pull
 
 
 @inlined
