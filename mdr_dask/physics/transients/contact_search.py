@@ -44,7 +44,7 @@ from mdr_dask.physics.transients.patches import (
 from mdr_dask.physics.transients.recent import WINDOW, WINDOWS, Recent, over, write_recent
 
 CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
-CANDIDATES = 256  # most places of leaving whose wakes are compared
+CANDIDATES = 1024  # most places of leaving whose wakes are compared
 KNOWN_FOR = 64.0  # cells in which what free elements have at least is taken for known
 ROUNDING = 1e-9  # of a displacement
 TURNS = 3  # of the line that an element may fly over
@@ -210,7 +210,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                 whole = i % BLOCK == 0 and i + BLOCK < min(stop, firm_until) and i + BLOCK <= n
                 i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
                 continue
-            if known + VISITS > CANDIDATES:
+            if known + VISITS > places.size:
                 return -1, 0
             cell, x1 = i, min(i + 1.0, finish)
             i += 1

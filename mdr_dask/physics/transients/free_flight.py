@@ -124,6 +124,8 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
         falls = (rate + change) * pace + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
         if abs(step) < NEAR:
+            if s + step > x:  # it is still to come there
+                break
             fade = np.exp(-since)
             u = (d + h + 0.5 * force * step * pace) * fade
             return u, -(d + h + rate) * fade * pace, _follows(now.history, now.time - since) * fade
@@ -270,7 +272,7 @@ def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest:
     for k in range(wakes.count):
         place, farthest = wakes.places[k], wakes.farthest[k]
         u = left(now, wakes, k, x)[0]
-        if u < 0:  # none at x left there; farther ones may have
+        if u < 0 and x - now.deborah * now.time < farthest:  # none at x left there; farther ones may have
             u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(
                 -max(x - farthest, 0.0) / now.deborah
             )
