@@ -111,7 +111,7 @@ def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
     return wake_at(now, wakes, x)[0]
 
 
-@inlined
+@nested
 def loss(now: Instant, wakes: Wakes, low: float, high: float) -> float:
     """Return where contact is lost between low and high, by bisection."""
     depth = now.history.depth[now.history.count - 1]

@@ -249,7 +249,7 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
     return x, slope, 1 - gain
 
 
-@inlined
+@nested
 def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, float]:
     """Return where the line comes nearest to the wake or above it between two places, falling back at `high`."""
     depth, x, gap = now.history.depth[now.history.count - 1], high, -1.0
