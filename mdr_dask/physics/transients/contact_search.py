@@ -186,6 +186,8 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     seen, seen_at = 0.0, begin  # what free elements were seen to have last, and where
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
+    if not contact:  # it may have been left there
+        known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
