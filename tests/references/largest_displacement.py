@@ -5,13 +5,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.surfaces import roughness
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients.contact_search import touch
+from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.march import Finish, Marching, Trajectory, march_depth
 from mdr_dask.physics.transients.patches import LOAD, History
+from mdr_dask.physics.transients.velocity_jump import Transient, _Relaxation
 
 SAMPLES = 12  # of a cell
 SHORT = 3.0  # samples: what is shorter cannot be judged
+RATIOS = (0.1, 0.2, 0.5, 0.8, 1.2, 2.0, 5.0, 10.0)
 
 
 class Sampled(NamedTuple):
@@ -82,3 +89,23 @@ def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> fl
         load, doubt = load_by_largest(marching, found, int(now), line)
         worst = np.fmax(worst, (abs(load - work.sums[LOAD]) - doubt) / work.sums[LOAD])
     return float(worst)
+
+
+def judged(seed: int, number: int, moments: int) -> tuple[float, dict[str, float]]:
+    """Return how far a random case is off, NaN if it has no transient, and what it was."""
+    random = np.random.default_rng([seed, number])
+    points, grid = int(random.choice([40, 80, 160])), int(random.choice([2, 4, 8, 16]))
+    hurst = float(random.uniform(0, 1))
+    amplitude = roughness.amplitudes(points // 2, hurst)
+    line = RoughLine(Waves(0.5 * amplitude * roughness.phase_factors(seed, number, points // 2), points))
+    load, ratio = 10 ** random.uniform(-3, 0.7), float(random.choice(RATIOS))
+    deborah = 10 ** random.uniform(-2.5, 1.5) / roughness.spectral_slope(amplitude)
+    prepared = PreparedLine.of(line.cubic(points * grid))
+    loads, numbers = np.array([load]), np.array([[deborah, deborah * ratio]])
+    ends = ends_on(prepared, loads, numbers)
+    case = {"points": points, "grid": grid, "hurst": hurst, "load": load, "deborah": deborah, "ratio": ratio}
+    if ends.outcome[0] != Outcome.CONVERGED:
+        return np.nan, case
+    asked = Transient(np.geomspace(0.01, 3, 20), np.pi * points, float(random.choice([6, 8, 24])))
+    relaxation = _Relaxation.of(prepared, load, numbers[0], ends, 0, asked)
+    return (np.nan if relaxation.is_full else worst_moment(relaxation, moments, random)), case

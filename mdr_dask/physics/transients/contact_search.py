@@ -7,21 +7,26 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
+from mdr_dask.physics.transients.contact_loss import (
+    Motion,
+    flies_over,
+    loss,
+    may_have_left,
+    motion_at,
+    overtaking,
+    turned,
+)
 from mdr_dask.physics.transients.free_flight import (
     Instant,
     Wakes,
+    crest,
     foreseen,
-    left_before,
-    losing,
     meeting,
-    next_free_place,
-    spread_over,
     wake_at,
     worth_keeping,
-    write_spreads,
 )
 from mdr_dask.physics.transients.patches import (
     DRAG_STIFFNESS,
@@ -36,12 +41,13 @@ from mdr_dask.physics.transients.patches import (
     loading,
     unloading,
 )
+from mdr_dask.physics.transients.recent import WINDOW, WINDOWS, Recent, over, write_recent
 
 CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
-CANDIDATES = 64  # most places of leaving whose wakes are compared
-WINDOW_CELLS = 64.0
-WINDOWS = 12
-GUARD_CELLS = 200.0  # travelled, until which elements that the jump found free are told apart
+CANDIDATES = 1024  # most places of leaving whose wakes are compared
+KNOWN_FOR = 64.0  # cells in which what free elements have at least is taken for known
+ROUNDING = 1e-9  # of a displacement
+TURNS = 3  # of the line that an element may fly over
 VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
 
 
@@ -54,10 +60,13 @@ class Reachable(NamedTuple):
         First and last node of the stretches in which contact is possible.
     floor : array, shape (n + 2,)
         Displacement that an element has at least, at the nodes.
+    second : float
+        Height of the highest point outside of the patch of the highest of all.
     """
 
     runs: IntArray
     floor: FloatArray
+    second: float
 
 
 class Workspace(NamedTuple):
@@ -66,9 +75,11 @@ class Workspace(NamedTuple):
     start: FloatArray
     end: FloatArray
     sums: FloatArray
+    earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
-    spreads: FloatArray
+    barrier: FloatArray
+    recent: Recent
     barriers: Barriers
 
 
@@ -76,15 +87,32 @@ def workspace_for(patches: int, barriers: Barriers) -> Workspace:
     """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
-    places, farthest = np.empty((2, CANDIDATES))
-    return Workspace(start, end, np.zeros(SUMS), places, farthest, np.empty(WINDOWS), barriers)
+    earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
+    recent = Recent(*np.empty((4, WINDOWS)))
+    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, barriers)
 
 
 @inlined
 def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
-    """Write down where contact was left, over the last place where there is no more room; count the places."""
-    known = min(known, CANDIDATES - 1)
-    work.places[known], work.farthest[known] = place, farthest
+    """Write down where contact was left; count the places."""
+    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = place, place, farthest, np.inf
+    return known + 1
+
+
+@inlined
+def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> int:
+    """Write down that contact may have been left in a cell where the force is positive now; count the places."""
+    last = known - 1
+    if known > 0 and work.earliest[last] < work.places[last] and work.places[last] == cell:
+        work.places[last], work.farthest[last] = cell + 1, cell + 1
+        work.barrier[last] = max(work.barrier[last], barrier)
+        return known
+    work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = (
+        cell,
+        cell + 1,
+        cell + 1,
+        barrier,
+    )
     return known + 1
 
 
@@ -99,21 +127,6 @@ def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) ->
     while i < int(now.track.cells) and keeps_pressed(now.track, barriers, now.deborah, i, highest):
         i += 1
     return i + 1.0
-
-
-@inlined
-def _leaving(now: Instant, depth: float, low: float, until: float, next_free: float) -> tuple[float, bool, float]:
-    """Return until where contact lasts in a part of a cell, whether to elements free at the jump, and the next ones.
-
-    At `until` the force vanishes, or the part ends.
-    """
-    if until < next_free:
-        return until, False, next_free
-    w = depth + height_at(now.track, until)[0]
-    next_free = next_free_place(now, until)
-    if next_free == until and w < left_before(now, until)[0] * (1 - 1e-14):
-        return losing(now, depth, low, until), True, next_free
-    return until, False, next_free
 
 
 @compiled
@@ -132,28 +145,49 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     Returns
     -------
     int
-        Number of patches, or -1 if a patch does not end within its stretch or there are more than fit.
+        Number of patches, or -1 if a patch does not end within its stretch, or if there are more patches or more places
+        of leaving than fit.
+    """
+    motion = motion_at(now, reachable.second)
+    write_recent(now.history, now.first, now.deborah, work.recent)
+    found, known = _turn(now, motion, reachable, work, 0)
+    if motion.overflown:
+        for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, TURNS)):
+            known = turned(
+                now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known), motion
+            )
+            if not flies_over(now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known)):
+                break
+            found, known = _turn(now, motion, reachable, work, known)
+    return found
+
+
+@nested
+def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
+    """Do what `touch` does on one turn of the line, with some places of leaving known; return how many are known then.
+
+    Where none is, the highest point is taken for touched.
     """
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
     runs, floor = reachable.runs, reachable.floor
-    start, end, sums, places, farthest, spreads, barriers = work
+    start, end, sums, earliest, places, farthest, least_lift, recent, barriers = work
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
-    deepest, highest = depth, lift  # so far: elements may fly from where the line is no longer touched
-    for moment in range(history.count):
-        deepest = max(deepest, history.depth[moment])
-        highest = max(highest, history.depth[moment] + history.rate[moment])
-    known, found, edges, edges_drag = 0, 0, 0.0, 0.0
-    n, finish = int(track.cells), track.cells + track.origin
-    contact, begin, free_from = True, track.origin, 0.0
-    guard = deborah * now.time < GUARD_CELLS
-    next_free = next_free_place(now, begin) if guard else np.inf
-    window = WINDOW_CELLS
-    write_spreads(now, window, spreads)
-    fade_of_cell = np.exp(-1 / min(deborah, now.first.deborah))
+    deepest, highest = motion.deepest, motion.highest  # elements may fly from where the line is no longer touched
+    found, edges, edges_drag = 0, 0.0, 0.0
+    n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
+    free_from = held = begin
+    firm, firm_until = 0.0, 0.0
+    contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
+    slowing = 1 / min(deborah, now.first.deborah)
+    fade_of_cell = np.exp(-slowing)
+    oldest = earliest[0] if known > 0 else begin
+    seen, seen_at = 0.0, begin  # what free elements were seen to have last, and where
     least_free, known_at = 0.0, 0.0
     sums[:] = 0.0
+    if not contact:  # it may have been left there
+        known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
@@ -161,23 +195,34 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
         while i < stop:
             if not contact:
                 least_free *= fade_of_cell
-                top = deepest + peak[np.uintp(i)]
+                most = deepest + peak[np.uintp(i)]
                 least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
-                if top <= least or (top < least_free and i + 1 - known_at < window):
+                if most <= least or (most < least_free and i + 1 - known_at < KNOWN_FOR):
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
             if not contact and i < n and lift <= barriers.idle[np.uintp(i)]:
                 i += 1
                 continue
-            if contact and positive and begin <= i and i + 1 < next_free:
-                whole = i % BLOCK == 0 and i + BLOCK < stop and i + BLOCK <= n and i + BLOCK < next_free
-                i += BLOCK if whole and barriers.block[i // BLOCK] < lift else 1
+            if contact and i + 1 > firm_until:
+                oldest = earliest[0] if known > 0 else begin
+                k = over(2 * (i + 1 - oldest))
+                firm, firm_until = min(depth - recent.push[k], recent.lowest[k]), oldest + WINDOW * 2.0**k
+            if contact and positive and begin <= i and barriers.cell[np.uintp(i)] < firm:
+                whole = i % BLOCK == 0 and i + BLOCK < min(stop, firm_until) and i + BLOCK <= n
+                i += BLOCK if whole and barriers.block[i // BLOCK] < firm else 1
                 continue
+            if known + VISITS > places.size:
+                return -1, 0
             cell, x1 = i, min(i + 1.0, finish)
             i += 1
             c0, c1, c2, c3 = cubic(height, enter, leave, cell)
-            x = max(float(cell), begin if contact else free_from)
+            barrier = barriers.cell[np.uintp(cell)] if cell < n else lift
+            weak = (contact or positive) and barrier >= recent.lowest[WINDOWS - 1]
+            leaves = contact and weak and may_have_left(track, motion, deborah, cell)
+            if leaves:
+                known = _remember_cell(float(cell), barrier, work, known)
+            x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:
                     y = x - cell
@@ -186,57 +231,77 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
                         pressed = force_at(c0, c1, c2, c3, lift, deborah, y) > 0
                         place = unloading(c0, c1, c2, c3, lift, deborah, y) if pressed else y
                     pulls = cell + place < x1
-                    until, lost, next_free = _leaving(now, depth, x, cell + place if pulls else x1, next_free)
+                    off = cell + place if pulls else x1
+                    wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
+                    if leaves:
+                        held = off
+                    u = overtaking(now, wakes, held, off)
+                    lost, until = depth + height_at(track, off)[0] < u * (1 - ROUNDING), off
                     if not (pulls or lost):
                         break
+                    if lost:
+                        until = loss(now, wakes, x, off)
                     if found + 1 >= start.size:
-                        return -1
+                        return -1, 0
                     add_patch(track, begin, until, lift, deborah, sums)
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, Wakes(places, farthest, known), until, w, spreads, window)
-                    least_free, known_at = (w - CLEAR * spreads[0]) * fade_of_cell, until
-                    if not lost:
-                        known = _remember(until, _farthest(now, until, highest, barriers), work, known)
-                    contact, free_from, x = False, until, until
-                    if lost:
+                    known = worth_keeping(now, wakes, until, w, deepest)
+                    least_free, known_at = (w - CLEAR * recent.spread[over(KNOWN_FOR)]) * fade_of_cell, until
+                    seen, seen_at, oldest = w, until, earliest[0] if known > 0 else until
+                    contact, free_from, x, pulled = False, off, off, True
+                    if not pulls:
                         break
+                    known = _remember(off, _farthest(now, off, highest, barriers), work, known)
                 # the line comes nearer to free elements while the force on them would be positive
                 low, high = x - cell, NONE
                 if not positive:
-                    if x == free_from or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
+                    if pulled or force_at(c0, c1, c2, c3, lift, deborah, low) <= 0:
                         low = loading(c0, c1, c2, c3, lift, deborah, low)
                     if cell + low >= x1:
                         break
                     high = unloading(c0, c1, c2, c3, lift, deborah, low)
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
-                wakes = Wakes(places, farthest, known)
-                u, u_slope, _ = wake_at(now, wakes, probe)
                 h, slope, _ = height_at(track, probe)
+                pull = recent.pull[over(probe - oldest)]
+                lowest_free = (seen - pull) * np.exp((seen_at - probe) * slowing) + pull
+                spread = recent.spread[over(2 * (probe - oldest) + KNOWN_FOR)]
+                if not pulls and depth + peak[np.uintp(cell)] + (2 * spread if weak else 0.0) <= lowest_free:
+                    break
+                wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
+                u, u_slope, _ = wake_at(now, wakes, probe)
+                seen, seen_at = u, probe
                 gap, rise = depth + h - u, slope - u_slope
-                spread = spread_over(spreads, window, 2 * (probe - places[0]) + window) if known > 0 else spreads[0]
+                if gap <= 0 and gap > rise * (probe - cell - low):
+                    top, above = crest(now, wakes, cell + low, probe)
+                    probe, gap = (top, above) if above > 0 else (probe, gap)
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
+                if (
+                    weak
+                    and gap + peak[np.uintp(cell)] - h > -2 * spread
+                    and may_have_left(track, motion, deborah, cell)
+                ):
+                    known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
                     begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
                     h, slope, _ = height_at(track, begin)
                     edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
                     edges, edges_drag = edges + edge, edges_drag + edge * slope
-                    contact, x = True, begin
-                    next_free = next_free_place(now, begin) if guard else np.inf
+                    contact, x, held, firm_until = True, begin, begin, 0.0
                     continue
                 if not pulls:
                     break
-                known = worth_keeping(now, wakes, probe, depth + h, spreads, window)
+                known = worth_keeping(now, wakes, probe, depth + h, deepest)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
-                free_from = x = probe
+                free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:
-            return -1
+            return -1, 0
     begin = begin if contact else finish
     add_patch(track, begin, finish, lift, deborah, sums)
     start[found], end[found] = begin, finish
     sums[STIFFNESS] = sums[LENGTH] * (1 + history.stiff) + edges
     sums[DRAG_STIFFNESS] = sums[TILT] * (1 + history.stiff) + edges_drag
-    return found + 1
+    return found + 1, known

@@ -16,13 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined, last_until
+from mdr_dask.physics.compiling import inlined, last_until, nested
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
+from mdr_dask.physics.transients.recent import Recent, over
 
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
 MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
+FARTHEST = 200  # cells back in which contact may have been left are looked at
+KEPT = 64.0  # cells more than twice the way, over which the depth may change what is kept
+CREST = 1e-3  # of a cell: where a line that comes near to a wake inside of a cell is nearest
 FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 
 
@@ -41,10 +45,17 @@ class Instant(NamedTuple):
 
 
 class Wakes(NamedTuple):
-    """Places where contact is left now and the farthest where it was, ``count`` of them."""
+    """Places where contact is left now and the farthest where it was, ``count`` of them.
 
+    Where `earliest` is before a place, contact is not left now. It may have been left in the cells between, when the
+    lift was below their `barrier`.
+    """
+
+    earliest: FloatArray
     places: FloatArray
     farthest: FloatArray
+    barrier: FloatArray
+    recent: Recent
     count: int  # type: ignore[assignment]
 
 
@@ -86,6 +97,13 @@ def _follows(history: History, t: float) -> float:
 
 
 @inlined
+def _in_turn(now: Instant, s: float) -> float:
+    """Return the place in the turn that a line is of a place in any turn."""
+    track = now.track
+    return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
+
+
+@inlined
 def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place` after the jump, its slope, its derivative by depth.
 
@@ -101,11 +119,13 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
             break
         since = (x - s) * pace
         d, rate, change = _depth_at(now.history, max(now.time - since, 0.0))
-        h, slope, curvature = height_at(now.track, s)
+        h, slope, curvature = height_at(now.track, s if s > 0 else _in_turn(now, s))
         force = d + h + rate + deborah * slope
         falls = (rate + change) * pace + slope + deborah * curvature
         step = -force / falls if falls < 0 else STRIDE if force > 0 else -STRIDE
         if abs(step) < NEAR:
+            if s + step > x:  # it is still to come there
+                break
             fade = np.exp(-since)
             u = (d + h + 0.5 * force * step * pace) * fade
             return u, -(d + h + rate) * fade * pace, _follows(now.history, now.time - since) * fade
@@ -123,15 +143,38 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
     return -1.0, 0.0, 0.0
 
 
+@nested
+def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
+    """Return what `_left_from` does, of an element that left somewhere in a stretch of cells: after a look at nodes."""
+    most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
+    low = max(low, x - now.deborah * now.time, s - FARTHEST)
+    while s >= low:
+        since = (x - s) / now.deborah
+        height = now.track.height[int(s if s >= 0 else s + now.track.cells)]
+        u = (_depth_at(now.history, now.time - since)[0] + height) * np.exp(-since)
+        if u > most:
+            most, place = u, s
+        s -= 1
+    return _left_from(now, x, place, place + 1) if most > 0 else (-1.0, 0.0, 0.0)
+
+
+@inlined
+def left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
+    """Return what `_left_from` does, of the k-th place."""
+    if wakes.earliest[k] < wakes.places[k]:
+        if wakes.recent.lowest[over(x - wakes.earliest[k])] > wakes.barrier[k]:
+            return -1.0, 0.0, 0.0
+        return _left_within(now, x, wakes.earliest[k], wakes.places[k])
+    return _left_from(now, x, wakes.places[k], wakes.farthest[k])
+
+
 @inlined
 def left_before(now: Instant, x: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x."""
-    track, first = now.track, now.first
-    s = x - now.deborah * now.time
-    s -= np.floor((s - track.origin) / track.cells) * track.cells
+    first, s = now.first, _in_turn(now, x - now.deborah * now.time)
     low = patch_before(first, s)
     if s <= first.end[low]:
-        h, slope, _ = height_at(track, s)
+        h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left
     u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * now.left
     return u, -u / first.deborah
@@ -142,7 +185,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
     for k in range(wakes.count):
-        value, value_slope, value_gain = _left_from(now, x, wakes.places[k], wakes.farthest[k])
+        value, value_slope, value_gain = left(now, wakes, k, x)
         if value > u:
             u, slope, gain = value, value_slope, value_gain
     if now.first.depth * now.left > u:  # heights count from the highest point
@@ -206,70 +249,35 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
     return x, slope, 1 - gain
 
 
-@inlined
-def losing(now: Instant, depth: float, low: float, high: float) -> float:
-    """Return where, between low and high, contact gives way to elements that the jump found free; by bisection."""
-    while high - low > 1e-12:
+@nested
+def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, float]:
+    """Return where the line comes nearest to the wake or above it between two places, falling back at `high`."""
+    depth, x, gap = now.history.depth[now.history.count - 1], high, -1.0
+    while gap <= 0 and high - low > CREST:
         x = 0.5 * (low + high)
-        if not low < x < high:
-            break
-        if depth + height_at(now.track, x)[0] > left_before(now, x)[0]:
+        u, u_slope, _ = wake_at(now, wakes, x)
+        h, h_slope, _ = height_at(now.track, x)
+        gap = depth + h - u
+        if h_slope > u_slope:
             low = x
         else:
             high = x
-    return high
+    return x, gap
 
 
 @inlined
-def write_spreads(now: Instant, window: float, spreads: FloatArray) -> None:
-    """Write the range of the depth while the line went the last window, twice that, four times that, and so on."""
-    history = now.history
-    last = history.count - 1
-    lowest = highest = history.depth[last]
-    back = last
-    for k in range(spreads.size):
-        since = now.time - window / now.deborah * 2.0**k
-        while back > 0 and history.time[back] > since:
-            back -= 1
-            lowest, highest = min(lowest, history.depth[back]), max(highest, history.depth[back])
-        spreads[k] = highest - lowest
-
-
-@inlined
-def spread_over(spreads: FloatArray, window: float, distance: float) -> float:
-    """Return the range of the depth while the line went a distance."""
-    k = 0
-    while k < spreads.size - 1 and distance > window:
-        distance *= 0.5
-        k += 1
-    return float(spreads[k])
-
-
-@inlined
-def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, spreads: FloatArray, window: float) -> int:
+def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0
     for k in range(wakes.count):
-        place = wakes.places[k]
-        u = _left_from(now, x, place, wakes.farthest[k])[0]
-        if u + 2 * spread_over(spreads, window, 2 * (x - place) + window) >= pressed:
-            wakes.places[kept], wakes.farthest[kept] = place, wakes.farthest[k]
+        place, farthest = wakes.places[k], wakes.farthest[k]
+        u = left(now, wakes, k, x)[0]
+        if u < 0 and x - now.deborah * now.time < farthest:  # none at x left there; farther ones may have
+            u = (deepest + height_at(now.track, _in_turn(now, place))[0]) * np.exp(
+                -max(x - farthest, 0.0) / now.deborah
+            )
+        if u + 2 * wakes.recent.spread[over(2 * (x - place) + KEPT)] >= pressed:
+            wakes.earliest[kept], wakes.places[kept], wakes.farthest[kept] = wakes.earliest[k], place, farthest
+            wakes.barrier[kept] = wakes.barrier[k]
             kept += 1
     return kept
-
-
-@inlined
-def next_free_place(now: Instant, x: float) -> float:
-    """Return the first place from x on whose element was free at the jump."""
-    track, first = now.track, now.first
-    travel = now.deborah * now.time
-    s = x - travel
-    turns = np.floor((s - track.origin) / track.cells) * track.cells
-    s -= turns
-    low = patch_before(first, s)
-    if not first.start[low] <= s <= first.end[low]:
-        return x
-    until = first.end[low]
-    if low == first.count - 1:
-        until = first.end[0] + track.cells
-    return float(until + turns + travel)

@@ -379,7 +379,10 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
             else:
                 runs[count, 0], runs[count, 1] = begin, end
                 count += 1
-    return Reachable(runs[:count].copy(), floor)
+    second = -np.inf
+    for i in range(int(np.ceil(slower.end[0])), int(slower.start[slower.count - 1])):
+        second = max(second, track.peak[i])
+    return Reachable(runs[:count].copy(), floor, second)
 
 
 def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray, falls: bool) -> FloatArray:

@@ -27,7 +27,7 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
     for depth in (0.01, 0.1, 0.5, 2.0, 6.0):
         first, barriers = line.patches(0.5 * depth, 2 * deborah, np.empty(SUMS)), line.barriers(deborah)
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
-        everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf))
+        everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf), 0.0)
         work = workspace_for(nodes, barriers)
         found = touch(Instant(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
         sums = np.empty(SUMS)

@@ -174,7 +174,7 @@ def test_cells_left_out_change_nothing(
 
     def whole(track: Track, *_: object) -> Reachable:
         nodes = track.height.size
-        return Reachable(np.array([[0, nodes - 1]]), np.full(nodes, -np.inf))
+        return Reachable(np.array([[0, nodes - 1]]), np.full(nodes, -np.inf), 0.0)
 
     height, slope = line(hurst, realisation, 12)
     case = (height, slope, load, (deborah, 3 * deborah), TIMES, 6)

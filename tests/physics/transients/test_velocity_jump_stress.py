@@ -63,7 +63,7 @@ def test_jump_does_not_depend_on_where_contact_is_looked_for(
     ends, asked = ends_on(line, loads, both), Transient(TIMES, 2 * np.pi * POINTS, 6)
     (near,) = velocity_jumps(line, loads, both, ends, asked)
     last = line.track.height.size - 1
-    everywhere = Reachable(np.array([[0, last]]), np.full(last + 1, -np.inf))
+    everywhere = Reachable(np.array([[0, last]]), np.full(last + 1, -np.inf), 0.0)
     monkeypatch.setattr(velocity_jump, "_reachable", lambda *_: everywhere)
     (whole,) = velocity_jumps(line, loads, both, ends, asked)
     assert near.outcome == whole.outcome == Outcome.CONVERGED
