@@ -94,6 +94,7 @@ MODEL = Model(
     outputs=OUTPUTS,
     compute=deferred(SOLVE, "compute"),
     seconds=deferred(SOLVE, "seconds"),
+    whole=("velocity", "normal_force", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
     coordinates=coordinates,
     distinct=deferred(SOLVE, "distinct"),
     numbers=(
