@@ -88,6 +88,8 @@ def test_regimes_start_from_the_rigid_limit() -> None:
     axes = DRAW["film_regimes"]({"": data}).axes[0]
     points = np.asarray(axes.collections[0].get_offsets())
     np.testing.assert_allclose(points[:, 1] * points[:, 0], 4.894968 / 2, rtol=0.02)  # W/sqrt(2U) = 0.02 at most
+    low, high = axes.get_ylim()
+    assert 0.01 * points[:, 1].min() < low < points[:, 1].min() < points[:, 1].max() < high
 
 
 def test_starvation_and_traction_follow_their_axes() -> None:

@@ -1,3 +1,5 @@
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -66,6 +68,13 @@ def test_every_stick_radius_has_its_own_row_of_profiles():
             drawn = [line.get_ydata() for line in axes.lines if len(line.get_ydata()) == RADIUS.size]
             worn = data[output].isel(stick_radius=number, cycles=0, realisation=0).values
             assert any(np.allclose(line, worn) for line in drawn)
+
+
+@pytest.mark.parametrize(("rule", "style"), [("exact", "--"), ("fast", "-"), ("limit", ":")])
+def test_a_rule_that_is_fixed_has_its_own_line(rule, style):
+    data = study(rule, [2.0]).assign_attrs(parameters=json.dumps({"wear_rule": rule, "hold": "depth"}))
+    axes, *_ = wear.draw_profiles({"": data}).axes
+    assert style in {line.get_linestyle() for line in axes.lines}
 
 
 def test_volume_has_a_band():
