@@ -6,6 +6,8 @@ import pytest
 from pydantic import ValidationError
 
 from benchmarks.kinetics import honesty
+from mdr_dask import plan
+from mdr_dask.campaign import load
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.sliding_friction import SlidingFriction
 from mdr_dask.models.sliding_friction import solve as sliding
@@ -247,3 +249,11 @@ def test_a_transient_that_misses_the_accuracy_says_so() -> None:
     assert "friction_coefficient by " in found.messages[0, 0]
     assert "accuracy of 1e-05 is missed" in found.messages[0, 0]
     assert found.status[0, 0] == Status.DONE
+
+
+def test_blocks_hold_all_jumps_of_a_line():
+    """The campaign of the thesis: each line is made once, for all velocities, forces and jumps."""
+    templates = plan.templates(load("campaigns/kinetics2014.yaml"), 200)
+    for template in templates:
+        shared = {"velocity", "normal_force", "velocity_change", "rms_roughness"} & set(template.sizes)
+        assert {dim: template.chunks[dim] for dim in shared} == {dim: template.sizes[dim] for dim in shared}
