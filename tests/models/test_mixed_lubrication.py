@@ -227,6 +227,13 @@ def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
     )
 
 
+def test_points_grow_with_the_accuracy_as_the_error_of_a_turn_falls():
+    """A hundredth of the accuracy takes 100^(1/3.6) = 3.6 times the points, in steps of a quarter of an octave."""
+    asked = block(["breakthrough_probability"], points="auto", shortest_wavelength=2e-6)
+    rough, fine = (points.first(operation_of(asked.case(0), each), each).source.points for each in (1e-3, 1e-5))
+    assert fine / rough == pytest.approx(100 ** (1 / 3.6), rel=2**0.25 - 1)
+
+
 def turn_on_its_points(accuracy, realisation, outputs):
     """Return a block of one case, its turn on the points that the accuracy begins with, and the errors of that turn:
     from its first parts, and from all."""
