@@ -257,3 +257,11 @@ def test_blocks_hold_all_jumps_of_a_line():
     for template in templates:
         shared = {"velocity", "normal_force", "velocity_change", "rms_roughness"} & set(template.sizes)
         assert {dim: template.chunks[dim] for dim in shared} == {dim: template.sizes[dim] for dim in shared}
+
+
+def test_times_that_nobody_names_reach_from_a_ten_thousandth_to_twenty_relaxation_times():
+    times = np.array(
+        VelocityJump.model_validate({k: v for k, v in BASE.items() if k != "relaxation_times"}).relaxation_times
+    )
+    assert (times[0], times[-1]) == (1e-4, 20)
+    np.testing.assert_allclose(np.diff(np.log(times)), np.log(20 / 1e-4) / (times.size - 1), atol=2e-3)

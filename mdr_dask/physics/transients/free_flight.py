@@ -150,7 +150,7 @@ def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float
     low = max(low, x - now.deborah * now.time, s - FARTHEST)
     while s >= low:
         since = (x - s) / now.deborah
-        height = now.track.height[int(s if s >= 0 else s + now.track.cells)]
+        height = now.track.height[int(s if s >= 0 else _in_turn(now, s))]
         u = (_depth_at(now.history, now.time - since)[0] + height) * np.exp(-since)
         if u > most:
             most, place = u, s
