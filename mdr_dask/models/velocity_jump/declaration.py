@@ -28,7 +28,7 @@ class VelocityJump(SlidingBody):
     oversampling: int = quantity(
         "1", "grid points for every Nyquist point of the transient", default=4, ge=2, le=256, multiple_of=2
     )
-    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=6, le=400)
+    steps_per_decade: int = quantity("1", "time steps in a factor ten of the time", default=8, ge=4, le=400)
     velocity_change: float = quantity("1", "jump of the velocity dv / v_1", default=0.2, gt=-1)
     protocol: Protocol = Field(default=Jump(), description="loading history: velocity and load from t_0 = 0 on")
     relaxation_times: tuple[float, ...] = quantity(
@@ -88,7 +88,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=13,
+    version=14,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

@@ -24,12 +24,15 @@ from mdr_dask.physics.transients.free_flight import (
     Wakes,
     crest,
     foreseen,
+    gap_at,
     meeting,
     wake_at,
     worth_keeping,
 )
 from mdr_dask.physics.transients.patches import (
+    DRAG_GROWTH,
     DRAG_STIFFNESS,
+    GROWTH,
     LENGTH,
     STIFFNESS,
     SUMS,
@@ -129,6 +132,23 @@ def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) ->
     return i + 1.0
 
 
+@inlined
+def _add_edge(now: Instant, lift: float, place: float, gap: tuple[float, float, float], sums: FloatArray) -> None:
+    """Add what load and drag gain by depth and time where a patch grows at an edge: the force there is not zero.
+
+    The gap is that of line and wake: its slope into the patch, its derivative by the depth, and its rate.
+    """
+    steep, gain, opening = gap
+    h, slope, _ = height_at(now.track, place)
+    force = lift + h + now.deborah * slope
+    if force > 0 and steep > 0:
+        edge = force / steep
+        sums[STIFFNESS] += edge * gain
+        sums[DRAG_STIFFNESS] += edge * gain * slope
+        sums[GROWTH] += edge * opening
+        sums[DRAG_GROWTH] += edge * opening * slope
+
+
 @compiled
 def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
@@ -139,8 +159,8 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     reachable : Reachable
         Its stretches must hold the patches at the depth.
     work : Workspace
-        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, rise over it, and the
-        derivatives of load and drag by the depth.
+        Written: the patches, and in `sums` load and drag over 4 G dx, length in contact, rise over it, the derivatives
+        of load and drag by the depth, and what they gain by time where patches begin.
 
     Returns
     -------
@@ -175,7 +195,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
     deepest, highest = motion.deepest, motion.highest  # elements may fly from where the line is no longer touched
-    found, edges, edges_drag = 0, 0.0, 0.0
+    found = 0
     n, finish, begin = int(track.cells), track.cells + track.origin, track.origin
     free_from = held = begin
     firm, firm_until = 0.0, 0.0
@@ -241,6 +261,8 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                         break
                     if lost:
                         until = loss(now, wakes, x, off)
+                        rise, gain, opening = gap_at(now, until, wake_at(now, wakes, until))[1:]
+                        _add_edge(now, lift, until, (-rise, gain, opening), sums)
                     if found + 1 >= start.size:
                         return -1, 0
                     add_patch(track, begin, until, lift, deborah, sums)
@@ -286,10 +308,8 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain = meeting(now, wakes, cell + low, probe, guess)
-                    h, slope, _ = height_at(track, begin)
-                    edge = max(lift + h + deborah * slope, 0.0) * gain / rise if rise > 0 else 0.0
-                    edges, edges_drag = edges + edge, edges_drag + edge * slope
+                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, guess)
+                    _add_edge(now, lift, begin, (rise, gain, opening), sums)
                     contact, x, held, firm_until = True, begin, begin, 0.0
                     continue
                 if not pulls:
@@ -302,6 +322,6 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     begin = begin if contact else finish
     add_patch(track, begin, finish, lift, deborah, sums)
     start[found], end[found] = begin, finish
-    sums[STIFFNESS] = sums[LENGTH] * (1 + history.stiff) + edges
-    sums[DRAG_STIFFNESS] = sums[TILT] * (1 + history.stiff) + edges_drag
+    sums[STIFFNESS] += sums[LENGTH] * (1 + history.stiff)
+    sums[DRAG_STIFFNESS] += sums[TILT] * (1 + history.stiff)
     return found + 1, known

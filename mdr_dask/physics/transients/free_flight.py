@@ -128,7 +128,7 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
                 break
             fade = np.exp(-since)
             u = (d + h + 0.5 * force * step * pace) * fade
-            return u, -(d + h + rate) * fade * pace, _follows(now.history, now.time - since) * fade
+            return u, -(u + rate * fade) * pace, _follows(now.history, now.time - since) * fade
         if force > 0:
             low = s
         elif s > first:
@@ -227,26 +227,35 @@ def foreseen(
 
 
 @inlined
-def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float]:
-    """Return where the line rises through the wake, the slopes of their gap by place and depth."""
-    depth = now.history.depth[now.history.count - 1]
-    slope, gain = 1.0, 0.0
+def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[float, float, float, float]:
+    """Return how far the line is above a wake at x, the slope of that, its derivative by the depth, and its rate.
+
+    What is in flight fades and moves on: its rate is -u - deborah u'.
+    """
+    u, u_slope, gain = wake
+    last = now.history.count - 1
+    h, h_slope, _ = height_at(now.track, x)
+    opening = now.history.rate[last] + u + now.deborah * u_slope
+    return now.history.depth[last] + h - u, h_slope - u_slope, 1 - gain, opening
+
+
+@inlined
+def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float, float]:
+    """Return where the line rises through the wake, the slopes of their gap by place and depth, and its rate there."""
+    slope, gain, opening = 1.0, 1.0, 0.0
     for _ in range(ROOT_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
-        u, u_slope, gain = wake_at(now, wakes, x)
-        h, h_slope, _ = height_at(now.track, x)
-        gap = depth + h - u
-        slope = h_slope - u_slope
+        gap, slope, gain, opening = gap_at(now, x, wake_at(now, wakes, x))
         if gap > 0:
             high = x
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
         if abs(step) < MET or high - low < 1e-9:
-            return min(max(x + step, low), high), slope, 1 - gain
+            return min(max(x + step, low), high), slope, gain, opening
         x += step
-    return x, slope, 1 - gain
+    return x, slope, gain, opening
 
 
 @nested

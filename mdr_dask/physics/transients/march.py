@@ -11,7 +11,19 @@ from mdr_dask.physics.compiling import compiled, kernel, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
 from mdr_dask.physics.transients.free_flight import Instant
-from mdr_dask.physics.transients.patches import DRAG, DRAG_STIFFNESS, LOAD, STIFFNESS, History, Patches, Track
+from mdr_dask.physics.transients.patches import (
+    DRAG,
+    DRAG_GROWTH,
+    DRAG_STIFFNESS,
+    GROWTH,
+    LENGTH,
+    LOAD,
+    STIFFNESS,
+    TILT,
+    History,
+    Patches,
+    Track,
+)
 
 TRIALS = 80
 ORDER = 3  # of the backward differentiation
@@ -71,25 +83,39 @@ class Marching(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """Time, log(1 + t / onset), depth, its rate and drag at every moment, from right after the jump on."""
+    """Time, log(1 + t / onset), depth, drag and their rates at every moment, from right after the jump on."""
 
     time: FloatArray
     place: FloatArray
     depth: FloatArray
     rate: FloatArray
     drag: FloatArray
+    drag_rate: FloatArray
+
+
+@nested
+def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
+    """Return the rate of the drag at constant load: patches grow where they begin, the lift falls to make up for it.
+
+    With a last step of the depth goes one of its rate, at which edges move.
+    """
+    edges = sums[STIFFNESS] - sums[LENGTH] * (1 + stiff)
+    edges_drag = sums[DRAG_STIFFNESS] - sums[TILT] * (1 + stiff)
+    growth, drag_growth = sums[GROWTH] + edges * stiff * step, sums[DRAG_GROWTH] + edges_drag * stiff * step
+    lift = -growth / sums[LENGTH] if sums[LENGTH] > 0 else 0.0
+    return float(lift * sums[TILT] + drag_growth)
 
 
 @compiled
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], close: float, work: Workspace
-) -> tuple[int, float]:
+) -> tuple[int, float, float]:
     """Find the depth that carries the load at the last moment of the history, by Newton steps.
 
     Returns
     -------
     outcome : int
-    drag : float
+    drag, drag_rate : float
     """
     now, load = history.count - 1, marching.load
     guess, (a, b), sums = history.depth[now], weights, work.sums
@@ -101,7 +127,7 @@ def _balance(
         history.depth[now], history.rate[now] = guess, a * guess + b
         found = touch(moment, marching.reachable, work)
         if found < 0:
-            return LEFT_LIMITS, 0.0
+            return LEFT_LIMITS, 0.0, 0.0
         off = sums[LOAD] - load
         step = -off / sums[STIFFNESS] if sums[STIFFNESS] > 0 else 0.5 * (low + high) - guess
         if off < 0:
@@ -111,15 +137,17 @@ def _balance(
         if abs(step) <= (close if found >= MANY else CAREFUL * close) or abs(off) <= EXACT * load:
             guess += step
             history.depth[now], history.rate[now] = guess, a * guess + b
-            return Outcome.CONVERGED, sums[DRAG] + step * sums[DRAG_STIFFNESS]
+            drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]
+            return Outcome.CONVERGED, drag, _drag_rate(sums, a, step)
         if high - low <= 1e-13 * (abs(low) + abs(high)):
-            return Outcome.CONVERGED, sums[DRAG]  # the load jumps here, as a grid lets it where a patch comes or goes
+            # the load jumps here, as a grid lets it where a patch comes or goes
+            return Outcome.CONVERGED, sums[DRAG], _drag_rate(sums, a, 0.0)
         guess += step
         if not marching.low <= guess <= marching.high:
-            return LEFT_LIMITS, 0.0
+            return LEFT_LIMITS, 0.0, 0.0
         if trial > 4 and not low < guess < high:
             guess = 0.5 * (low + high)
-    return Outcome.DEPTH_NOT_FOUND, 0.0
+    return Outcome.DEPTH_NOT_FOUND, 0.0, 0.0
 
 
 @nested
@@ -148,7 +176,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
 @nested
 def _foretold(found: Trajectory, now: int) -> float:
     """Extrapolate the depth to moment `now`: by a parabola over the places, as soon as there are three of them."""
-    time, place, depth, rate, _ = found
+    time, place, depth, rate, _, _ = found
     taken = time[now] - time[now - 1]
     if now == 1:
         return float(depth[0] + taken * rate[0])
@@ -180,7 +208,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
     outcome : int
         An `Outcome`, or `LEFT_LIMITS`.
     """
-    time, place, depth, rate, drag = found
+    time, place, depth, rate, drag, drag_rate = found
     near, step, now, farthest = 0.0, pace.first, 1, abs(drag[0] - aim.drag)
     while time[now - 1] < pace.until:
         if now == time.size:
@@ -192,7 +220,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
         weights, foretold = _weights(found, now, marching.onset), _foretold(found, now)
         depth[now] = min(max(foretold, marching.low), marching.high)
         history = History(time, depth, rate, now + 1, weights[0])
-        outcome, drag[now] = _balance(marching, history, weights, pace.close, work)
+        outcome, drag[now], drag_rate[now] = _balance(marching, history, weights, pace.close, work)
         miss = abs(depth[now] - foretold) if outcome == Outcome.CONVERGED else 8 * pace.miss
         if miss > 2 * pace.miss or outcome != Outcome.CONVERGED:
             if step < 1e-3 * pace.first or (outcome == LEFT_LIMITS and step < 1e-2 * time[now - 1]):
@@ -227,14 +255,14 @@ def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Wor
     outcome : int
         An `Outcome`, or `LEFT_LIMITS`.
     """
-    time, _, depth, rate, drag = found
+    time, _, depth, rate, drag, drag_rate = found
     for now in range(1, time.size):
         depth[now] = depths[now] + (depth[now - 1] - depths[now - 1])
         if not marching.low <= depth[now] <= marching.high:
             return LEFT_LIMITS
         weights = _weights(found, now, marching.onset)
         history = History(time, depth, rate, now + 1, weights[0])
-        outcome, drag[now] = _balance(marching, history, weights, np.inf, work)
+        outcome, drag[now], drag_rate[now] = _balance(marching, history, weights, np.inf, work)
         if outcome != Outcome.CONVERGED:
             return outcome
     return Outcome.CONVERGED

@@ -18,8 +18,8 @@ from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 ROOT_STEPS = 60
 CLOSE = 1e-6  # of a cell: a step of Newton after which the next one is below rounding
 NEARBY = 8  # patches to look at one by one before halving
-LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS = range(6)
-SUMS = 6
+LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
+SUMS = 8
 
 
 class Track(NamedTuple):

@@ -14,8 +14,8 @@ from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
+from mdr_dask.physics.transients.curve import curve_through
 from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
-from mdr_dask.physics.transients.makima import curve_through
 from mdr_dask.physics.transients.march import LEFT_LIMITS, Finish, Marching, Stepping, Trajectory, march_depth, retrace
 from mdr_dask.physics.transients.patches import Patches, Track
 
@@ -315,21 +315,22 @@ class _Relaxation(NamedTuple):
         )
         if outcome == LEFT_LIMITS:
             return None
-        time, _, depth, _, drag = (column[:count] for column in found)
+        time, _, depth, rate, drag, drag_rate = (column[:count] for column in found)
         near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
         ends = np.array([self.after, self.depth[1]])
         path = np.stack([time, drag, depth])
-        trace, sinking = _at_times(time, path[1:], asked.times, ends, bool(self.deborah[1] < self.deborah[0]))
+        rates, falls = np.stack([drag_rate, rate]), bool(self.deborah[1] < self.deborah[0])
+        trace, sinking = _at_times(time, path[1:], rates, asked.times, ends, falls)
         path[2] -= self.line.cells.top
         return jump._replace(trace=trace, depth=sinking - self.line.cells.top, path=path)
 
     def begun(self, limits: tuple[float, float], moments: int) -> tuple[Marching, Trajectory, Workspace]:
         """Return a march between two depths at its first moment, with room for all of them."""
-        found = Trajectory(*np.empty((5, moments)))
-        for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at), strict=True):
+        found = Trajectory(*np.empty((6, moments)))
+        for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at, np.nan), strict=True):
             column[0] = value
         reachable = _reachable(self.line.track, self.slower, limits)
         onset = self.pace.first / (self.pace.growth - 1)
@@ -385,15 +386,19 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
     return Reachable(runs[:count].copy(), floor, second)
 
 
-def _at_times(moments: FloatArray, rows: FloatArray, times: FloatArray, after: FloatArray, falls: bool) -> FloatArray:
-    """Interpolate over log time by modified Akima curves, which no kink makes overshoot.
+def _at_times(
+    moments: FloatArray, rows: FloatArray, rates: FloatArray, times: FloatArray, after: FloatArray, falls: bool
+) -> FloatArray:
+    """Interpolate rows of values and their rates over log time.
 
     In the first step friction goes as the time; where the velocity falls as its root, as contact grows behind a patch.
     """
     scale, power = moments[1], 0.5 if falls else 1.0
     x, places = (np.log1p((each / scale) ** power) for each in (moments, times))
+    grown = (moments / scale) ** power
+    pace = scale / power * (1 + grown) * grown ** (1 / power - 1)
     traces = np.empty((len(rows), times.size))
-    for row, trace in zip(rows, traces, strict=True):
-        curve_through(x, row, places, trace)
+    for row, rate, trace in zip(rows, rates, traces, strict=True):
+        curve_through(x, row, rate * pace, places, trace)
     traces[:, times > moments[-1]] = after[:, None]
     return traces

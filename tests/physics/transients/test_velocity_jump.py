@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 from references.followed_kelvin import follow_kelvin
@@ -49,6 +51,32 @@ def solved(
 def jump(change: float = 0.2, per_decade: float = 24, load: float = LOAD, oversampling: int = OVERSAMPLING) -> Jump:
     height, slope = line(oversampling=oversampling)
     return solved(height, slope, load, (DEBORAH, DEBORAH * (1 + change)), TIMES, per_decade)
+
+
+@pytest.mark.parametrize("change", [0.2, -0.2])
+def test_the_rate_of_the_drag_is_that_of_its_course(change: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    courses: list[tuple[np.ndarray, ...]] = []
+    interpolated = jumps_of._at_times
+
+    def kept(moments: np.ndarray, rows: np.ndarray, rates: np.ndarray, *rest: Any) -> np.ndarray:
+        courses.append((moments, rows[0], rates[0]))
+        return interpolated(moments, rows, rates, *rest)
+
+    monkeypatch.setattr(jumps_of, "_at_times", kept)
+    jump(change, per_decade=200)
+    ((time, drag, rate),) = courses
+    step, gained = np.diff(drag[1:]), 0.5 * (rate[1:-1] + rate[2:]) * np.diff(time[1:])
+    assert np.isnan(rate[0])
+    assert np.ptp(drag[1:]) > 5e-3 * abs(drag[1])
+    leaps = np.abs(step - gained) > 0.01 * np.ptp(drag[1:])  # where an asperity comes or goes
+    assert np.count_nonzero(leaps) <= 2
+    assert np.abs(np.sum((step - gained)[~leaps])) < 0.02 * np.ptp(drag[1:])
+    assert np.sum(np.abs(step - gained)[~leaps]) < 0.1 * np.sum(np.abs(step))
+
+
+def test_few_steps_find_the_course_of_many() -> None:
+    few, many = (jump(per_decade=steps).trace for steps in (4, 96))
+    assert np.max(np.abs(few - many)) < 0.03 * np.ptp(many)
 
 
 @pytest.mark.parametrize("change", [0.2, -0.2, 0.3])
