@@ -137,13 +137,15 @@ class _Group:
 
     def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
         """Yield why a case failed, or which outputs miss the accuracy and by how much."""
+        missed = {name: self._relative(found, name) for name in self.outputs}
         for k, outcome in enumerate(found.outcome):
             if outcome != Outcome.CONVERGED:
                 more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
                 yield k, Outcome(int(outcome)).sentence + more
                 continue
-            missed = {name: self._relative(found, name, k) for name in self.outputs}
-            named = ", ".join(f"{name} by {late:.2g}" for name, late in missed.items() if late > self._allowed(name))
+            named = ", ".join(
+                f"{name} by {late[k]:.2g}" for name, late in missed.items() if late[k] > self._allowed(name)
+            )
             if named:
                 yield k, f"an accuracy of {self.block.accuracy or ACCURACY:.2g} is missed: {named} (estimated)"
 
@@ -153,11 +155,14 @@ class _Group:
             return self.block.accuracy
         return np.inf if name in TRANSIENT else ACCURACY
 
-    def _relative(self, found: _Found, name: str, k: int) -> float:
-        """Return the estimated error of an output of one case over its size, the largest of all times; 0 of unknown."""
+    def _relative(self, found: _Found, name: str) -> FloatArray:
+        """Return the estimated errors of an output over its size, of every case at the worst time; 0 of unknown."""
         with np.errstate(all="ignore"):
-            sizes = np.asarray(found.errors[name][k] / np.abs(found.values[name][k]))
-        return float(np.max(sizes, initial=0.0, where=~np.isnan(sizes)))
+            sizes = found.errors[name] / np.abs(found.values[name])
+        worst: FloatArray = (
+            np.where(np.isnan(sizes), 0.0, sizes).reshape(found.outcome.size, -1).max(axis=1, initial=0.0)
+        )
+        return worst
 
 
 class _Marched(_Group):

@@ -173,9 +173,15 @@ def cut(line: CubicLine) -> Cells:
     return Cells(height, enter, leave, peaks, mean, stretch, place if line.periodic else 0.0, top, line.periodic)
 
 
+@kernel
 def running(integrals: FloatArray) -> FloatArray:
     """Return the integral up to every node from those over the cells, shape (cells + 1,)."""
-    return np.concatenate([[0.0], np.cumsum(integrals)])
+    summed, total = np.empty(integrals.size + 1), 0.0
+    for i in range(integrals.size):
+        summed[i] = total
+        total += integrals[i]
+    summed[integrals.size] = total
+    return summed
 
 
 @kernel
