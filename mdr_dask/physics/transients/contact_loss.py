@@ -13,7 +13,7 @@ import numpy as np
 
 from mdr_dask.physics.compiling import inlined, nested
 from mdr_dask.physics.surfaces.cubic_line import cubic
-from mdr_dask.physics.transients.free_flight import Instant, Wakes, left, left_before, wake_at, worth_keeping
+from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at, worth_keeping
 from mdr_dask.physics.transients.patches import Track, height_at
 from mdr_dask.physics.transients.recent import over
 
@@ -132,18 +132,3 @@ def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
         wakes.places[k] -= now.track.cells
         wakes.farthest[k] -= now.track.cells
     return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
-
-
-@nested
-def flies_over(now: Instant, wakes: Wakes) -> bool:
-    """Return whether elements from before the patch of the highest point came over it at one of the moments so far."""
-    for moment in range(now.history.count - 1, -1, -1):
-        since, u = now.time - now.history.time[moment], 0.0
-        if now.deborah * since >= now.track.cells:
-            break
-        for k in range(wakes.count):
-            if wakes.farthest[k] < 0:
-                u = max(u, left(now, wakes, k, now.track.origin + now.deborah * since)[0])
-        if u > now.history.depth[moment] * np.exp(-since):
-            return True
-    return False

@@ -12,7 +12,6 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.contact_loss import (
     Motion,
-    flies_over,
     loss,
     may_have_left,
     motion_at,
@@ -176,7 +175,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
             known = turned(
                 now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known), motion
             )
-            if not flies_over(now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known)):
+            if known == 0:
                 break
             found, known = _turn(now, motion, reachable, work, known)
     return found

@@ -25,6 +25,7 @@ EVERY_MOMENT = 1000
         (11, 600, "elements of the turn before fly over the highest point"),
         (11, 1144, "elements that left where contact is no more"),
         (2601, 429, "elements that left the highest point come round to it"),
+        (2602, 135, "elements fly over the highest point between two moments only"),
         (11, 724, "the line rises above the wake inside of a cell only"),
     ],
 )
