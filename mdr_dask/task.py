@@ -100,7 +100,8 @@ class Outcome:
     """What a task sends home: counts and times, never numbers of the study.
 
     Of the time to compute, `compile_seconds` went by while this process compiled kernels. `warned` counts the results
-    that are done and have a message all the same, `further` those of rounds that the block went on to by itself.
+    that are done and have a message all the same, `further` the results of rounds that the block went on to by itself;
+    it is `settled` if no case needs more.
     """
 
     counts: tuple[int, ...]
@@ -111,6 +112,7 @@ class Outcome:
     compile_seconds: float = 0.0
     warned: int = 0
     further: int = 0
+    settled: bool = False
 
     @property
     def seconds(self) -> float:
@@ -151,17 +153,17 @@ def run_block(work: Work) -> Outcome:
         values, status = store.read_block(work.place, work.block.outputs) if kept else _nothing(model, work)
         status[work.spared] = Status.NOT_NEEDED
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
-    asked = work
+    asked, settled = work, False
     if work.rounds:
-        work, values, status, result = _go_on(model, work, values, status, result)
+        work, values, status, result, settled = _go_on(model, work, values, status, result)
     middle = time.perf_counter()
     compiled = clock.seconds - compiled if clock else 0.0
     record = _record(work, result, status, middle - started)
     _write(work, values if work.wanted.any() else {}, status, record)
     written, warned = time.perf_counter() - middle, _warned(record)
     further = work.wanted.size - asked.wanted.size
-    seconds = middle - started
-    return Outcome(_counts(work, status), result.solves, work.estimate, seconds, written, compiled, warned, further)
+    times = work.estimate, middle - started, written, compiled
+    return Outcome(_counts(work, status), result.solves, *times, warned, further, settled)
 
 
 def finished(work: Work) -> Outcome | None:
@@ -281,8 +283,8 @@ def _compute_part(
 
 def _go_on(
     model: Model[Any], work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], result: Result
-) -> tuple[Work, dict[str, NDArray[np.float64]], NDArray[np.int8], Result]:
-    """Compute the rounds that follow, decided as between tasks, as long as the block holds them."""
+) -> tuple[Work, dict[str, NDArray[np.float64]], NDArray[np.int8], Result, bool]:
+    """Compute the rounds that follow, decided as between tasks, as long as the block holds them; say if all end."""
     assert work.rounds
     replication, until = work.rounds.replication, work.rounds.replication.until
     scatter = known_scatter(model, until, work.block.outputs)
@@ -294,7 +296,7 @@ def _go_on(
         needed = growth > 1
         further = next_round(replication, count, growth)
         if not count < further <= work.rounds.most:
-            return work, values, status, result
+            return work, values, status, result, not needed.any()
         work = work.grown(further)
         values = {name: _longer(array, status.ndim - 1, further, np.nan) for name, array in values.items()}
         status = _longer(status, status.ndim - 1, further, Status.NOT_NEEDED)

@@ -172,10 +172,13 @@ def _run_stages(job: _Job, execute: Execute) -> Progress:
     """Run a campaign, and again with what its adaptive axes still want, until they want nothing more."""
     start = time.monotonic()
     progress = Progress()
+    whole: list[Outcome] = []
 
     def settle(work: Work, outcome: Outcome) -> None:
         nonlocal progress
         progress = progress.after(outcome, time.monotonic() - start)
+        if work.rounds:
+            whole.append(outcome)
         job.tell(ended(work, outcome))
         job.report(progress)
 
@@ -183,12 +186,11 @@ def _run_stages(job: _Job, execute: Execute) -> Progress:
         nonlocal progress
         progress = _begin_round(progress, groups)
         job.report(progress)
-        before = progress.total
         execute(tasks(job.url, groups, job.hold, _rounds_of_block(job, groups)), settle)
         if job.resources.remote:
             _verify(job, current)
-        if further := progress.total - before:
-            current = _gone_on(job, current, further)
+        if whole:
+            current = _gone_on(job, current, whole.pop())
         facts = {"realisations": current.realisations[1], "done": progress.done, "failed": progress.failed}
         job.tell(Event("round ended", facts))
         return current
@@ -302,16 +304,18 @@ def _rounds_of_block(job: _Job, groups: list[Cells]) -> Rounds | None:
     return Rounds(replication, first.template.chunks["realisation"])
 
 
-def _gone_on(job: _Job, last: _Round, further: int) -> _Round:
+def _gone_on(job: _Job, last: _Round, outcome: Outcome) -> _Round:
     """Return a round together with those that its block has gone through by itself, and let the store show them."""
-    count = last.realisations[1] + further // last.needed[0].size
-    with store.entrance(job.url):
-        layout = _laid_out(job, last.layout, count)
-    (template,) = layout
-    status = store.ledger(job.url, template.series.name, template.shape)
-    taken = np.count_nonzero(status != Status.NOT_NEEDED, axis=-1)
-    needed = [taken == count]
-    return replace(last, layout=layout, needed=needed, realisations=(last.realisations[0], count), taken=(taken,))
+    count = last.realisations[1] + outcome.further // last.needed[0].size
+    taken, layout = last.taken, last.layout
+    if outcome.further:
+        with store.entrance(job.url):
+            layout = _laid_out(job, layout, count)
+        (template,) = layout
+        status = store.ledger(job.url, template.series.name, template.shape)
+        taken = (np.count_nonzero(status != Status.NOT_NEEDED, axis=-1),)
+    needed = [(each == count) & (not outcome.settled) for each in taken]
+    return replace(last, layout=layout, needed=needed, realisations=(last.realisations[0], count), taken=taken)
 
 
 def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...], Places]:
@@ -327,8 +331,10 @@ def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...]
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
     """Return how many times as many realisations each case of a round needs; at most 1 where it has enough."""
     narrow = _narrow(job, layout, places, last)
-    growth = [_growth_of(job.url, template, last.realisations[1]) for template in layout]
-    own = [np.where(mask, each, 0.0) for mask, each in zip(last.needed, growth, strict=True)]
+    own = [
+        np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
+        for mask, template in zip(last.needed, layout, strict=True)
+    ]
     return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
 
 
