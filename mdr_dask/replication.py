@@ -20,7 +20,7 @@ GROWTH = 1.5
 #: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
 FEWEST = 10
 #: So many are enough where their variance may be so many times as large as they say.
-FEW, DOUBT = 6, 2.0
+FEW, DOUBT = 7, 2.0
 #: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
 NEGLIGIBLE = 1e-3
 
