@@ -17,16 +17,16 @@ from mdr_dask.models.base import Model, Status
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Where nobody knows how many are needed, for a fitted constant.
 GROWTH = 1.5
-#: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
-FEWEST = 10
-#: So many are enough where their variance may be so many times as large as they say.
-FEW, DOUBT = 7, 2.0
+#: So many results are taken at their word. Fewer do not know their own scatter: stopping by it, 95 % intervals would
+#: cover as little as 89 %. So `FEW` count only where the variance may be so many times as large as they say:
+#: ``python -m benchmarks friction rounds``.
+FEWEST, FEW, DOUBT = 12, 7, 2.0
 #: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, a multiple of ``at_least`` or ``at_most``.
+    """Return the number of realisations after the next round.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     if not more.size:
         return count
     times = max(float(np.quantile(more, 0.5, method="lower")), LEAST_GROWTH)
-    return min(replication.at_least * math.ceil(times * count / replication.at_least), replication.at_most)
+    return min(math.ceil(round(times * count, 6)), replication.at_most)
 
 
 def growth_needed(
@@ -66,9 +66,9 @@ def growth_needed(
     Returns
     -------
     float array, shape (...)
-        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, a part
-        of it with fewer, or each result knows its own scatter and that meets it, too. A case that never succeeds is
-        not tried for ever.
+        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, or with
+        `FEW` whose variance were `DOUBT` times as large; it meets a small part of it with fewer, or each result knows
+        its own scatter and that meets it, too. A case that never succeeds is not tried for ever.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
