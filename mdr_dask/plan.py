@@ -365,8 +365,7 @@ def _is_whole(axis: Axis, path: str) -> bool:
 def _part(template: Template, dim: str, most: int) -> int:
     """Return the length of the parts when a dimension is cut into the fewest nearly equal parts of at most `most`.
 
-    Where rounds add realisations, parts divide a round, so that every round fills whole blocks. Only where one block
-    holds the whole first round, the next ones go on in it.
+    Where rounds add realisations, parts divide the first one. Where a block holds all of it, the next ones go on in it.
     """
     size = template.sizes[dim]
     replication = template.campaign.replication

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.models.base import Status
+from mdr_dask.models.base import Model, Status
 
 #: A round goes to the number that is enough for half of its cases by what is known, within these times the last one:
 #: ``python -m benchmarks friction rounds``.
 LEAST_GROWTH, MOST_GROWTH = 1.25, 4.0
 #: Where nobody knows how many are needed, for a fitted constant.
 GROWTH = 1.5
-#: Fewer results do not know their own scatter: stopping by it, 95 % intervals would cover as little as 89 %.
-FEWEST = 10
+#: So many results are taken at their word. Fewer do not know their own scatter: stopping by it, 95 % intervals would
+#: cover as little as 89 %. So `FEW` count only where the variance may be so many times as large as they say:
+#: ``python -m benchmarks friction rounds``.
+FEWEST, FEW, DOUBT = 12, 7, 2.0
 #: Part of the tolerance that the standard error of fewer must meet, as where every realisation gives the same.
 NEGLIGIBLE = 1e-3
 
 
 def next_round(replication: Replication, count: int, growth: NDArray[np.float64]) -> int:
-    """Return the number of realisations after the next round, a multiple of ``at_least`` or ``at_most``.
+    """Return the number of realisations after the next round.
 
     Parameters
     ----------
@@ -38,7 +41,7 @@ def next_round(replication: Replication, count: int, growth: NDArray[np.float64]
     if not more.size:
         return count
     times = max(float(np.quantile(more, 0.5, method="lower")), LEAST_GROWTH)
-    return min(replication.at_least * math.ceil(times * count / replication.at_least), replication.at_most)
+    return min(math.ceil(round(times * count, 6)), replication.at_most)
 
 
 def growth_needed(
@@ -63,9 +66,9 @@ def growth_needed(
     Returns
     -------
     float array, shape (...)
-        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, a part
-        of it with fewer, or each result knows its own scatter and that meets it, too. A case that never succeeds is
-        not tried for ever.
+        At most 1 where every standard error is known to meet its tolerance: it meets it with `FEWEST` results, or with
+        `FEW` whose variance were `DOUBT` times as large; it meets a small part of it with fewer, or each result knows
+        its own scatter and that meets it, too. A case that never succeeds is not tried for ever.
     """
     done = status == Status.DONE
     count = np.maximum(done.sum(axis=-1), 1)
@@ -74,12 +77,22 @@ def growth_needed(
         mean, error = mean_and_error(values[name], done)
         allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(mean))
         enough = count * _times(error, allowed)
-        ways = [np.maximum(FEWEST, enough), count * _times(error, NEGLIGIBLE * allowed)]
+        ways = [
+            np.maximum(FEWEST, enough),
+            np.maximum(FEW, DOUBT * enough),
+            count * _times(error, NEGLIGIBLE * allowed),
+        ]
         if scatter and name in scatter:
             within = _error_from_within(scatter[name], done)
             ways.append(np.maximum(enough, count * _times(within, allowed)))
         needed = np.maximum(needed, np.minimum.reduce(ways))
     return np.asarray(np.where(done.any(axis=-1), needed / count, 0.0))
+
+
+def known_scatter(model: Model[Any], until: Collection[str], outputs: Collection[str]) -> dict[str, str]:
+    """Return which of the outputs hold what single realisations know of the scatter of those that have a tolerance."""
+    scatter = {output: model.output(output).scatter for output in until}
+    return {output: own for output, own in scatter.items() if own in outputs}
 
 
 def _times(error: NDArray[np.float64], allowed: NDArray[np.float64]) -> NDArray[np.float64]:

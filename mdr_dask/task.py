@@ -15,14 +15,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask import models, store
+from mdr_dask.campaign import Replication
 from mdr_dask.compile_clock import compile_clock
 from mdr_dask.errors import ClusterError
 from mdr_dask.models.base import Block, Model, Result, Status
+from mdr_dask.replication import growth_needed, known_scatter, next_round
 from mdr_dask.store import Place
 from mdr_dask.version import __version__
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 MAPPED, TRIMMED = 32 * 2**20, 128 * 2**20  # bytes: the largest that glibc allows on the heap, and a few of them
+
+
+@dataclass(frozen=True)
+class Rounds:
+    """Rounds that a block may go through by itself: what decides them, and how many realisations it holds at most."""
+
+    replication: Replication
+    most: int
 
 
 @dataclass(frozen=True)
@@ -45,6 +55,8 @@ class Work:
         How often the block has been run, this time included.
     estimate : float
         Seconds that it should take by the model's estimate.
+    rounds : Rounds, optional
+        By which it goes on, if it holds the whole study.
     """
 
     place: Place
@@ -55,6 +67,7 @@ class Work:
     spared: NDArray[np.bool_]
     attempt: int
     estimate: float
+    rounds: Rounds | None = None
 
     def halves(self) -> tuple[Work, ...]:
         """Return the same work as two tasks, to be run one after the other; none for a single result."""
@@ -65,7 +78,21 @@ class Work:
         first.flat[cells[: cells.size // 2]] = True
         half = self.estimate / 2
         rest = self.wanted & ~first
-        return replace(self, wanted=first, estimate=half), replace(self, wanted=rest, estimate=half)
+        part = replace(self, estimate=half, rounds=None)
+        return replace(part, wanted=first), replace(part, wanted=rest)
+
+    def grown(self, count: int) -> Work:
+        """Return the same block with so many realisations, all of them this task's."""
+        *cases, realisations = self.place.region
+        numbers = slice(realisations.start, realisations.start + count)
+        wanted = np.ones((*self.wanted.shape[:-1], count), dtype=bool)
+        return replace(
+            self,
+            place=replace(self.place, region=(*cases, numbers)),
+            block=replace(self.block, realisations=tuple(range(numbers.start, numbers.stop))),
+            wanted=wanted,
+            spared=~wanted,
+        )
 
 
 @dataclass(frozen=True)
@@ -73,7 +100,8 @@ class Outcome:
     """What a task sends home: counts and times, never numbers of the study.
 
     Of the time to compute, `compile_seconds` went by while this process compiled kernels. `warned` counts the results
-    that are done and have a message all the same.
+    that are done and have a message all the same, `further` the results of rounds that the block went on to by itself;
+    it is `settled` if no case needs more.
     """
 
     counts: tuple[int, ...]
@@ -83,6 +111,8 @@ class Outcome:
     write_seconds: float
     compile_seconds: float = 0.0
     warned: int = 0
+    further: int = 0
+    settled: bool = False
 
     @property
     def seconds(self) -> float:
@@ -123,12 +153,17 @@ def run_block(work: Work) -> Outcome:
         values, status = store.read_block(work.place, work.block.outputs) if kept else _nothing(model, work)
         status[work.spared] = Status.NOT_NEEDED
         result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
+    asked, settled = work, False
+    if work.rounds:
+        work, values, status, result, settled = _go_on(model, work, values, status, result)
     middle = time.perf_counter()
     compiled = clock.seconds - compiled if clock else 0.0
     record = _record(work, result, status, middle - started)
     _write(work, values if work.wanted.any() else {}, status, record)
     written, warned = time.perf_counter() - middle, _warned(record)
-    return Outcome(_counts(work, status), result.solves, work.estimate, middle - started, written, compiled, warned)
+    further = work.wanted.size - asked.wanted.size
+    times = work.estimate, middle - started, written, compiled
+    return Outcome(_counts(work, status), result.solves, *times, warned, further, settled)
 
 
 def finished(work: Work) -> Outcome | None:
@@ -244,6 +279,38 @@ def _compute_part(
         if chosen[case, number]
     }
     return replace(result, messages=messages)
+
+
+def _go_on(
+    model: Model[Any], work: Work, values: dict[str, NDArray[np.float64]], status: NDArray[np.int8], result: Result
+) -> tuple[Work, dict[str, NDArray[np.float64]], NDArray[np.int8], Result, bool]:
+    """Compute the rounds that follow, decided as between tasks, as long as the block holds them; say if all end."""
+    assert work.rounds
+    replication, until = work.rounds.replication, work.rounds.replication.until
+    scatter = known_scatter(model, until, work.block.outputs)
+    needed = np.ones(status.shape[:-1], dtype=bool)
+    while True:
+        count = status.shape[-1]
+        within = {output: values[own] for output, own in scatter.items()}
+        growth = np.where(needed, growth_needed(values, status, until, within), 0.0)
+        needed = growth > 1
+        further = next_round(replication, count, growth)
+        if not count < further <= work.rounds.most:
+            return work, values, status, result, not needed.any()
+        work = work.grown(further)
+        values = {name: _longer(array, status.ndim - 1, further, np.nan) for name, array in values.items()}
+        status = _longer(status, status.ndim - 1, further, Status.NOT_NEEDED)
+        wanted = np.zeros(status.shape, dtype=bool)
+        wanted[..., count:] = needed[..., None]
+        more = _compute_part(model, work.block, wanted.reshape(work.block.cases, -1), values, status)
+        messages = {**result.messages, **more.messages}
+        result = replace(result, messages=messages, solves=result.solves + more.solves)
+
+
+def _longer(array: NDArray[Any], axis: int, length: int, fill: float) -> NDArray[Any]:
+    """Return an array with a longer axis."""
+    before = [(0, length - size if dim == axis else 0) for dim, size in enumerate(array.shape)]
+    return np.pad(array, before, constant_values=fill)
 
 
 def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float) -> dict[str, Any]:

@@ -129,15 +129,17 @@ def test_a_round_writes_what_changes_and_reads_no_block(toy, url, monkeypatch):
 
 
 def test_a_run_looks_through_metadata_once_for_each_shape_and_lays_out_once(toy, url, monkeypatch):
-    """Two rounds, two shapes; the first is known from looking whether the campaign fits."""
-    looked, laid_out = [], []
+    """Two rounds in one task, two shapes; the first is known from looking whether the campaign fits."""
+    looked, laid_out, read, values = [], [], [], store.values
+    monkeypatch.setattr(store, "values", lambda *given: read.append(given) or values(*given))
     whole, templates = study.faults, stages.templates
     monkeypatch.setattr(study, "faults", lambda found: looked.append(found) or whole(found))
     monkeypatch.setattr(stages, "templates", lambda *given: laid_out.append(given) or templates(*given))
     study._looked_through.cache_clear()
     tolerance = {"height": Tolerance(absolute=1.0)}
     campaign = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=Replication(10, 20, tolerance))
-    assert run(campaign, url, Resources(threads=1), lambda _: None).blocks == 2
+    assert run(campaign, url, Resources(threads=1), lambda _: None).blocks == 1
+    assert not read  # the block has decided
     assert len(looked) == 2
     assert len(laid_out) == 1
 

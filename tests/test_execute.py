@@ -229,7 +229,7 @@ def test_rounds_go_on_for_the_cases_that_need_them(toy, url):
     run(campaign, url)
     dataset = store.datasets(url)[""]
     done = (dataset.status == Status.DONE).sum("realisation")
-    assert (done.sel(noise=0.01) == 10).all()  # the fewest that know their scatter
+    assert (done.sel(noise=0.01) == 7).all()  # the fewest that know their scatter
     assert (done.sel(noise=0.2) > 50).all()
     height = dataset.height
     error = height.std("realisation", ddof=1) / np.sqrt(height.notnull().sum("realisation"))
@@ -253,7 +253,7 @@ def test_rounds_have_the_same_bytes_however_often_they_stop_and_whoever_works(to
     run(campaign, whole)
     stopped = 0
     while True:
-        told = iter(range(1))
+        told = iter(blocks)
 
         def stop(progress, left=told):
             if progress.blocks and next(left, None) is None:
@@ -268,7 +268,7 @@ def test_rounds_have_the_same_bytes_however_often_they_stop_and_whoever_works(to
         for number in (1, 2):
             run(campaign, parts, part=Part(number, 2))
     run(campaign, parts)
-    assert stopped > 1
+    assert stopped > bool(blocks)
     assert digests(whole) == digests(broken) == digests(parts)
     assert run(campaign, whole).done == 0
 

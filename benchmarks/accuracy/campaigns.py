@@ -88,7 +88,7 @@ class Study:
 
 def told(accuracy: float, output: str, rest: str = "") -> str:
     """Return what a campaign is told that wants a standard error."""
-    return f"realisations: {{at_least: 10, at_most: 4096, until: {{{output}: {accuracy:g}}}}}\n{rest}"
+    return f"realisations: {{at_least: 7, at_most: 4096, until: {{{output}: {accuracy:g}}}}}\n{rest}"
 
 
 FRICTION = Study(

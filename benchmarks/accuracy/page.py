@@ -194,7 +194,7 @@ asking does. A user does not know the cheapest one beforehand. Then the largest 
 {within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times.
 
 Like cases are other lines, depths, speeds, exponents and amounts of wear about the one named. A campaign asks for a
-standard error, so that nine of ten seeds lie within 1.6 times that. It takes ten lines: fewer do not know their own
+standard error, so that nine of ten seeds lie within 1.6 times that. It takes seven lines: fewer do not know their own
 scatter, but turns of rollers do. The fast rule and the limit of wear are left out:
 their errors are those of their equations, and no setting lowers them.
 

@@ -16,7 +16,9 @@ from mdr_dask.fits.answers import cases_behind, half_widths, is_wide, still_wide
 from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Mesh, Stage
-from mdr_dask.replication import FEWEST
+
+#: Fewer realisations do not know the interval of a fitted constant.
+FEWEST = 10
 
 
 def cases_that_narrow(

@@ -14,7 +14,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
 from mdr_dask.plan import RECORDS_TOGETHER, BlockIndex, Template
 from mdr_dask.store import Hold, Part, Place
-from mdr_dask.task import Work, versions
+from mdr_dask.task import Rounds, Work, versions
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def owners(layout: Iterable[Template], count: int) -> Iterator[NDArray[np.int32]
         yield numbers
 
 
-def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
+def tasks(url: str, groups: Iterable[Cells], hold: Hold, rounds: Rounds | None) -> Iterator[Work]:
     """Yield the tasks of a round, lazily, so that only a window of them exists at a time."""
     place, laid_out = store.absolute(url), store.layout_mark(url)
     if laid_out is None:
@@ -110,4 +110,5 @@ def tasks(url: str, groups: Iterable[Cells], hold: Hold) -> Iterator[Work]:
                     spared=spared,
                     attempt=attempts.get(index, 0) + 1,
                     estimate=cells.seconds(index),
+                    rounds=rounds,
                 )

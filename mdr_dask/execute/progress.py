@@ -65,6 +65,7 @@ class Progress:
         counts = outcome.counts
         return replace(
             self,
+            total=self.total + outcome.further,
             done=self.done + counts[Status.DONE],
             failed=self.failed + counts[Status.FAILED] + counts[Status.NOT_CONVERGED],
             not_needed=self.not_needed + counts[Status.NOT_NEEDED],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,11 +20,12 @@ from mdr_dask.execute.executors import Execute, check, executor
 from mdr_dask.execute.progress import Progress
 from mdr_dask.execute.resources import Resources
 from mdr_dask.execute.stages import Places, cases_of, following, stored_layout
+from mdr_dask.models.base import Status
 from mdr_dask.plan import Template
 from mdr_dask.refinement import Stage
-from mdr_dask.replication import GROWTH, growth_needed, next_round
+from mdr_dask.replication import GROWTH, growth_needed, known_scatter, next_round
 from mdr_dask.store import Hold, Part
-from mdr_dask.task import Outcome, Work
+from mdr_dask.task import Outcome, Rounds, Work
 
 Masks = list[NDArray[np.bool_]]
 #: Seconds between two looks at what other parts have still to do.
@@ -170,22 +172,28 @@ def _run_stages(job: _Job, execute: Execute) -> Progress:
     """Run a campaign, and again with what its adaptive axes still want, until they want nothing more."""
     start = time.monotonic()
     progress = Progress()
+    whole: list[Outcome] = []
 
     def settle(work: Work, outcome: Outcome) -> None:
         nonlocal progress
         progress = progress.after(outcome, time.monotonic() - start)
+        if work.rounds:
+            whole.append(outcome)
         job.tell(ended(work, outcome))
         job.report(progress)
 
-    def run_round(current: _Round, groups: list[Cells]) -> None:
+    def run_round(current: _Round, groups: list[Cells]) -> _Round:
         nonlocal progress
         progress = _begin_round(progress, groups)
         job.report(progress)
-        execute(tasks(job.url, groups, job.hold), settle)
+        execute(tasks(job.url, groups, job.hold, _rounds_of_block(job, groups)), settle)
         if job.resources.remote:
             _verify(job, current)
+        if whole:
+            current = _gone_on(job, current, whole.pop())
         facts = {"realisations": current.realisations[1], "done": progress.done, "failed": progress.failed}
         job.tell(Event("round ended", facts))
+        return current
 
     reached, stage = 0, job.stage
     while last := _run_rounds(_before_answers(job) if stage.is_adaptive else job, run_round):
@@ -203,7 +211,7 @@ def _run_stages(job: _Job, execute: Execute) -> Progress:
 
 
 def _run_rounds(
-    job: _Job, run_round: Callable[[_Round, list[Cells]], None], current: _Round | None = None
+    job: _Job, run_round: Callable[[_Round, list[Cells]], _Round], current: _Round | None = None
 ) -> _Round | None:
     """Run round after round, each over the cases that the one before left too uncertain.
 
@@ -214,8 +222,7 @@ def _run_rounds(
         further = _lay_out(job, current)
         if not any(mask.any() for mask in further.needed):
             break
-        current = further
-        run_round(current, _find(job, current))
+        current = run_round(further, _find(job, further))
         is_last = current.realisations[1] == replication.at_most and not job.stage.is_adaptive
         if job.part and not is_last and not _others_are_done(job, job.part, current):
             return None
@@ -224,7 +231,7 @@ def _run_rounds(
     return current
 
 
-def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], None], realisations: int) -> None:
+def _end_stages(job: _Job, run_round: Callable[[_Round, list[Cells]], _Round], realisations: int) -> None:
     """Go on for fitted constants with all values there are, and write down as not needed what nothing has asked for."""
     if job.stage.campaign.replication.answers:
         job = replace(job, stage=replace(job.stage, new=tuple(mesh.cases for mesh in job.stage.meshes)))
@@ -268,15 +275,47 @@ def _lay_out(job: _Job, last: _Round | None) -> _Round:
                 job.stage.campaign.replication, before, np.concatenate([each.ravel() for each in growth])
             )
         if any(mask.any() for mask in needed):
-            job.tell(Event("laying out", {"realisations": count}))
-            layout = _grow(layout, count)
-            with store.holding(job.url, job.hold):
-                store.lay_out(job.url, layout)
-            blocks = {template.series.name or "-": list(template.grid) for template in layout}
-            job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
+            layout = _laid_out(job, layout, count)
     earlier = last.taken if last else [np.zeros(mask.shape, dtype=np.int64) for mask in needed]
     taken = tuple(np.where(mask, count, number) for mask, number in zip(needed, earlier, strict=True))
     return _Round(layout, places, asked, needed, (before, count), taken)
+
+
+def _laid_out(job: _Job, layout: tuple[Template, ...], count: int) -> tuple[Template, ...]:
+    """Lay a study out for so many realisations."""
+    job.tell(Event("laying out", {"realisations": count}))
+    layout = _grow(layout, count)
+    with store.holding(job.url, job.hold):
+        store.lay_out(job.url, layout)
+    blocks = {template.series.name or "-": list(template.grid) for template in layout}
+    job.tell(Event("laid out", {"realisations": count, "blocks": blocks}))
+    return layout
+
+
+def _rounds_of_block(job: _Job, groups: list[Cells]) -> Rounds | None:
+    """Return the rounds that a block may go through by itself, if it is the whole of a study that nothing is known of.
+
+    Whatever else has a say in them, another group, a fitted constant, a refined axis, is not seen from a block.
+    """
+    replication, (first, *others) = job.stage.campaign.replication, groups
+    alone = math.prod(first.template.grid) == 1 and bool(first.wanted.all()) and not others
+    if not (replication.until and alone) or replication.answers or job.stage.is_adaptive or job.part:
+        return None
+    return Rounds(replication, first.template.chunks["realisation"])
+
+
+def _gone_on(job: _Job, last: _Round, outcome: Outcome) -> _Round:
+    """Return a round together with those that its block has gone through by itself, and let the store show them."""
+    count = last.realisations[1] + outcome.further // last.needed[0].size
+    taken, layout = last.taken, last.layout
+    if outcome.further:
+        with store.entrance(job.url):
+            layout = _laid_out(job, layout, count)
+        (template,) = layout
+        status = store.ledger(job.url, template.series.name, template.shape)
+        taken = (np.count_nonzero(status != Status.NOT_NEEDED, axis=-1),)
+    needed = [(each == count) & (not outcome.settled) for each in taken]
+    return replace(last, layout=layout, needed=needed, realisations=(last.realisations[0], count), taken=taken)
 
 
 def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...], Places]:
@@ -292,8 +331,10 @@ def _layout_before(job: _Job, last: _Round | None) -> tuple[tuple[Template, ...]
 def _growth(job: _Job, layout: tuple[Template, ...], places: Places, last: _Round) -> list[FloatArray]:
     """Return how many times as many realisations each case of a round needs; at most 1 where it has enough."""
     narrow = _narrow(job, layout, places, last)
-    growth = [_growth_of(job.url, template, last.realisations[1]) for template in layout]
-    own = [np.where(mask, each, 0.0) for mask, each in zip(last.needed, growth, strict=True)]
+    own = [
+        np.where(mask, _growth_of(job.url, template, last.realisations[1]), 0.0) if mask.any() else np.zeros(mask.shape)
+        for mask, template in zip(last.needed, layout, strict=True)
+    ]
     return [np.where(cases, np.maximum(each, GROWTH), each) for each, cases in zip(own, narrow, strict=True)]
 
 
@@ -372,9 +413,7 @@ def _grow(layout: tuple[Template, ...], realisations: int) -> tuple[Template, ..
 
 def _growth_of(url: str, template: Template, count: int) -> FloatArray:
     until, name = template.campaign.replication.until, template.series.name
-    model = models.load(template.campaign.model)
-    scatter = {output: model.output(output).scatter for output in until}
-    known = {output: own for output, own in scatter.items() if own in template.campaign.outputs}
+    known = known_scatter(models.load(template.campaign.model), until, template.campaign.outputs)
     values, within = (
         {output: store.values(url, name, array)[..., :count] for output, array in arrays.items()}
         for arrays in (dict(zip(until, until, strict=True)), known)

@@ -149,8 +149,14 @@ def _in_memory(url: str, series: str, layout: str) -> tuple[dict[str, Any], dict
     """Return the same arrays with nothing in them, and their chunks as they are written: each task takes its own."""
     shown, encoded = _arrays(url, series, layout), dict[str, Buffer]()
     memory = zarr.storage.MemoryStore(encoded)
-    empty = {name: array_of(array.metadata.to_dict(), memory, array.path) for name, array in shown.items()}
+    empty = {name: array_of(_whole_chunks(array), memory, array.path) for name, array in shown.items()}
     return {name: array.with_config({"write_empty_chunks": True}) for name, array in empty.items()}, encoded
+
+
+def _whole_chunks(array: Any) -> dict[str, Any]:
+    """Return the metadata of an array as whole chunks: a block may hold more realisations than the study shows."""
+    shape = [-(-size // length) * length for size, length in zip(array.shape, array.chunks, strict=True)]
+    return {**array.metadata.to_dict(), "shape": shape}
 
 
 def _other_store(seen: str | None) -> str:
