@@ -169,7 +169,7 @@ def coordinates(parameters: EhlLineParameters) -> dict[str, Coordinate]:
 
 MODEL = Model(
     name="ehl_line",
-    version=8,
+    version=9,
     summary="film, pressure and traction of a lubricated line contact (elastohydrodynamic)",
     parameters=EhlLineParameters,
     outputs=OUTPUTS,

@@ -305,7 +305,7 @@ def _expected_points(block: Block[MixedLubrication]) -> FloatArray:
 
 MODEL = Model(
     name="mixed_lubrication",
-    version=10,
+    version=11,
     summary="breakthrough of the boundary layer between two rough rollers on an oil film",
     parameters=MixedLubrication,
     outputs=OUTPUTS,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -49,6 +50,19 @@ class GridSolution:
         inside = (positions > self.nodes[0]) & (positions < self.nodes[-1])
         return np.where(inside, np.maximum(_between(self.nodes, self.pressure, positions, _CUBIC), 0.0), 0.0)
 
+    def pressure_carried(self, nodes: FloatArray, front: float) -> FloatArray:
+        """Return the pressure at the nodes of another grid, on which it falls behind its spike at `front` (or NaN).
+
+        The nodes beside that place get what this grid has half a cell from its own, as finer grids find much the same.
+        """
+        if np.isnan(front + self.front):
+            return self.pressure_between(nodes)
+        before, behind = _cell_around(self.nodes, self.front)
+        beside = self.front + 0.5 * (behind - before) * np.array([-1.0, 1.0])
+        there = _cell_around(nodes, front)
+        moved = np.interp(nodes, [front - 1, *there, nodes[-1]], [0.0, *(beside - there), 0.0])
+        return np.asarray(np.interp(nodes + moved, self.nodes, self.pressure))
+
     @cached_property
     def density(self) -> FloatArray:
         """The density of nodes that the solution asks for, at its own."""
@@ -79,14 +93,30 @@ class GridSolution:
     @cached_property
     def spike(self) -> tuple[float, float]:
         """Position and height of a second pressure maximum behind the first; NaN twice if there is none."""
+        peak, _ = self._spike
+        return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
+
+    @cached_property
+    def front(self) -> float:
+        """Where the pressure behind its spike is down to the lowest before it; NaN if there is no spike.
+
+        It falls within a cell or two there, however fine the grid; only the spike's height depends on the nodes.
+        """
+        peak, lowest = self._spike
+        if not peak:
+            return float("nan")
+        after = peak + int(np.argmax(self.pressure[peak:] <= lowest))
+        return float(np.interp(lowest, self.pressure[[after, after - 1]], self.nodes[[after, after - 1]]))
+
+    @cached_property
+    def _spike(self) -> tuple[int, float]:
+        """The node of a second pressure maximum and the lowest pressure before it; node 0 if there is none."""
         P = self.pressure
         peaks = np.flatnonzero((P[1:-1] > P[:-2]) & (P[1:-1] >= P[2:])) + 1
         if peaks.size < 2:
-            return float("nan"), float("nan")
-        last = peaks[-1]
-        if P[last] - P[peaks[-2] : last].min() < _SPIKE * P.max():
-            return float("nan"), float("nan")
-        return float(self.nodes[last]), float(P[last])
+            return 0, 0.0
+        last, lowest = int(peaks[-1]), float(P[peaks[-2] : peaks[-1]].min())
+        return (last, lowest) if P[last] - lowest >= _SPIKE * P.max() else (0, 0.0)
 
     @cached_property
     def rupture(self) -> float:
@@ -103,10 +133,30 @@ class GridSolution:
     @cached_property
     def cut(self) -> float:
         """Distance of the film's end from the nearest node, in cells: a half at most."""
-        end = self.rupture
-        after = int(np.clip(np.searchsorted(self.nodes, end), 1, self.nodes.size - 1))
-        share = (end - self.nodes[after - 1]) / (self.nodes[after] - self.nodes[after - 1])
+        before, behind = _cell_around(self.nodes, self.rupture)
+        share = (self.rupture - before) / (behind - before)
         return float(min(abs(share), abs(1 - share)))
+
+
+def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
+    """Return the two nodes on either side of a position."""
+    after = int(np.clip(np.searchsorted(nodes, position), 1, nodes.size - 1))
+    return nodes[after - 1 : after + 1]
+
+
+def expected(
+    before: Sequence[GridSolution],
+    reading: Callable[[GridSolution], float | FloatArray],
+    spacing: float,
+    order: float,
+) -> FloatArray:
+    """Return what the last two grids let expect of a reading at another spacing, or what the only one has."""
+    last = np.asarray(reading(before[-1]))
+    if len(before) == 1:
+        return last
+    coarse, fine = before[-2].spacing ** order, before[-1].spacing ** order
+    share = (fine - spacing**order) / (coarse - fine)
+    return np.asarray(last + share * (last - reading(before[-2])))
 
 
 @kernel

@@ -65,11 +65,14 @@ def _placed(positions: FloatArray, density: FloatArray, number: FloatArray, want
     return np.asarray(nodes)
 
 
-def aligned(positions: FloatArray, density: FloatArray, count: int, rupture: float) -> tuple[FloatArray, float]:
-    """Return nodes of a density, one of them where the film ends.
+def aligned(
+    positions: FloatArray, density: FloatArray, count: int, rupture: float, front: float = np.nan
+) -> tuple[FloatArray, float]:
+    """Return nodes of a density, one of them where the film ends, and none within half a cell of the pressure's front.
 
     The error of a film depends on where in its cell it ends, by as much as a tenth and least at a node, so that grids
-    compare only if it ends alike on all of them.
+    compare only if it ends alike on all of them. Where the pressure falls behind a sharp spike, it does so within a
+    cell or two, and the lowest film depends on which. So cells are a little wider or narrower behind that front.
 
     Parameters
     ----------
@@ -79,6 +82,8 @@ def aligned(positions: FloatArray, density: FloatArray, count: int, rupture: flo
         Number of nodes, but for one or two.
     rupture : float
         Where the film ends, as a coarser grid found it.
+    front : float
+        Where the pressure falls behind its spike, before the film ends; NaN if it does not.
 
     Returns
     -------
@@ -86,13 +91,28 @@ def aligned(positions: FloatArray, density: FloatArray, count: int, rupture: flo
         Ascending nodes, the last one behind the last position or there, and the spacing: cells of the density a cell.
     """
     number = _cells(positions, density)
-    before = int(np.clip(np.searchsorted(positions, rupture) - 1, 0, positions.size - 2))
-    rest = rupture - positions[before]
-    slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
-    reached = number[before] + rest * (density[before] + slope * rest / 2)
-    spacing = reached / round(reached / number[-1] * (count - 1))
+    reached = _cells_before(rupture, positions, density, number)
+    cells = round(reached / number[-1] * (count - 1))
+    if front < rupture:
+        cells = _halved_by(_cells_before(front, positions, density, number) / reached, cells)
+    spacing = reached / cells
     last = int(np.ceil(number[-1] / spacing * (1 - 1e-12)))
     return _placed(positions, density, number, spacing * np.arange(last + 1)), float(spacing)
+
+
+def _halved_by(share: float, cells: int) -> int:
+    """Return the number of cells near `cells` one of which is halved best at this share of them all."""
+    far = int(0.5 / max(1 - share, 4 / cells))  # the place in its cell comes again with every 1 / (1 - share) cells
+    near = cells + np.arange(-far, far + 1)
+    return int(near[np.argmin(np.abs(near * share % 1 - 0.5))])
+
+
+def _cells_before(position: float, positions: FloatArray, density: FloatArray, number: FloatArray) -> float:
+    """Return the number of cells before any position, where those before the positions of the density are given."""
+    before = int(np.clip(np.searchsorted(positions, position) - 1, 0, positions.size - 2))
+    rest = position - positions[before]
+    slope = (density[before + 1] - density[before]) / (positions[before + 1] - positions[before])
+    return float(number[before] + rest * (density[before] + slope * rest / 2))
 
 
 def first_grid(central_film: float, inlet: float, count: int) -> FloatArray:

@@ -59,7 +59,7 @@ class Limit(NamedTuple):
 def extrapolate(
     values: FloatArray,
     spacing: Sequence[float] | FloatArray,
-    least: float = TRUST.floor,
+    least: float | FloatArray = TRUST.floor,
     fourth: float | None = None,
     trust: Trust = TRUST,
 ) -> Limit:
@@ -77,7 +77,7 @@ def extrapolate(
         changed by.
     spacing : array, shape (k,)
         Of the grids, in lengths over which the solution changes.
-    least : float
+    least : float or array
         Least error over what the second order moved an extrapolated value.
     fourth : float, optional
         Where whole powers are known to follow: the error over what is left of a fourth order that is as large as the

@@ -17,7 +17,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
-from mdr_dask.physics.lubrication.grid_solution import GridSolution
+from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
 from mdr_dask.physics.lubrication.limits import Limit, extrapolate
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
@@ -57,7 +57,7 @@ class Settings(NamedTuple):
     attempt_steps : int
         Greatest number of steps of an attempt.
     paces : tuple of Pace
-        Ways from one grid to another, in this order.
+        Ways from one grid to another, in this order: from what the last grids let expect, then from the last one's own.
     adapted_nodes, adaptations : int
         Nodes of the grids that are placed by a solution before grids are compared, and their number.
     nodes : tuple of int
@@ -73,8 +73,6 @@ class Settings(NamedTuple):
         Power of the spacing that the error of a film's end goes like: where a finer grid lets expect it.
     further : float
         Greatest share of a pressure by which two grids let expect another one on the next: spikes move.
-    further_steps : int
-        Greatest number of steps from there; then the last grid's own pressure is taken.
     fourth : float
         Error of a film over what is left of a fourth power of the spacing, :func:`extrapolate`.
     floor : float
@@ -85,9 +83,9 @@ class Settings(NamedTuple):
     spike : float
         Added to that share for each such logarithm, times the square of the spacing: what the spike leaves of the
         square of the spacing goes like the fourth power.
-    narrow, thick : float
-        Added to it for each such logarithm where M is below `thick` (half of it there): the spike stands in the
-        narrowest place.
+    narrow, thick : float, pair of float
+        Added to it for each such logarithm where M is below `thick` (half of it there), that of the central and of the
+        minimum film: the spike stands in the narrowest place, and at the centre only where M is small.
     cut : float
         Added to that share for a film that ends a whole cell from the nearest node: the minimum film scatters.
     placed : float
@@ -104,7 +102,7 @@ class Settings(NamedTuple):
         Attempt(1.5, 0.2, 0.05, 361),
     )
     attempt_steps: int = 80
-    paces: tuple[Pace, ...] = (Pace(0.12, 30), Pace(0.05, 80), Pace(0.02, 250))
+    paces: tuple[Pace, ...] = (Pace(0.12, 16), Pace(0.05, 80), Pace(0.02, 250))
     adapted_nodes: int = 161
     adaptations: int = 2
     nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
@@ -113,13 +111,12 @@ class Settings(NamedTuple):
     order: float = 4.0
     end_order: float = 4.0
     further: float = 0.1
-    further_steps: int = 9
     fourth: float = 2.0
     floor: float = 0.01
     sharpest: float = 50.0
     spike: float = 0.15
     narrow: float = 0.008
-    thick: float = 30.0
+    thick: tuple[float, float] = (6.0, 30.0)
     cut: float = 0.1
     placed: float = 0.1
     spiked: float = 0.13
@@ -278,7 +275,7 @@ class LineSolution:
 def _tends_to(
     solved: Sequence[GridSolution],
     reading: Callable[[GridSolution], float | FloatArray],
-    share: float,
+    share: float | FloatArray,
     fourth: float | None = None,
 ) -> Limit:
     """Return what a reading of the last grids tends to; `share` is the least error's, but for what a cut film adds."""
@@ -324,40 +321,31 @@ def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, Gri
 
 
 def _refined(
-    case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int, settings: Settings
+    case: LineContact, solved: Sequence[GridSolution], source: GridSolution, count: int, settings: Settings
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes placed as the `source` asks for, from what the last one or two grids let expect."""
-    last, paces = before[-1], settings.paces
+    """Solve on some `count` nodes placed as the `source` asks for.
+
+    The start is what the last grids let expect; where that leads nowhere, the pressure of the last one as it is.
+    """
+    before = _nearest(solved, source)
+    last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
-    end = _expected(before, lambda grid: grid.rupture, spacing, settings.end_order)
-    nodes, spacing = grids.aligned(source.nodes, source.density, count, float(end))
-    if len(before) == 1:
-        guess = np.interp(nodes, last.nodes, last.pressure)
-        return _solve_on(case, nodes, guess, last.central, paces, spacing)
-    here = last.pressure_between(nodes)
-    further = _expected(before, lambda grid: grid.pressure_between(nodes), spacing, 2.0) - here
+    end = float(expected(before, lambda grid: grid.rupture, spacing, settings.end_order))
+    front = float("nan")
+    if case.log_viscosity >= settings.smooth:
+        same = solved[-2:] if len(solved) > 1 else [source]  # cells beside the front are wider in the source
+        front = float(expected(same, lambda grid: grid.front, spacing, settings.end_order))
+    nodes, spacing = grids.aligned(source.nodes, source.density, count, end, front)
+    here = last.pressure_carried(nodes, front)
+    further = expected(before, lambda grid: grid.pressure_carried(nodes, front), spacing, 2.0) - here
     guess = here + np.clip(further, -settings.further * here, settings.further * here)
-    central = float(_expected(before, lambda grid: grid.central, spacing, 2.0))
-    outcome, found = _solve_on(case, nodes, guess, central, (paces[0]._replace(most=settings.further_steps),), spacing)
+    central = float(expected(before, lambda grid: grid.central, spacing, 2.0))
+    outcome, found = _solve_on(case, nodes, guess, central, settings.paces[:1], spacing)
     if outcome == Outcome.CONVERGED:
         return outcome, found
-    outcome, again = _refined(case, before[-1:], source, count, settings)
+    straight = np.interp(nodes, last.nodes, last.pressure)
+    outcome, again = _solve_on(case, nodes, straight, last.central, settings.paces[1:], spacing)
     return outcome, replace(again, steps=found.steps + again.steps)
-
-
-def _expected(
-    before: Sequence[GridSolution],
-    reading: Callable[[GridSolution], float | FloatArray],
-    spacing: float,
-    order: float,
-) -> FloatArray:
-    """Return what the last two grids let expect of a reading at another spacing, or what the only one has."""
-    last = np.asarray(reading(before[-1]))
-    if len(before) == 1:
-        return last
-    coarse, fine = before[-2].spacing ** order, before[-1].spacing ** order
-    share = (fine - spacing**order) / (coarse - fine)
-    return np.asarray(last + share * (last - reading(before[-2])))
 
 
 def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
@@ -365,7 +353,7 @@ def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, G
     outcome, state = _first_solution(case, settings)
     steps = state.steps
     for _ in range(settings.adaptations if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, (state,), state, settings.adapted_nodes, settings)
+        adapted_outcome, adapted = _refined(case, (), state, settings.adapted_nodes, settings)
         steps += adapted.steps
         if adapted_outcome == Outcome.CONVERGED:
             state = adapted
@@ -401,7 +389,7 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     failure, found, solved = (outcome, source), None, list[GridSolution]()
     rungs, at = grids.ladder(settings.nodes), 0
     while outcome == Outcome.CONVERGED and at < len(rungs):
-        outcome, finer = _refined(case, _nearest(solved, source), source, rungs[at], settings)
+        outcome, finer = _refined(case, solved, source, rungs[at], settings)
         steps += finer.steps
         if outcome == Outcome.CONVERGED:
             solved.append(finer)
@@ -433,7 +421,7 @@ def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[G
 def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
     """Return what the last three grids tend to."""
     viscosity = min(case.log_viscosity, SETTINGS.sharpest)
-    narrow = SETTINGS.narrow / (1 + (case.M / SETTINGS.thick) ** 2)
+    narrow = SETTINGS.narrow / (1 + (case.M / np.array(SETTINGS.thick)) ** 2)
     share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
     films = _tends_to(solved, lambda grid: np.array([grid.central_film, grid.minimum[1]]), share, SETTINGS.fourth)
     central, minimum = (Limit(*(column[film] for column in films)) for film in (0, 1))

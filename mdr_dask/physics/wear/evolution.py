@@ -113,9 +113,12 @@ class Resolution(NamedTuple):
         return graded_panels(round(sharpness * left), right, order - min(self.fewer, self.thinned))
 
     def panels_of_a_punch(self, sharpness: float) -> Panels:
-        """Return panels for a pressure that tends to a jump at the edge."""
-        halvings = round(2.0 * max(-np.log10(self.accuracy), 2.0)) - self.fewer
-        return graded_panels(round(sharpness * (halvings + 1)), halvings + 4, 4 - min(self.fewer, self.thinned))
+        """Return panels for a pressure that tends to a jump at the edge, and a body that is a power at its axis."""
+        digits = max(-np.log10(self.accuracy), 2.0)
+        halvings = round(2.0 * digits) - self.fewer
+        # the tip is off by its height in the innermost panel, which a halving lowers by a root of two under a cone
+        tip = max(halvings + 1, 3.3 * digits - 2.2 - self.fewer)
+        return graded_panels(round(sharpness * tip), halvings + 4, 4 - min(self.fewer, self.thinned))
 
     def finer(self, factor: float) -> Resolution:
         """Return the resolution for a finer accuracy where a march failed: equations are solved more closely, too."""

@@ -70,3 +70,25 @@ def test_a_film_ends_at_a_node_of_every_aligned_grid() -> None:
         assert cells / spacing == pytest.approx(round(cells / spacing), abs=1e-3)
         spacings.append(spacing)
     assert spacings[0] / spacings[2] == pytest.approx(2, rel=0.03)
+
+
+@pytest.mark.parametrize("front", [0.61, 0.8, 0.95])
+def test_a_front_lies_in_the_middle_of_a_cell_of_every_aligned_grid(front: float) -> None:
+    """By the number of cells alone, an eighth more or fewer at most: all are as wide as the density wants them."""
+    positions, density = np.linspace(-5.0, 2.0, 60), 1 + np.exp(-((np.linspace(-5.0, 2.0, 60) - 1) ** 2) / 0.1)
+    for count in (114, 161, 227, 641):
+        nodes, spacing = aligned(positions, density, count, 1.037, front)
+        after = int(np.searchsorted(nodes, front))
+        assert (front - nodes[after - 1]) / (nodes[after] - nodes[after - 1]) == pytest.approx(0.5, abs=0.1)
+        assert np.min(np.abs(nodes - 1.037)) < 1e-9
+        assert abs(nodes.size / count - 1) < 0.15
+        middle = 0.5 * (nodes[:-2] + nodes[1:-1])
+        np.testing.assert_allclose(np.diff(nodes[:-1]) * np.interp(middle, positions, density), spacing, rtol=0.02)
+
+
+@pytest.mark.parametrize("front", [np.nan, 1.037, 1.5, 1.037 - 1e-13])
+def test_a_front_that_is_none_or_hardly_before_the_end_hardly_matters(front: float) -> None:
+    positions, density = np.linspace(-5.0, 2.0, 60), np.ones(60)
+    nodes, _ = aligned(positions, density, 114, 1.037, front)
+    assert abs(nodes.size / 114 - 1) < 0.15
+    assert np.all(np.diff(nodes) > 0)

@@ -117,6 +117,18 @@ def test_a_sharp_tip_is_worn_to_the_accuracy_asked(exponent):
     assert abs(rough.worn_depth / fine.worn_depth - 1.0) < 0.01
 
 
+@pytest.mark.parametrize("exponent", [0.9, 1.0])
+def test_a_sharp_tip_under_force_is_worn_to_fine_accuracies(exponent):
+    """It was off by 1.8 to 2.6 times the accuracy: panels at the axis were halved too few times for it."""
+    *coarser, fine = (
+        exact(PowerProfile(exponent), 0.0, [2.0], one, constant_force=True, errors=False)[0]
+        for one in (3e-4, 1e-4, 1e-5)
+    )
+    tip = np.zeros(1)
+    for worn, accuracy in zip(coarser, (3e-4, 1e-4), strict=True):
+        assert abs(worn.height(tip) - fine.height(tip)) < 1.1 * accuracy
+
+
 def test_a_step_that_leaves_the_numbers_fails_without_a_warning():
     """An infinite residual was differentiated; every warning is an error here."""
     (worn,) = exact(PowerProfile(6.804484763820827), 0.9977872552149678, [14.4], 1e-4, constant_force=True)
