@@ -124,6 +124,16 @@ CLOSED_LAWS = {
         "elastic isoviscous": lambda x: 2.05 * x**-0.2,
     },
 }
+#: Lines across a panel at fixed places: those that stand up, and those that lie.
+GUIDES = {
+    "relaxation_rate": ((1.0,), ()),
+    "jump_fit": ((), (0.0,)),
+    "profiles": ((-1.0, 1.0), ()),
+    "stribeck": ((), (1.0,)),
+    "film_formula": ((), (1.0,)),
+}
+#: Figures whose ordinate begins at zero.
+FROM_ZERO = {"regions", "velocity", "plateau", "zone_one", "trace", "traction", "starvation", "film_profile"}
 #: Bands that a law is known within.
 BANDS = {"jump_law": "fitted", "jump_fit": "one exponential"}
 
@@ -143,6 +153,53 @@ def check_laws(name: str, figure) -> None:
     assert (bands["y_low"] <= bands["y_high"]).all()
     if name in BANDS:
         assert bands["what"].str.startswith(BANDS[name]).any()
+
+
+def check_limits(name: str, figure) -> None:
+    """All data lie within their panels, the ends that a figure sets are where they belong, and so are its guides."""
+    standing, lying = GUIDES.get(name, ((), ()))
+    seen = [_guides(axes) for axes in figure.panels()]
+    assert set(standing) <= {x for found, _ in seen for x in found}
+    assert set(lying) <= {y for _, found in seen for y in found}
+    for axes in figure.panels():
+        points = np.concatenate([np.zeros((0, 2)), *_points(axes)])
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            continue
+        for k, (ends, scale) in enumerate(((axes.get_xlim(), axes.get_xscale()), (axes.get_ylim(), axes.get_yscale()))):
+            shown = points[:, k][(points[:, k] > 0) | (scale != "log")]
+            if name != "jump_fit" or k == 1:  # of which `_check_window` knows more
+                assert np.all((shown >= min(ends)) & (shown <= max(ends))), (name, "xy"[k], ends, shown)
+        _check_ends(name, axes, points)
+
+
+def _check_ends(name: str, axes, points: np.ndarray) -> None:
+    """Ends that are a part of the data, once more."""
+    (least, low), (most, high) = points.min(axis=0), points.max(axis=0)
+    bottom, top = axes.get_ylim()
+    if name in FROM_ZERO:
+        assert bottom == 0
+    if name == "jump_law":
+        assert (bottom, top) == pytest.approx((points[points[:, 1] > 0, 1].min() / 2, 3 * high))
+    if name == "film_regimes":
+        assert (bottom, top) == pytest.approx((0.5 * min(low, 2.05 * (2 * most) ** -0.2), 2 * high))
+    if name == "starvation":
+        assert axes.get_xlim() == pytest.approx((1.15 * least, 0.95 * most))
+    if name == "film_profile" and axes.get_ylabel().startswith("film"):
+        assert top == pytest.approx(3 * points[abs(points[:, 0]) <= 1, 1].max())
+
+
+def _points(axes) -> list[np.ndarray]:
+    shown = [line.get_xydata() for line in axes.lines if line.get_gid() == style.DATA]
+    shown += [part.get_offsets().data for part in axes.collections if _is(part, "PathCollection")]
+    return [np.asarray(each, dtype=float) for each in shown]
+
+
+def _guides(axes) -> tuple[list[float], list[float]]:
+    """Return where lines stand that go from bottom to top, and where those lie that go from side to side."""
+    lines = [line for line in axes.lines if line.get_transform() != axes.transData]
+    standing = [line.get_xdata()[0] for line in lines if list(line.get_ydata()) == [0, 1]]
+    return standing, [line.get_ydata()[0] for line in lines if list(line.get_xdata()) == [0, 1]]
 
 
 def _check_exponentials(table: pd.DataFrame) -> None:

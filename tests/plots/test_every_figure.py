@@ -15,7 +15,7 @@ import numpy as np
 import planted
 import pytest
 import xarray as xr
-from drawn import LAST, check_laws, check_picture, expected, mismatches
+from drawn import LAST, check_laws, check_limits, check_picture, expected, mismatches
 
 from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
@@ -264,6 +264,7 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         assert not any(re.search(r"\((m|m/s|N|Pa|s)\)", text) for text in texts), "units stand in [ ]"
     check_picture(figure)
     check_laws(name, figure)
+    check_limits(name, figure)
     table = figure.table()
     data = table[table["what"] == "data"]
     assert len(data), "nothing of the store is drawn"
