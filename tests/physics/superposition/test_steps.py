@@ -1,4 +1,4 @@
-"""Scans of single steps, and what all steps have in common, beside dense algebra and plain sums over what is unknown."""
+"""Scans of single steps, and what all steps have in common, beside dense algebra and closed forms."""
 
 import numpy as np
 import pytest
