@@ -169,8 +169,65 @@ def check_limits(name: str, figure) -> None:
         for k, (ends, scale) in enumerate(((axes.get_xlim(), axes.get_xscale()), (axes.get_ylim(), axes.get_yscale()))):
             shown = points[:, k][(points[:, k] > 0) | (scale != "log")]
             if name != "jump_fit" or k == 1:  # of which `_check_window` knows more
-                assert np.all((shown >= min(ends)) & (shown <= max(ends))), (name, "xy"[k], ends, shown)
+                assert np.all((shown >= min(ends)) & (shown <= max(ends))), (name, "xy"[k])
         _check_ends(name, axes, points)
+
+
+def check_words(name: str, figure) -> None:
+    """Parameters that titles and labels name have the values of the points; those of a case are named where held."""
+    table = figure.table()
+    over = figure.get_suptitle().replace("\n", " ")
+    titles = [over, *(axes.get_title().replace("\n", " ") for axes in figure.axes)]
+    for parameter, value in table.attrs["held"].items():
+        here = [title for title in titles if _names(title, parameter)]
+        assert here or parameter not in OF_A_CASE or name in BARE, f"{parameter} is held, and not named"
+        assert all(_says(title, parameter, value, table.attrs["units"][parameter]) for title in here)
+    for each in figure.rows:
+        for parameter, unit in each.units.items():
+            values = set(each.columns[parameter])
+            if len(values) == 1:
+                for text in (each.label, each.axes.get_title().replace("\n", " ")):
+                    assert _says(text, parameter, *values, unit), (text, parameter, values)
+
+
+#: What titles have to name, as far as nothing on the figure varies it; and figures of cases that have no numbers alike.
+OF_A_CASE = {
+    *("normal_force", "velocity", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
+    *("temperature", "rotation_speed", "layer_thickness", "stick_radius", "cycles", "load_parameter"),
+    *("line_load", "mean_velocity", "radius", "viscosity"),
+}
+BARE = {"film_formula", "film_regimes", "regime_map"}
+
+
+def _names(text: str, parameter: str) -> bool:
+    symbol = style.named(parameter, xr.DataArray(1.0)).split(" = ")[0]
+    return f" {symbol} = " in f" {text}"
+
+
+def _says(text: str, parameter: str, value, unit: str) -> bool:
+    """Return whether a text that names a parameter gives it this value, in the unit of figures or as it was written."""
+    known = xr.DataArray(value, attrs={"units": unit})
+    written = f" = {value:.4g} {unit}" if known.dtype.kind in "fiu" else str(value)
+    return not _names(text, parameter) or style.named(parameter, known) in text or written in text
+
+
+def check_colours(figure) -> None:
+    """Curves of more colours than can be told apart have a colour bar, and each the colour of its value there."""
+    for axes in figure.panels():
+        curves = [each for each in figure.rows if each.axes is axes and each.artist.get_gid() == style.DATA]
+        lines = [each for each in curves if isinstance(each.artist, Line2D) and len(each.columns["x"])]
+        bars = [
+            bar.drawn for bar in figure.bars if any(axes.bbox.bounds == beside.bbox.bounds for beside in bar.panels)
+        ]
+        assert bars or len({str(each.artist.get_color()) for each in lines}) <= style.most_colours()
+        for bar in bars:
+            named = [each for each in lines for name in each.units if style.label(name) == bar.ax.get_ylabel()]
+            for each in named:
+                (name,) = (name for name in each.units if style.label(name) == bar.ax.get_ylabel())
+                value = style.shown(name, xr.DataArray(each.columns[name][0], attrs={"units": each.units[name]}))
+                assert each.artist.get_color() == pytest.approx(bar.mappable.to_rgba(value)), name
+                rounding = 1e-9 * abs(value)
+                assert bar.vmin - rounding <= value <= bar.vmax + rounding, name
 
 
 def _check_ends(name: str, axes, points: np.ndarray) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 import planted
 import pytest
 import xarray as xr
-from drawn import LAST, check_laws, check_limits, check_picture, expected, mismatches
+from drawn import LAST, check_colours, check_laws, check_limits, check_picture, check_words, expected, mismatches
 
 from mdr_dask import aggregation, fits, models
 from mdr_dask.errors import DataError, FitError
@@ -265,6 +265,8 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
     check_picture(figure)
     check_laws(name, figure)
     check_limits(name, figure)
+    check_words(name, figure)
+    check_colours(figure)
     table = figure.table()
     data = table[table["what"] == "data"]
     assert len(data), "nothing of the store is drawn"
