@@ -166,7 +166,7 @@ def test_a_reader_that_has_read_enough_is_no_error(monkeypatch, tmp_path):
         closed = Closed(pipe)
         monkeypatch.setattr(sys, "stdout", closed)
         assert main(["models", "--json"]) == 0
-        assert os.path.samestat(os.fstat(pipe.fileno()), os.stat(os.devnull))
+        assert os.path.samestat(os.fstat(pipe.fileno()), Path(os.devnull).stat())
         monkeypatch.undo()
 
 
