@@ -86,7 +86,9 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {"velocity", "force", "indenter", "plateau"},
     ),
     "angles of a cone": (
-        planted.SLIDING + V + "  indenter: {shape: cone, angle: {linear: [5 deg, 30 deg, 9]}}\n  normal_force: 1 N\n",
+        planted.SLIDING
+        + V
+        + "  indenter: {shape: cone, angle: {geometric: [0.1 deg, 30 deg, 9]}}\n  normal_force: 1 N\n",
         {},
         {"velocity", "indenter", "plateau"},
     ),
@@ -278,6 +280,10 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
     told = style.left_out(figure)
     if len(groups) == 1 and not re.search("values of|series|cases|not known", told) and name not in PARTLY:
         assert mismatches(known, data).empty
+    if name == "indenter":  # of those beyond the law some cannot stand on logarithmic axes
+        within = known[known["y_low"].notna()]
+        assert mismatches(within, data).empty
+        assert len(within) or shape == "cone"
     if len(groups) == 1:
         (one,) = groups.values()
         cut = [axis for axis in data.columns.intersection(list(one.dims)) if 1 < data[axis].nunique() < one[axis].size]
