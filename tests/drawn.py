@@ -145,6 +145,8 @@ def check_laws(name: str, figure) -> None:
         drawn = table[(table["curve"] == curve) | table["curve"].str.startswith(f"{curve}:")]
         assert len(drawn), f"{curve} is not drawn"
         np.testing.assert_allclose(drawn["y"], law(drawn["x"]), rtol=2e-4, atol=1e-9, err_msg=curve)
+    if name == "relaxation_rate":
+        _check_powers(table)
     if name == "jump_fit":
         _check_exponentials(table)
         _check_window(*figure.axes[:2])
@@ -257,6 +259,14 @@ def _guides(axes) -> tuple[list[float], list[float]]:
     lines = [line for line in axes.lines if line.get_transform() != axes.transData]
     standing = [line.get_xdata()[0] for line in lines if list(line.get_ydata()) == [0, 1]]
     return standing, [line.get_ydata()[0] for line in lines if list(line.get_xdata()) == [0, 1]]
+
+
+def _check_powers(table: pd.DataFrame) -> None:
+    """The power of a regime goes from one of its rates to another, and not into the other regime."""
+    x = table.loc[table["what"] == "power fitted", "x"]
+    assert set(x) <= set(table.loc[table["what"] == "data", "x"])
+    for first, last in zip(x.iloc[::2], x.iloc[1::2], strict=True):
+        assert first < last < 1 or 1 <= first < last
 
 
 def _check_exponentials(table: pd.DataFrame) -> None:

@@ -22,7 +22,7 @@ from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots import available, curves, drawing, page, scaling, style
 
 V = "  velocity: {geometric: [0.001 mm/s, 1 km/s, 8]}\n"
-FEW_V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 8]}\n"
+FEW_V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 9]}\n"  # one of them just above v tau q_max = 1
 F = "  normal_force: {geometric: [1 mN, 100 N, 8]}\n"
 OPERATION = (
     "  normal_force: [200 N, 800 N]\n  rotation_speed: {geometric: [10 rpm, 1000 rpm, 4]}\n"
