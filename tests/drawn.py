@@ -124,6 +124,16 @@ CLOSED_LAWS = {
         "elastic isoviscous": lambda x: 2.05 * x**-0.2,
     },
 }
+#: Lines across a panel at fixed places: those that stand up, and those that lie.
+GUIDES = {
+    "relaxation_rate": ((1.0,), ()),
+    "jump_fit": ((), (0.0,)),
+    "profiles": ((-1.0, 1.0), ()),
+    "stribeck": ((), (1.0,)),
+    "film_formula": ((), (1.0,)),
+}
+#: Figures whose ordinate begins at zero.
+FROM_ZERO = {"regions", "velocity", "plateau", "zone_one", "trace", "traction", "starvation", "film_profile"}
 #: Bands that a law is known within.
 BANDS = {"jump_law": "fitted", "jump_fit": "one exponential"}
 
@@ -135,6 +145,8 @@ def check_laws(name: str, figure) -> None:
         drawn = table[(table["curve"] == curve) | table["curve"].str.startswith(f"{curve}:")]
         assert len(drawn), f"{curve} is not drawn"
         np.testing.assert_allclose(drawn["y"], law(drawn["x"]), rtol=2e-4, atol=1e-9, err_msg=curve)
+    if name == "relaxation_rate":
+        _check_powers(table)
     if name == "jump_fit":
         _check_exponentials(table)
         _check_window(*figure.axes[:2])
@@ -145,10 +157,123 @@ def check_laws(name: str, figure) -> None:
         assert bands["what"].str.startswith(BANDS[name]).any()
 
 
+def check_limits(name: str, figure) -> None:
+    """All data lie within their panels, the ends that a figure sets are where they belong, and so are its guides."""
+    standing, lying = GUIDES.get(name, ((), ()))
+    seen = [_guides(axes) for axes in figure.panels()]
+    assert set(standing) <= {x for found, _ in seen for x in found}
+    assert set(lying) <= {y for _, found in seen for y in found}
+    for axes in figure.panels():
+        points = np.concatenate([np.zeros((0, 2)), *_points(axes)])
+        points = points[np.isfinite(points).all(axis=1)]
+        if not len(points):
+            continue
+        for k, (ends, scale) in enumerate(((axes.get_xlim(), axes.get_xscale()), (axes.get_ylim(), axes.get_yscale()))):
+            shown = points[:, k][(points[:, k] > 0) | (scale != "log")]
+            if name != "jump_fit" or k == 1:  # of which `_check_window` knows more
+                assert np.all((shown >= min(ends)) & (shown <= max(ends))), (name, "xy"[k])
+        _check_ends(name, axes, points)
+
+
+def check_words(name: str, figure) -> None:
+    """Parameters that titles and labels name have the values of the points; those of a case are named where held."""
+    table = figure.table()
+    over = figure.get_suptitle().replace("\n", " ")
+    titles = [over, *(axes.get_title().replace("\n", " ") for axes in figure.axes)]
+    for parameter, value in table.attrs["held"].items():
+        here = [title for title in titles if _names(title, parameter)]
+        assert here or parameter not in OF_A_CASE or name in BARE, f"{parameter} is held, and not named"
+        assert all(_says(title, parameter, value, table.attrs["units"][parameter]) for title in here)
+    for each in figure.rows:
+        for parameter, unit in each.units.items():
+            values = set(each.columns[parameter])
+            if len(values) == 1:
+                for text in (each.label, each.axes.get_title().replace("\n", " ")):
+                    assert _says(text, parameter, *values, unit), (text, parameter, values)
+
+
+#: What titles have to name, as far as nothing on the figure varies it; and figures of cases that have no numbers alike.
+OF_A_CASE = {
+    *("normal_force", "velocity", "velocity_change", "shear_modulus", "relaxation_time", "rms_roughness"),
+    *("temperature", "rotation_speed", "layer_thickness", "stick_radius", "cycles", "load_parameter"),
+    *("line_load", "mean_velocity", "radius", "viscosity"),
+}
+BARE = {"film_formula", "film_regimes", "regime_map"}
+
+
+def _names(text: str, parameter: str) -> bool:
+    symbol = style.named(parameter, xr.DataArray(1.0)).split(" = ")[0]
+    return f" {symbol} = " in f" {text}"
+
+
+def _says(text: str, parameter: str, value, unit: str) -> bool:
+    """Return whether a text that names a parameter gives it this value, in the unit of figures or as it was written."""
+    known = xr.DataArray(value, attrs={"units": unit})
+    written = f" = {value:.4g} {unit}" if known.dtype.kind in "fiu" else str(value)
+    return not _names(text, parameter) or style.named(parameter, known) in text or written in text
+
+
+def check_colours(figure) -> None:
+    """Curves of more colours than can be told apart have a colour bar, and each the colour of its value there."""
+    for axes in figure.panels():
+        curves = [each for each in figure.rows if each.axes is axes and each.artist.get_gid() == style.DATA]
+        lines = [each for each in curves if isinstance(each.artist, Line2D) and len(each.columns["x"])]
+        bars = [
+            bar.drawn for bar in figure.bars if any(axes.bbox.bounds == beside.bbox.bounds for beside in bar.panels)
+        ]
+        assert bars or len({str(each.artist.get_color()) for each in lines}) <= style.most_colours()
+        for bar in bars:
+            named = [each for each in lines for name in each.units if style.label(name) == bar.ax.get_ylabel()]
+            for each in named:
+                (name,) = (name for name in each.units if style.label(name) == bar.ax.get_ylabel())
+                value = style.shown(name, xr.DataArray(each.columns[name][0], attrs={"units": each.units[name]}))
+                assert each.artist.get_color() == pytest.approx(bar.mappable.to_rgba(value)), name
+                rounding = 1e-9 * abs(value)
+                assert bar.vmin - rounding <= value <= bar.vmax + rounding, name
+
+
+def _check_ends(name: str, axes, points: np.ndarray) -> None:
+    """Ends that are a part of the data, once more."""
+    (least, low), (most, high) = points.min(axis=0), points.max(axis=0)
+    bottom, top = axes.get_ylim()
+    if name in FROM_ZERO:
+        assert bottom == 0
+    if name == "jump_law":
+        assert (bottom, top) == pytest.approx((points[points[:, 1] > 0, 1].min() / 2, 3 * high))
+    if name == "film_regimes":
+        assert (bottom, top) == pytest.approx((0.5 * min(low, 2.05 * (2 * most) ** -0.2), 2 * high))
+    if name == "starvation":
+        assert axes.get_xlim() == pytest.approx((1.15 * least, 0.95 * most))
+    if name == "film_profile" and axes.get_ylabel().startswith("film"):
+        assert top == pytest.approx(3 * points[abs(points[:, 0]) <= 1, 1].max())
+
+
+def _points(axes) -> list[np.ndarray]:
+    shown = [line.get_xydata() for line in axes.lines if line.get_gid() == style.DATA]
+    shown += [part.get_offsets().data for part in axes.collections if _is(part, "PathCollection")]
+    return [np.asarray(each, dtype=float) for each in shown]
+
+
+def _guides(axes) -> tuple[list[float], list[float]]:
+    """Return where lines stand that go from bottom to top, and where those lie that go from side to side."""
+    lines = [line for line in axes.lines if line.get_transform() != axes.transData]
+    standing = [line.get_xdata()[0] for line in lines if list(line.get_ydata()) == [0, 1]]
+    return standing, [line.get_ydata()[0] for line in lines if list(line.get_xdata()) == [0, 1]]
+
+
+def _check_powers(table: pd.DataFrame) -> None:
+    """The power of a regime goes from one of its rates to another, and not into the other regime."""
+    x = table.loc[table["what"] == "power fitted", "x"]
+    assert set(x) <= set(table.loc[table["what"] == "data", "x"])
+    for first, last in zip(x.iloc[::2], x.iloc[1::2], strict=True):
+        assert first < last < 1 or 1 <= first < last
+
+
 def _check_exponentials(table: pd.DataFrame) -> None:
     """A relaxation falls with the rate that its label tells to three digits."""
     told = table["curve"].str.extract(r"^b = ([\d.]+)", expand=False).astype(float)
-    assert told.notna().any()
+    for law in ("weights 1/variance", "all times alike", "of eq. 4.12"):
+        assert table["curve"].str.endswith(law).any(), f"{law} is not drawn"
     for (panel, curve), rows in table[told.notna()].groupby(["panel", "curve"]):
         rate = -np.polyfit(rows["x"], np.log(np.abs(rows["y"])), 1)[0]
         assert abs(rate / told[rows.index[0]] - 1) < 0.01, (panel, curve, rate)

@@ -14,7 +14,7 @@ from mdr_dask import bootstrap, execute, store
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
-from mdr_dask.execute import Part, Resources
+from mdr_dask.execute import Part, Resources, stages
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.interpolant import law
 from mdr_dask.models.base import Status
@@ -305,3 +305,42 @@ def test_a_figure_has_the_values_that_each_curve_needed(study, url):
         assert not needed.all()
         np.testing.assert_allclose(line.get_xdata(), one.x.to_numpy()[needed])
         np.testing.assert_allclose(line.get_ydata(), one.y.mean("realisation").to_numpy()[needed])
+
+
+@pytest.mark.parametrize(
+    ("until", "outputs", "message"),
+    [
+        (
+            "{film: 1 %}",
+            "film, minimum_film",
+            "speed_parameter.until.film: expected an output of one number a case, this",
+        ),
+        ("1 %", "film", "until: expected an output of one number a case to refine by, this study has none"),
+    ],
+)
+def test_an_axis_is_refined_by_outputs_of_one_number(until, outputs, message):
+    speeds = f"{{adaptive: [1e-12, 1e-10], until: {until}}}"
+    parameters = f"load_parameter: 2e-5, material_parameter: 5000, speed_parameter: {speeds}"
+    with pytest.raises(CampaignError) as refused:
+        loads(f"name: c\nmodel: ehl_line\nparameters: {{{parameters}}}\noutputs: [{outputs}]\n", "c.yaml", ".")
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize("errors", [True, False])
+def test_an_axis_is_refined_by_means_with_the_errors_of_their_grids(errors, url, monkeypatch):
+    """Where the store holds them."""
+    seen, of = [], stages.Mean.of
+    monkeypatch.setattr(
+        stages.Mean, "of", lambda values, done, error: seen.append((values, error)) or of(values, done, error)
+    )
+    body = "shear_modulus: 10 MPa, relaxation_time: 1 ms, normal_force: 1 N"
+    lines = f"length: 20 mm, points: 300, rms_roughness: 1 um, {body}"
+    speeds = "{adaptive: [1 mm/s, 1 m/s], until: {friction_coefficient: 50 %}}"
+    campaign = f"name: c\nmodel: sliding_friction\nrealisations: 2\nerrors: {str(errors).lower()}\n"
+    run(loads(f"{campaign}parameters: {{{lines}, velocity: {speeds}}}\n", "c.yaml", "."), url)
+    data = store.datasets(url)[""]
+    values, error = seen[-1]
+    np.testing.assert_array_equal(np.sort(np.ravel(values)), np.sort(np.ravel(data["friction_coefficient"])))
+    assert (error is not None) == errors
+    if errors:
+        np.testing.assert_array_equal(np.sort(np.ravel(error)), np.sort(np.ravel(data["friction_coefficient_error"])))

@@ -14,6 +14,7 @@ from mdr_dask.campaign import Replication, Tolerance, loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, FitError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.fits import answers
 from mdr_dask.fits.base import Fit
 
 TEXT = """
@@ -155,6 +156,20 @@ def test_what_more_realisations_cannot_narrow_ends_the_rounds(own, url):
     told.clear()
     run(own(Tolerance(absolute=0.8), at_most=2000, answer="missed.level"), url + "2", tell=told.append)
     assert not [event for event in told if event.name == "not answered"]
+
+
+@pytest.mark.parametrize("doubted", ["more", "less"])
+def test_what_is_left_without_scatter_is_the_less_of_two_looks(doubted):
+    """With a little less scatter and a little more; at one of both the law is doubted, by half of its interval."""
+
+    def law(series):
+        scatter = series[""]["height"].std("realisation")
+        half = scatter.where((scatter > 1.005) != (doubted == "more"), 0.5 * (1 + scatter))
+        return xr.Dataset({"level": 0 * half, "level_low": -half, "level_high": half})
+
+    heights = xr.Dataset({"height": ("realisation", [-1.0, 1.0])})
+    (left,) = answers.without_scatter(dataclasses.replace(LEVEL, compute=law), "level", {"": heights}).values()
+    assert float(left) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_zone_one_goes_on_in_region_one_alone_and_ends_narrow_enough(url):

@@ -156,10 +156,12 @@ def test_no_shipped_campaign_is_asked_about(path):
     assert load(path).remarks == ()
 
 
-def test_moduli_of_no_solid_are_asked_about(files, capsys):
-    (files / "rubber.csv").write_text(rubber((0, 20, 50)).replace("MPa", "mPa"))
+@pytest.mark.parametrize(("unit", "ends"), [("mPa", "1.079 mPa to 35.62 mPa"), ("TPa", "1.079 TPa to 35.62 TPa")])
+def test_moduli_of_no_solid_are_asked_about(files, capsys, unit, ends):
+    """Softer than a gel, stiffer than diamond."""
+    (files / "rubber.csv").write_text(rubber((0, 20, 50)).replace("MPa", unit))
     assert main(["check", "tyre.yaml"]) == 0
-    told = r"rubber.csv: shear moduli of 1.079 mPa to 35.62 mPa are those of no solid: is the unit right\?"
+    told = rf"rubber.csv: shear moduli of {ends} are those of no solid: is the unit right\?"
     assert re.search(told, capsys.readouterr().out)
 
 

@@ -46,6 +46,17 @@ MISTAKES = [
     ("accuracy: 1 %", "store: a.zarr", "14:8: store: expected a mapping, got 'a.zarr' (write {path: a.zarr})"),
     ("accuracy: 1 %", "sampling: sobol", "expected 'grid' or 'zip', got 'sobol' (write {sobol: ...})"),
     ("name: study", "name: my study", "1:7: name: expected letters, digits, '-', '_' and '.' only, for it names a fi"),
+    (
+        "realisations: 2",
+        "realisations: {at_least: 4, at_most: 40, until: {zone_one.alpha: little}}",
+        "4:66: realisations.until.zone_one.alpha: expected a number, got 'little'",
+    ),
+    ("name: study", f"name: {'a' * 101}", "1:7: name: expected at most 100 characters, for it names a file of the sto"),
+    (
+        "name: study",
+        f"name: {'a' * 92}.partial",
+        "name: expected no such ending, for it names a file of the store, got",
+    ),
     # numbers
     ("hurst: 0.7", "hurst: 0,7", "8:10: parameters.hurst: expected a number, got '0,7' (write a decimal point: '0.7')"),
     ("0.5 um", "0,5 um", f"{LENGTH} '0,5 um' (write a decimal point: '0.5 um')"),

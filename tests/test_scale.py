@@ -16,6 +16,7 @@ from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources, run
 from mdr_dask.store import ledgers, sound
 from mdr_dask.store.records import opened, sealed
+from mdr_dask.store.seals import read_seal
 
 
 @pytest.fixture
@@ -120,6 +121,16 @@ def test_a_copy_of_a_study_is_read_again_and_sealed_by_the_next_run(url, tmp_pat
     campaign = toy.campaign(toy.axis("position", np.arange(1.0, 14.0).tolist()), fail_above=12.5)
     run(replace(campaign, replication=toy.Replication(5, 5, {})), copy, Resources(), lambda _: None)
     assert store.look(copy, "").is_sealed
+
+
+def test_a_chunk_that_is_not_what_was_written_has_no_stamp_in_the_seal(url):
+    Path(url, "status/seal.json").unlink()
+    swap_names(Path(url, "height/c/2/1"), Path(url, "height/c/6/0"))
+    store.seal(url, "")
+    seal, stamps = read_seal(url, ""), store.look(url, "").stamps
+    assert np.argwhere(seal.stamps["height"] != stamps["height"]).tolist() == [[2, 1], [6, 0]]
+    assert seal.stamps["height"][[2, 6], [1, 0]].tolist() == [0, 0]
+    assert np.array_equal(seal.stamps["status"], stamps["status"])
 
 
 def test_a_seal_that_is_damaged_or_of_another_study_is_no_seal(url):

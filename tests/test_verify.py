@@ -17,7 +17,7 @@ from mdr_dask import execute, store
 from mdr_dask.cli import main
 from mdr_dask.errors import StoreError
 from mdr_dask.execute import Resources
-from mdr_dask.store.records import digest
+from mdr_dask.store.records import digest, name_of, sealed
 from mdr_dask.task import run_block
 
 
@@ -286,3 +286,53 @@ def test_a_task_is_done_once(toy, url, monkeypatch):
     with pytest.raises(StoreError, match="nothing was written"):
         run_block(late)
     assert run(small(toy), url).done == 12
+
+
+def empty(path):
+    path.write_bytes(b"")
+
+
+def retitled(path):
+    held = json.loads(path.read_text())
+    path.write_text(json.dumps({**held, "attributes": {**held["attributes"], "title": "another"}}))
+
+
+def of_another_block(path):
+    (path.parent / Path(name_of("", (0, 0), 1)).name).write_bytes(
+        sealed({"attempt": 1, "block": [1, 0], "chunks": {"status": "ab"}, "messages": []})
+    )
+
+
+def of_no_block(path):
+    path.write_bytes(
+        path.read_bytes().rstrip()
+        + b"\n"
+        + sealed({"attempt": 1, "block": [9, 9], "chunks": {"status": "ab"}, "messages": []})
+        + b"\n"
+    )
+
+
+RECORDS = "status/records/*.jsonl"
+
+
+@pytest.mark.parametrize(
+    ("name", "harm", "kind", "told", "what"),
+    [
+        (RECORDS, empty, "damaged", None, "an empty record"),
+        (RECORDS, of_no_block, "foreign", None, "the record of block [9, 9], which is none"),
+        (RECORDS, of_another_block, "swapped", name_of("", (0, 0), 1), "the record of block [1, 0]"),
+        ("status/c/0/0", Path.unlink, "missing", None, "the ledger of a block that was done"),
+        ("zarr.json", Path.unlink, "missing", None, "the metadata of the study"),
+        ("zarr.json", retitled, "damaged", None, "not what was laid out"),
+    ],
+)
+def test_each_fault_is_told_in_its_words(toy, url, name, harm, kind, told, what):
+    """And mended, but for a record that is nobody's among those of others."""
+    run(small(toy), url)
+    (path,) = Path(url).glob(name)
+    harm(path)
+    found = {(each.kind, each.name, each.what) for each in store.verify(url).findings}
+    assert (kind, told or str(path.relative_to(url)), what) in found
+    store.repair(url)
+    run(small(toy), url)
+    assert [each.kind for each in store.verify(url).findings] == ["foreign"] * (kind == "foreign")

@@ -84,8 +84,9 @@ def draw_jump(groups: Mapping[str, xr.Dataset]) -> Figure:
                 law = jump_law(np.asarray(curve.data[names[0]].values), LAW)
                 drawing.law(axes, speed, law, ":", name="eq. 4.11", of=curve.data, color=curve.colour, lw=1)
         axes.set(xlabel=style.label("velocity", found["velocity"]), ylabel=label)
-        style.logarithmic(axes, "xy")
     panels[1].plot([], [], "k:", lw=1, label=f"eq. 4.11 with {LAW}, from $\\mu_1$ on the left")
+    for axes in panels:
+        style.logarithmic(axes, "xy")
     curves.finish(figure, panels[1], family)
     _title(figure, "friction before the jump, and the jump", family.held, name)
     style.leave_out(figure, [*family.left_out, *told])

@@ -15,6 +15,7 @@ from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import available
 from mdr_dask.fits.calibration import LEAST, calibrate, calibration, summary
+from mdr_dask.fits.determined import written
 from mdr_dask.fits.posterior import Likelihood, Noise
 from mdr_dask.fits.prediction import prediction
 from mdr_dask.plots.calibration import PARTS, _of_whole_cells
@@ -288,3 +289,9 @@ def test_the_error_of_measurement_is_told_where_it_was_not_given(given):
     assert len(told) == (not given)
     if not given:  # equal shares were planted; forty residuals tell their size to an eighth
         assert found["relative_measurement_error"].item() == pytest.approx(0.03, rel=0.35)
+
+
+def test_a_product_is_written_in_halves_and_thirds():
+    """And in a decimal number where it is neither."""
+    powers = np.array([1.0, 2.0, 0.5, -1 / 3, 0.25, 0.0])
+    assert written("abcdef", powers) == "a x b^2 x c^(1/2) x d^(-1/3) x e^0.25"

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.stats import norm, t
 
 from mdr_dask.errors import FitError
-from mdr_dask.fits import available
+from mdr_dask.fits import available, kinetics
 from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.kinetics import relaxation_curves
 from mdr_dask.fits.relaxation import exponential, widths
@@ -203,3 +204,21 @@ def test_curves_of_a_relaxation_are_those_of_its_constants():
     alike = -np.polyfit(found["t"], np.log(found["alike"]), 1)[0]
     assert alike == pytest.approx(found["rate_unweighted"].item())
     assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))
+
+
+def test_rates_count_in_a_power_as_well_as_their_logarithms_are_known():
+    """Half-widths of logarithms are those of a bootstrap of eight realisations; one rate is hardly known."""
+    x, scatter = np.log([2.0, 5.0, 10.0, 20.0, 50.0]), np.array([0.02, 0.05, 0.1, 0.19, 0.6])
+    random = np.random.default_rng(3)
+    logs = 0.4 * x + np.append([[0.0, 0.02, -0.05, 0.05, 0.0]], scatter * random.standard_normal((400, 5)), axis=0)
+    power, factor, deviation, number, _ = kinetics._power(x, np.exp(logs), np.full(5, 8))
+    low, high = np.quantile(logs[1:], [0.025, 0.975], axis=0)
+    half = np.sqrt(8 / 7) * t.ppf(0.975, 7) / norm.ppf(0.975) * (high - low) / 2
+    good = half < 0.5
+    assert good.tolist() == [True] * 4 + [False]
+    weights = 1 / ((half[good] / 2) ** 2 + 0.1**2)
+    slope, level = np.polyfit(x[good], logs[0, good], 1, w=np.sqrt(weights))
+    assert number == 4
+    assert power[0] == pytest.approx(slope, rel=1e-9)
+    assert factor == pytest.approx(np.exp(level), rel=1e-9)
+    assert deviation == pytest.approx(np.std(logs[0, good] - slope * x[good] - level), rel=0.5)

@@ -110,6 +110,17 @@ def test_saved_curves_can_be_rereferenced(tmp_path):
     assert again["curve_abscissa"].attrs["measured_low"] == pytest.approx(1.0)
 
 
+def test_vertical_bootstrap_is_kept_and_referenced_anew():
+    curve = master_curve(store()[["friction_coefficient"]], vertical=True, draws=5)
+    velocity = float(curve["velocity"][1])
+    moved = rereferenced(xr.Dataset.from_dict(curve.to_dict()), velocity)
+    shifted = curve["vertical_draws"] - curve["vertical_draws"].sel(velocity=velocity)
+    np.testing.assert_allclose(moved["vertical_draws"], shifted, atol=1e-12)
+    ends = shifted.quantile([0.15865, 0.84135], "draw")
+    np.testing.assert_allclose(moved["vertical_factor_bootstrap"], ends.diff("quantile").squeeze() / 2, atol=1e-12)
+    assert np.all(moved["vertical_factor_bootstrap"].drop_sel(velocity=velocity) > 0)
+
+
 def test_bootstrap_is_kept_and_referenced_anew():
     curve = master_curve(store()[["friction_coefficient"]], draws=5)
     assert curve["draws"].shape == (5, 7)

@@ -6,6 +6,7 @@ import xarray as xr
 from friction_store import store
 
 from mdr_dask.errors import FitError
+from mdr_dask.fits import scaling
 from mdr_dask.fits.friction import numbers
 from mdr_dask.fits.scaling import FITS, contact_slope_law
 from mdr_dask.physics.sliding import laws
@@ -109,6 +110,18 @@ def test_curves_collapse_and_tell_their_shifts(lines):
     assert coverage(found, "vertical", -UP * decades) >= LEAST
     assert judged(found, "yes") == 1
     assert np.all(found["collapsed"] > 0.99)
+
+
+def test_curves_without_scatter_collapse_onto_a_curve_that_bends_as_they_do():
+    """Five bells in a row, each seen in part: what holds the curve between the points does not bend it off them."""
+    place = np.linspace(-1.5, 1.5, 21)
+    along, up = np.array([0.0, 0.4, 0.9, 1.3, 1.8]), np.array([0.0, 0.1, -0.2, 0.3, 0.1])
+    x = (place[None] + 0.0 * along[:, None]).ravel()
+    member = np.repeat(np.arange(5), place.size)
+    row = -np.log(np.cosh(x + along[member])) - up[member]
+    found = scaling.collapse(x, row[None], member, along + 0.1, 0)
+    np.testing.assert_allclose(found.shifts[0], [along, up], atol=0.01)
+    assert np.max(np.abs(found.residuals)) < 0.01
 
 
 @LINES

@@ -325,3 +325,30 @@ def test_an_accuracy_is_met_by_the_first_solution_and_its_two_rougher_ones(monke
     assert len(marches) == 3 + 1  # one of the truth
     assert np.all(errors <= accuracy * volumes)
     assert np.all(np.abs(volumes - [worn.wear_volume for worn in truth]) <= errors)
+
+
+LISTED = {"indenter", "amplitude", "cycles"}
+
+
+@pytest.mark.parametrize(
+    ("indenter", "path", "values"),
+    [
+        (Parabola(radius=0.01), "indenter.radius", [0.005, 0.02]),
+        (Cone(shape="cone", angle=0.1), "indenter.angle", [0.05, 0.2]),
+        (Power(shape="power", coefficient=20.0, exponent=3.0), "indenter.coefficient", [1e5, 4e5]),
+        (Power(shape="power", coefficient=20.0, exponent=3.0), "indenter.exponent", [1.5, 2.5]),
+        *((STEEL["indenter"], name, [0.1 * STEEL[name], 0.2 * STEEL[name]]) for name in ("amplitude", "cycles")),
+        *((STEEL["indenter"], name, [0.9 * STEEL[name], 0.8 * STEEL[name]]) for name in STEEL if name not in LISTED),
+    ],
+)
+def test_an_axis_over_any_number_gives_what_single_cases_give(indenter, path, values):
+    given = FrettingWear(**STEEL | {"indenter": indenter, "amplitude": 2e-7, "wear_rule": "fast", "hold": "force"})
+    together = run(given, {path: np.array(values)})
+    assert np.all(together.status == Status.DONE)
+    assert np.ptp(together.values["wear_volume"]) > 1e-3 * np.max(together.values["wear_volume"])
+    *_, name = path.split(".")
+    for case, value in enumerate(values):
+        changed = {"indenter": indenter.model_copy(update={name: value})} if "." in path else {name: value}
+        alone = run(given.model_copy(update=changed))
+        for output in SCALARS:
+            assert together.values[output][case] == pytest.approx(alone.values[output][0], rel=1e-9, nan_ok=True)

@@ -317,6 +317,10 @@ def test_errors_of_the_film_are_those_of_its_solution():
         assert formula[f"{name}_error"] == 0.0
         assert 0 < coarse[f"{name}_error"] < 0.05 * coarse[name]
         assert abs(coarse[name] - fine[name]) <= coarse[f"{name}_error"] + fine[f"{name}_error"]
+    thinner = float(coarse["film"][0, 0] - coarse["film_error"][0, 0])
+    thin = MODEL.compute(block(names, **given | {"film_thickness": thinner})).values
+    for name in names:
+        assert coarse[f"{name}_error"] == pytest.approx(abs(thin[name] - coarse[name]), rel=1e-6)
 
 
 def test_what_misses_the_accuracy_is_named():

@@ -205,3 +205,18 @@ def test_the_error_of_a_history_is_that_of_half_the_nodes_in_half_the_steps(monk
     (fine, coarse) = sorted(asked, reverse=True)
     assert fine[0] == pytest.approx(2 * coarse[0], abs=2)
     assert fine[1] == 2 * coarse[1]
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,0.05\n2,0.1\n1,0.1", "expected times that start at 0 and do not fall"),
+        ("0,0.05\n2,x", "expected a number, got 'x'"),
+    ],
+)
+def test_a_table_that_is_no_history_is_refused_where_it_is_named(tmp_path: Path, rows: str, message: str) -> None:
+    (tmp_path / "rig.csv").write_text(f"time [ms],velocity [m/s]\n{rows}\n")
+    context = {"to_si": lambda value, unit: value, "directory": tmp_path}
+    given = block().parameters.model_dump(exclude={"protocol"}, exclude_none=True)
+    with pytest.raises(ValidationError, match=message):
+        VelocityJump.model_validate(given | {"protocol": {"shape": "table", "file": "rig.csv"}}, context=context)

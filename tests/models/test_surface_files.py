@@ -137,3 +137,18 @@ def test_a_scan_is_no_map_and_a_map_no_scan(tmp_path):
     topography.UniformLineScan(HEIGHT[0], 1.0, unit="m").to_netcdf(str(tmp_path / "line.nc"))
     assert "expected a line scan, got a map" in refused(tmp_path, scan="map.nc")
     assert "expected a map, got a line scan" in refused(tmp_path, map="line.nc")
+
+
+def test_a_spectrum_goes_on_by_its_power_law_where_that_is_asked_for(tmp_path):
+    """Rows of a self-affine surface to twice its shortest wave: beyond them it has the gradient of the whole one."""
+    whole = self_affine(0.7, LENGTH / 4, LENGTH / 256, 1e-6)
+    shorter = whole.between(LENGTH / 4, LENGTH / 64)
+    q, density = shorter.wavenumber, shorter.density
+    rows = "\n".join(f"{one:.12g},{other:.12g}" for one, other in zip(q, density, strict=True))
+    (tmp_path / "road.csv").write_text(f"q [rad/m],C2D [m^4]\n{rows}\n")
+    ends = {"longest_wavelength": LENGTH / 4, "shortest_wavelength": LENGTH / 256}
+    given = {"spectrum": {"files": ["road.csv"]}, **ends}
+    (found,) = spectra_of(surface(tmp_path, **given, extrapolate=True))
+    assert found.rms_gradient() == pytest.approx(whole.rms_gradient(), rel=1e-3)
+    assert shorter.rms_gradient() < 0.8 * found.rms_gradient()
+    assert "expected shortest_wavelength of at least 3.125e-05 m, where the spectrum ends" in refused(tmp_path, **given)

@@ -223,6 +223,17 @@ def test_accuracy_holds_for_the_ends_and_the_jump() -> None:
     assert max(uncovered.values()) <= 2
 
 
+def test_peaks_are_judged_by_the_nodes_of_every_grid_that_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The least errors are those of its own oversampling, which doubles until the accuracy is met."""
+    seen, least = [], jumps._least
+    monkeypatch.setattr(jumps, "_least", lambda ends, *of: seen.append((of, least(ends, *of))) or least(ends, *of))
+    found = compute(Block(parameters(oversampling=4), {}, 1, (0,), 5, MODEL.with_companions(ENDS), 1e-4))
+    assert [of for of, _ in seen] == [(BASE["points"], 4 * 2**k) for k in range(len(seen))]
+    assert len(seen) > 1
+    for name in ENDS:
+        assert found.values[f"{name}_error"][0, 0] >= seen[-1][1].min() * abs(found.values[name][0, 0])
+
+
 @pytest.mark.parametrize("seed", range(0, 60, 6))
 def test_ends_are_the_steady_solvers(seed: int) -> None:
     case = random_jump(seed)

@@ -82,6 +82,9 @@ def test_the_elastomer_fills_its_panels(groups):
         assert low < elastomer.min() < elastomer.max() < high
         drawn = np.ptp(elastomer) if axes in figure.axes[::2] else np.ptp([*elastomer, *axes.lines[0].get_ydata()])
         assert drawn > 0.7 * (high - low)
+    for whole, part in zip(figure.axes[::2], figure.axes[1::2], strict=True):
+        shares = [np.isfinite(axes.lines[2].get_ydata()).mean() for axes in (whole, part)]
+        assert abs(shares[1] - 0.5) < 0.15 or abs(shares[1] - 0.5) < abs(shares[0] - 0.5)
 
 
 def test_lines_have_the_height_of_the_campaign_and_the_same_phases(groups):

@@ -13,7 +13,7 @@ from mdr_dask.models.base import Block
 from mdr_dask.models.ehl_line.declaration import MODEL, STEEL, EhlLineParameters, coordinates
 from mdr_dask.models.ehl_line.solve import compute
 from mdr_dask.physics.lubrication.film_formulas import REGIMES
-from mdr_dask.plots.ehl import PLOTS
+from mdr_dask.plots.ehl import PLOTS, _apart
 from mdr_dask.plots.style import DATA
 
 CONTACT = {"load_parameter": 2.0452e-5, "speed_parameter": 1e-11, "material_parameter": 5007.0}
@@ -100,6 +100,11 @@ def test_starvation_and_traction_follow_their_axes() -> None:
     sliding = series(("traction_coefficient",), {"slide_roll_ratio": np.array([0.001, 0.01])}, shear_law="eyring")
     line = DRAW["traction"]({"": sliding}).axes[0].lines[0]
     assert np.all(np.diff(line.get_ydata()) > 0)
+
+
+def test_labels_of_inlets_stand_a_twenty_fifth_of_their_axis_apart() -> None:
+    shown = _apart(np.array([-20.0, -10.0, -9.3, -8.9, -2.0]))
+    assert shown.tolist() == [-20.0, -10.0, -8.9, -2.0]
 
 
 @pytest.mark.parametrize("name", list(DRAW))

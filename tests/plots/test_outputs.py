@@ -313,6 +313,14 @@ def test_numbers_are_shown_in_the_unit_that_stands_behind_them(name):
     assert quantity.of(293.7) * factor + zero == pytest.approx(293.7, rel=1e-12)
 
 
+@pytest.mark.parametrize(("unit", "there"), [("degC", 20.0), ("K", 293.15)])
+def test_a_temperature_is_shown_in_the_unit_asked_for(unit, there):
+    """Its zero lies elsewhere."""
+    temperature = xr.DataArray(293.15, attrs={"units": "K"})
+    with page.drawing_for(page.Page(units={"temperature": unit})):
+        assert style.shown("temperature", temperature) == pytest.approx(there, rel=1e-12)
+
+
 @pytest.mark.parametrize("low", [0.02, 0.2, 2.0, 200.0])
 def test_an_axis_of_less_than_two_decades_has_plain_numbers(low):
     axes = Figure().subplots()

@@ -53,6 +53,11 @@ HOLD = [
     ("not scheme == hermite", 0),
     ("odd > 1.5", [0, 1, 1]),
     ("log10(pressure / 1 Pa) < 6.1", [1, 0, 0]),
+    ("velocity + 1 km/h - 1 km/h < 3 km/h", [1, 0, 0]),
+    ("1 + velocity > 2.5 m/s", [0, 0, 1]),
+    ("sqrt(pressure) * sqrt(1 Pa) > 1.2 kPa", [0, 1, 1]),
+    ("1 / velocity > 0.9 s/m", [1, 1, 0]),
+    ("3 * pressure / 3 > 1.5 MPa", [0, 1, 1]),
 ]
 
 

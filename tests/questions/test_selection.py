@@ -79,6 +79,17 @@ def test_a_value_between_two_takes_the_nearest_and_says_so(study):
     assert told == ["velocity: 0.2 m/s is no value of this axis, the nearest is 0.1 m/s"]
 
 
+@pytest.mark.parametrize(("factor", "kept"), [(1 + 5e-6, True), (1 + 2e-5, False)])
+def test_an_end_of_an_axis_is_its_own_but_for_rounding(study, factor, kept):
+    """By a hundred thousandth of the largest value, whatever its unit."""
+    micro = study.assign_coords(velocity=study["velocity"] * 1e6)
+    if kept:
+        assert select(micro, [f"velocity={1e6 * factor!r}"], silent).velocity == 1e6
+    else:
+        with pytest.raises(DataError, match=r"no velocity 1.00002e\+06 m/s: it has the values"):
+            select(micro, [f"velocity={1e6 * factor!r}"], silent)
+
+
 def test_cases_of_a_sampled_study_are_selected_by_number_and_by_column(sampled):
     xr.testing.assert_identical(select(sampled, ["case=3,7..8"], silent), sampled.isel(case=[3, 7, 8]))
     xr.testing.assert_identical(select(sampled, ["velocity=0.5"], silent), sampled.isel(case=[4, 5]))

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from report_stores import HOSTILE, friction, hostile
 
-from mdr_dask import aggregation, plots, store
+from mdr_dask import aggregation, fits, plots, store
 from mdr_dask.cli import main
 from mdr_dask.execute import Resources, run
 from mdr_dask.report import cases, figures, page, read_study, words
@@ -37,6 +37,17 @@ def study(url):
 @pytest.fixture(scope="module")
 def html(study):
     return page([study])
+
+
+def test_constants_stand_under_their_names_and_units(study):
+    """Pure numbers have none; every law of the page is the table of its fit."""
+    assert study.laws
+    known = fits.available("sliding_friction")
+    for table in study.laws:
+        (found,) = known[table.title.split(":")[0].split(" ")[0]].results(store.datasets(study.url)).values()
+        for heading in table.headings[len(found.sizes) :]:
+            name, _, unit = heading.partition(" [")
+            assert unit.removesuffix("]") == found[name].attrs.get("units", "1").replace("1", ""), heading
 
 
 def test_a_page_is_one_file_that_names_no_other(html):

@@ -41,11 +41,6 @@ class SurfaceMap(NamedTuple):
     height: FloatArray
     size: tuple[float, float]
 
-    @property
-    def spacing(self) -> tuple[float, float]:
-        """Distances of points along x and y, m."""
-        return self.size[0] / self.height.shape[0], self.size[1] / self.height.shape[1]
-
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     """Return which points stick out of their four neighbours, by `FAR` times what is usual."""

@@ -5,6 +5,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.sliding import problem
 from mdr_dask.physics.surfaces import shapes as indenter
 
 SHAPES = ((0.3, 1.0), (0.2, 1.5), (0.5, 2.0), (1.0, 4.0))
@@ -90,6 +91,18 @@ def test_a_contact_that_leaves_the_line_fails(scheme):
     zeros, load = np.zeros(200), np.array([0.005, 0.2, 2.0])
     steady = under_indenter(zeros, zeros, 0.5, 2.0, np.full(3, 1e-3), load, scheme)
     assert steady.status.tolist() == [Outcome.CONVERGED, Outcome.OUTSIDE_LINE, Outcome.OUTSIDE_LINE]
+
+
+@pytest.mark.parametrize("deborah", [1e-6, 0.1])
+def test_the_closed_form_ends_where_an_edge_leaves_the_line(deborah):
+    """Its leading edge, which is the farther one, at half the line."""
+    loads = np.geomspace(0.02, 0.5, 200)
+    lead = solve(loads, np.full(200, deborah), 0.5, 2.0)[indenter.LEADING]
+    assert lead[0] < 0.49
+    assert np.any((lead > 0.5) & (lead < 0.51))
+    steady, _ = problem._closed_form(indenter.PowerLaw(0.5, 2.0), np.full(200, deborah), loads)
+    assert (steady.status == Outcome.OUTSIDE_LINE).tolist() == (lead > 0.5).tolist()
+    assert np.isnan(steady.drag).tolist() == (lead > 0.5).tolist()
 
 
 def test_low_velocity_gives_the_law():

@@ -50,10 +50,11 @@ def test_more_places_of_leaving_than_fit_are_told() -> None:
 
 
 @pytest.mark.parametrize("ratio", [0.2, 5.0])
-def test_wakes_are_within_their_bounds(ratio: float) -> None:
+@pytest.mark.parametrize(("size", "growth"), [(1.0, -9.0), (-0.05, 3.0), (0.05, 3.0)], ids=["slows", "falls", "rises"])
+def test_wakes_are_within_their_bounds(ratio: float, size: float, growth: float) -> None:
     """D u' + u of what left at any time is what the rate of the depth took, and that of what was free follows D."""
     time = np.append(0.0, np.geomspace(1e-3, 1, 30))
-    depth, rate = 1 + np.exp(-9 * time), -9 * np.exp(-9 * time)
+    depth, rate = 2 + size * np.exp(growth * time), size * growth * np.exp(growth * time)
     deborah = 100.0
     line = PreparedLine.of(periodic_line(np.cos(2 * np.pi * np.arange(64) / 64), None))
     first = line.patches(2.0, deborah / ratio, np.empty(SUMS))._replace(depth=2.0)

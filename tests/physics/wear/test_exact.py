@@ -8,12 +8,17 @@ from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.mdr.transforms import power_factor
 from mdr_dask.physics.wear import evolution as wear_evolution
 from mdr_dask.physics.wear import rules as wear
-from mdr_dask.physics.wear.exact import _fretted_contact, exact
+from mdr_dask.physics.wear.exact import _fretted_contact, exact, fretted_resolution
 from mdr_dask.physics.wear.slip import partial_slip
 
 PARABOLA = PowerProfile(2.0)
 RADII = np.array([0.5, 0.7, 0.9, 1.0, 1.1])
 SLID = 3.0 * (np.arange(2000) + 0.5) / 2000
+
+
+@pytest.mark.parametrize(("stick_radius", "wider"), [(0.5, 4.0), (0.9, 4.0), (0.95, 2.0), (1 - 1e-9, 1.0)])
+def test_steps_are_not_widened_where_the_annulus_of_slip_is_thin(stick_radius, wider):
+    assert fretted_resolution(stick_radius, 1e-3).wider == pytest.approx(wider, rel=1e-6)
 
 
 @pytest.fixture(scope="module")

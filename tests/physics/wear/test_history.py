@@ -32,6 +32,8 @@ def test_orders_of_the_uniform_grid():
     assert np.all(orders[:, 1] > 1.4)
     assert np.all(orders[:, 3] > 1.9)
     assert errors[-1][2] < 1e-3
+    inside = np.abs(grid.pressure(x**2, 1.003) - 2 / np.pi * np.sqrt(np.maximum(1.003 - x**2, 0)))
+    assert np.max(inside[x > 0.9]) < 1e-4  # an edge within a cell: 0.01 if it stood at the next node
 
 
 def test_literal_simulation_agrees_with_the_evolution_and_converges():

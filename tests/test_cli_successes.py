@@ -1,0 +1,196 @@
+"""Commands that succeed, in the forms and with the options that no other test asks for."""
+
+import io
+import json
+import os
+import sys
+import threading
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import planted
+import pytest
+import test_cli
+import xarray as xr
+from planted import SLIDING
+
+from mdr_dask import campaign, fits, models
+from mdr_dask.cli import main
+from mdr_dask.cli.results import list_names
+from mdr_dask.report import serving
+
+TABLE = Path(__file__).parent / "data/dma/time_user_raw.csv"
+
+
+@pytest.fixture
+def store(tmp_path, monkeypatch):
+    """A study of sliding friction whose numbers are planted: forces and velocities."""
+    monkeypatch.chdir(tmp_path)
+    axes = "  normal_force: {geometric: [1 mN, 100 N, 5]}\n  velocity: {geometric: [0.001 mm/s, 1 km/s, 6]}\n"
+    planted.make(tmp_path, SLIDING + axes)
+    return "study.zarr"
+
+
+def test_models_are_listed_with_what_they_are_for(capsys):
+    known = {name: models.load(name).summary for name in models.names()}
+    assert main(["models", "--json"]) == 0
+    assert {row["model"]: row["summary"] for row in json.loads(capsys.readouterr().out)} == known
+    assert main(["models"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in known)
+
+
+@pytest.mark.parametrize("command", [["init", "sliding_friction"], ["schema"]])
+def test_what_is_printed_is_what_a_file_would_hold(command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(command) == 0
+    printed = capsys.readouterr().out
+    assert main([*command, "-o", "campaign.yaml"]) == 0
+    assert Path("campaign.yaml").read_text() == printed
+    if command == ["schema"]:
+        assert json.loads(printed) == campaign.json_schema()
+    else:
+        assert main(["check", "campaign.yaml"]) == 0
+
+
+def test_laws_of_a_store_are_listed_each_with_its_sentence(store, capsys):
+    assert main(["fit", store]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    known = fits.available("sliding_friction")
+    assert [line.split("  ", 1)[0] for line in printed] == list(known)
+    assert [line.split("  ", 1)[1].strip() for line in printed] == [law.summary for law in known.values()]
+    assert len({line.index(law.summary) for line, law in zip(printed, known.values(), strict=True)}) == 1
+    list_names("toy", {})
+    assert capsys.readouterr().out == "none for toy\n"
+
+
+def test_a_table_can_be_given_to_a_calibration_and_to_nothing_else(store, capsys):
+    data = xr.open_zarr(store)
+    force = data["normal_force"].values[2]
+    at = data.sel(normal_force=force)["friction_coefficient"].mean("realisation")
+    rows = [f"{v},{m},{0.02 * m}" for v, m in zip(data["velocity"].values, at.values, strict=True)]
+    Path("rig.csv").write_text("\n".join(["velocity [m/s],friction_coefficient,standard_error", *rows]))
+    assert main(["fit", store, "calibration", "--measured", "rig.csv", "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["rows"]
+    assert found["normal_force_low"] < force < found["normal_force_high"]
+    assert main(["fit", store, "plateau", "--measured", "rig.csv"]) == 2
+    assert "--measured and --figure are for `calibration` alone" in capsys.readouterr().err
+
+
+def test_a_run_tells_its_counts_as_json(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("small.yaml").write_text(test_cli.CAMPAIGN)
+    for kept, done in ((0, 64), (64, 0)):
+        assert main(["run", "small.yaml", "--quiet", "--json"]) == 0
+        told = json.loads(capsys.readouterr().out)
+        assert told["store"] == "results/small.zarr"
+        assert (told["kept"], told["done"], told["failed"]) == (kept, done, 0)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["study.zarr", "--campaign", "study.yaml"], "--campaign is for --repair"),
+        (["study.zip", "--repair"], "--repair is for a store, not for a published zip; unpack it first"),
+    ],
+)
+def test_options_of_verify_that_do_not_go_together_are_refused(store, options, message, capsys):
+    Path("study.zip").touch()
+    assert main(["verify", *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_master_curve_of_a_store_is_that_of_its_table(store, capsys):
+    """Friction against velocity at each force, from the store and from a table of its means."""
+    data = xr.open_zarr(store)
+    mean = data["friction_coefficient"].mean("realisation").to_series()
+    rows = [f"{force},{velocity},{mu}" for (force, velocity), mu in mean.items()]
+    Path("means.csv").write_text("\n".join(["normal_force,velocity,mu", *rows]))
+    found = []
+    for source in (store, "means.csv"):
+        assert main(["master-curve", source, "--over", "velocity", "--by", "normal_force", "--json"]) == 0
+        found.append(json.loads(capsys.readouterr().out)["data_vars"]["shift_factor"]["data"])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6, atol=1e-9)
+
+
+def test_points_of_a_master_curve_are_its_table_shifted(capsys):
+    assert main(["master-curve", str(TABLE), "--show", "points", "--csv"]) == 0
+    lines = [line.split(",") for line in capsys.readouterr().out.splitlines()]
+    points = dict(zip(lines[0], np.array(lines[1:], dtype=float).T, strict=True))
+    groups = {name.split(" ")[0]: values for name, values in points.items()}
+    measured = np.loadtxt(TABLE, delimiter=",", skiprows=2)
+    assert len(groups["point_group"]) == len(measured)
+    assert main(["master-curve", str(TABLE), "--json"]) == 0
+    curve = json.loads(capsys.readouterr().out)
+    factors = dict(zip(curve["coords"]["T"]["data"], curve["data_vars"]["shift_factor"]["data"], strict=True))
+    shift = np.array([factors[group] for group in groups["point_group"]])
+    unshifted = np.sort(np.log10(groups["point_abscissa"]) - shift)
+    np.testing.assert_allclose(unshifted, np.sort(np.log10(measured[:, 0])), atol=1e-4)
+
+
+def test_a_surface_is_told_as_a_table_with_intervals(tmp_path, monkeypatch, capsys):
+    """What is not known of a scan has no column."""
+    monkeypatch.chdir(tmp_path)
+    place, height = np.arange(400) * 1e-2, np.random.default_rng(0).standard_normal(400).cumsum()
+    np.savetxt("scan.csv", np.column_stack([place, height]), delimiter=",", header="x [mm],z [um]", comments="")
+    assert main(["surface", "scan.csv"]) == 0
+    table = capsys.readouterr().out.splitlines()
+    assert main(["surface", "scan.csv", "--json"]) == 0
+    (row,) = json.loads(capsys.readouterr().out)["rows"]
+    unknown = [name for name, value in row.items() if value is None]
+    assert unknown
+    assert not set(unknown) & set(table[0].split())
+    assert f"{row['rms_height']:.6g}" in table[1].split()
+    if "hurst" in table[0].split():
+        assert f"{row['hurst']:.4g} ({row['hurst_low']:.4g}, {row['hurst_high']:.4g})" in table[1]
+
+
+def test_an_interrupted_command_says_that_nothing_is_lost(monkeypatch, capsys):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaign, "json_schema", stopped)
+    assert main(["schema"]) == 130
+    assert capsys.readouterr().err.strip().startswith("interrupted; nothing is lost: the same command goes on")
+
+
+def test_a_reader_that_has_read_enough_is_no_error(monkeypatch, tmp_path):
+    """As in `mdr-dask models | head -1`; what is still to be written goes nowhere."""
+
+    class Closed(io.TextIOWrapper):
+        def write(self, text):
+            raise BrokenPipeError
+
+    with (tmp_path / "pipe").open("wb") as pipe:
+        closed = Closed(pipe)
+        monkeypatch.setattr(sys, "stdout", closed)
+        assert main(["models", "--json"]) == 0
+        assert os.path.samestat(os.fstat(pipe.fileno()), Path(os.devnull).stat())
+        monkeypatch.undo()
+
+
+def test_a_page_is_served_until_ctrl_c(store, monkeypatch, capsys):
+    served = []
+
+    def serve_forever(server):
+        served.append(server.address)
+        with urllib.request.urlopen(f"{server.address}progress", timeout=60) as answer:
+            served.append(json.load(answer))
+        raise KeyboardInterrupt
+
+    def asked_once(server):
+        thread = threading.Thread(target=server.handle_request)
+        thread.start()
+        try:
+            serve_forever(server)
+        finally:
+            thread.join()
+
+    monkeypatch.setattr(serving.Server, "serve_forever", asked_once)
+    assert main(["serve", store]) == 0
+    out, err = capsys.readouterr()
+    assert out.strip() == served[0]
+    assert served[1]["results"] == 120
+    assert err.split()[-1] == "ended"
+    assert "other machines" not in err
