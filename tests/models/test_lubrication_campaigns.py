@@ -213,9 +213,9 @@ def test_ranges_that_are_left_stand_beside_the_results(capsys):
     assert "film formula Pan-Hamrock (central): W = " in told["line"]
 
 
-@pytest.mark.parametrize(("errors", "turns"), [("true", 4), ("false", 12)])
+@pytest.mark.parametrize(("errors", "turns"), [("true", 4), ("false", 7)])
 def test_turns_that_know_their_own_scatter_end_a_campaign_early(errors, turns):
-    """Four turns whose parts tell a standard error below the tolerance are enough; without that, ten must scatter."""
+    """Four turns whose parts tell a standard error below the tolerance are enough; without that, seven must scatter."""
     until = "\nrealisations: {at_least: 4, at_most: 40, until: {breakthrough_probability: {absolute: 0.1}}}"
     dataset = results(MIXED + f"errors: {errors}\n", ("\nseed: 5", f"\nseed: 5{until}"))
     probability = dataset.breakthrough_probability
