@@ -12,6 +12,7 @@ from mdr_dask.physics.transients.elements.follow import (
     Response,
     follow_line,
     steady_start,
+    untouched,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
@@ -208,6 +209,25 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
         line, KELVIN, Schedule(moments, 0.05 * moments, 0.05 * one, 0.05 * np.exp(moments)), state, depth
     )
     assert (status, found.status) == (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
+
+
+@pytest.mark.parametrize("solid", [KELVIN, SERIES])
+def test_elements_that_left_an_indenter_while_touched_are_new_ones(solid: Foundation) -> None:
+    """A step past the whole line leaves nothing of what was: the rest is as if nothing had been touched before."""
+    line = bowl(100)
+    state, depth, _ = steady_start(line, solid, 0.05, 0.05)
+    moments = np.array([0.0, 1.0, 1.1, 1.2])
+    travels, one = np.array([0.0, 1.03, 1.05, 1.07]), np.ones(moments.size)
+    assert state.touching.any()
+    found, fresh = (
+        follow_line(line, solid, Schedule(moments, travels, 0.2 * one, 0.05 * one), each, depth)
+        for each in (state, untouched(100, solid.times.size))
+    )
+    assert (found.status, fresh.status) == (Outcome.CONVERGED, Outcome.CONVERGED)
+    np.testing.assert_allclose(found.displacement, fresh.displacement, rtol=0, atol=1e-12)
+    for name in ("drag", "depth", "contact", "stored"):
+        np.testing.assert_allclose(getattr(found, name)[1:], getattr(fresh, name)[1:], rtol=1e-9)
+    np.testing.assert_allclose(np.diff(found.work), np.diff(fresh.work), rtol=1e-9)
 
 
 def test_rest_is_static() -> None:
