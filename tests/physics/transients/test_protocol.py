@@ -214,19 +214,16 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
 @pytest.mark.parametrize("solid", [KELVIN, SERIES])
 def test_elements_that_left_an_indenter_while_touched_are_new_ones(solid: Foundation) -> None:
     """A step past the whole line leaves nothing of what was: the rest is as if nothing had been touched before."""
-    line = bowl(100)
+    line, speed, travels = bowl(100), 10.0, np.array([0.0, 1.03, 1.05])
     state, depth, _ = steady_start(line, solid, 0.05, 0.05)
-    moments = np.array([0.0, 1.0, 1.1, 1.2])
-    travels, one = np.array([0.0, 1.03, 1.05, 1.07]), np.ones(moments.size)
-    assert state.touching.any()
+    schedule = Schedule(travels / speed, travels, np.full(3, speed), np.full(3, 0.05))
     found, fresh = (
-        follow_line(line, solid, Schedule(moments, travels, 0.2 * one, 0.05 * one), each, depth)
-        for each in (state, untouched(100, solid.times.size))
+        follow_line(line, solid, schedule, each, depth) for each in (state, untouched(100, solid.times.size))
     )
+    assert state.touching.any()
     assert (found.status, fresh.status) == (Outcome.CONVERGED, Outcome.CONVERGED)
     np.testing.assert_allclose(found.displacement, fresh.displacement, rtol=0, atol=1e-12)
-    for name in ("drag", "depth", "contact", "stored"):
-        np.testing.assert_allclose(getattr(found, name)[1:], getattr(fresh, name)[1:], rtol=1e-9)
+    np.testing.assert_allclose(found.depth[1:], fresh.depth[1:], rtol=1e-9)
     np.testing.assert_allclose(np.diff(found.work), np.diff(fresh.work), rtol=1e-9)
 
 

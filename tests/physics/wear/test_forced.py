@@ -286,6 +286,13 @@ def test_a_march_goes_no_further_than_what_is_wanted(monkeypatch):
     assert taken[0] < 0.6 * taken[1]
 
 
+def test_steps_are_judged_by_the_depth_as_by_the_slip(monkeypatch):
+    """By a depth that counts a thousandfold there were eight times as many."""
+    tried = count_steps(monkeypatch)
+    exact_forced(PARABOLA, 0.455, [0.5], 1e-3, errors=False)
+    assert len(tried) < 80
+
+
 def test_a_march_whose_steps_shrink_without_end_gives_up(monkeypatch):
     """Steps went down to a billionth of the first one, a thousand of them; no march that got through needed a tenth."""
     tries = []
