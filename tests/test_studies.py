@@ -3,6 +3,7 @@
 import io
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from types import ModuleType, SimpleNamespace
 
@@ -257,6 +258,22 @@ def test_a_notebook_has_a_bar_below_its_cell(monkeypatch):
     assert "preparing" in shown[0]
     assert 'value="4" max="10"' in shown[1]
     assert shown[-1] == ""
+
+
+def test_a_run_in_a_notebook_moves_its_bar(monkeypatch):
+    shown = []
+    room = ModuleType("IPython.display")
+    room.HTML = str
+    room.display = lambda html, display_id: SimpleNamespace(update=shown.append)
+    monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
+    monkeypatch.setitem(sys.modules, "IPython.display", room)
+    monkeypatch.setattr(progress, "LIVE_PAUSE", 0.02)
+    with progress.reporter(quiet=False) as report:
+        report(studies.execute.__globals__["Progress"](total=10, done=4))
+        end = time.monotonic() + 20
+        while not shown and time.monotonic() < end:
+            time.sleep(0.01)
+    assert 'value="4" max="10"' in shown[0]
 
 
 def test_importing_the_package_is_light_and_its_names_stay_functions():

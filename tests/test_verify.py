@@ -303,6 +303,10 @@ def of_another_block(path):
     )
 
 
+def values_of_another_block(path):
+    path.write_bytes(path.with_name("1").read_bytes())
+
+
 def of_no_block(path):
     path.write_bytes(
         path.read_bytes().rstrip()
@@ -321,6 +325,7 @@ RECORDS = "status/records/*.jsonl"
         (RECORDS, empty, "damaged", None, "an empty record"),
         (RECORDS, of_no_block, "foreign", None, "the record of block [9, 9], which is none"),
         (RECORDS, of_another_block, "swapped", name_of("", (0, 0), 1), "the record of block [1, 0]"),
+        ("height/c/0/0", values_of_another_block, "swapped", None, "holds what belongs to height/c/0/1"),
         ("status/c/0/0", Path.unlink, "missing", None, "the ledger of a block that was done"),
         ("zarr.json", Path.unlink, "missing", None, "the metadata of the study"),
         ("zarr.json", retitled, "damaged", None, "not what was laid out"),

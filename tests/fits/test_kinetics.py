@@ -204,6 +204,9 @@ def test_curves_of_a_relaxation_are_those_of_its_constants():
     alike = -np.polyfit(found["t"], np.log(found["alike"]), 1)[0]
     assert alike == pytest.approx(found["rate_unweighted"].item())
     assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))
+    # on an axis of logarithms they begin long before the first time, and close up to nothing
+    assert found["t"][0] == 0.0
+    assert 0.0 < found["t"][1] < 1e-3 * found["window"]
 
 
 def test_rates_count_in_a_power_as_well_as_their_logarithms_are_known():

@@ -135,6 +135,15 @@ def test_profiles_overlap_where_there_is_contact():
     assert np.mean(upper[inside]) - np.mean(lower[inside]) == pytest.approx(4e-7, abs=3e-7)
 
 
+def test_profiles_are_those_of_the_most_intimate_contact_around_its_middle():
+    """Without a layer as much of them overlaps within the contact as is touched at that moment."""
+    values = MODEL.compute(block(layer_shear_strength=0.0, trace_points=20_000)).values
+    positions = MODEL.coordinates(block().parameters)["position"].values
+    overlap = (values["lower_profile"] >= values["upper_profile"])[0, 0, np.abs(positions) <= 1]
+    touched = 2 * values["contact_half_width"][0, 0] * np.mean(overlap)
+    assert touched == pytest.approx(values["contact_length_trace"].max(), rel=0.02)
+
+
 def test_smooth_surfaces_stand_the_film_apart_and_open_outside_the_contact():
     values = MODEL.compute(block(rms_roughness=1e-13)).values
     gap = values["upper_profile"][0, 0] - values["lower_profile"][0, 0]

@@ -123,6 +123,14 @@ def test_a_spectrum_without_harmonics_is_a_failed_case():
     assert result.solves == 0
 
 
+@pytest.mark.parametrize(("name", "called"), [("normal_force", "load"), ("velocity", "velocity"), ("length", "length")])
+def test_what_is_not_positive_or_not_finite_is_a_failed_case(name, called):
+    result = MODEL.compute(make({name: [0.02, -1.0, 0.0, np.inf]}))
+    assert result.status.tolist() == [[Status.DONE] * 2, *[[Status.FAILED] * 2] * 3]
+    told = [result.messages[case, 1] for case in (1, 2, 3)]
+    assert told == [f"the {called} must be positive and finite, got {number}" for number in ("-1", "0", "inf")]
+
+
 def test_overflowing_numbers_are_a_failed_case():
     result = MODEL.compute(make({"normal_force": [1e300, 1.5], "rms_roughness": [1e-300, 5e-7]}))
     assert result.status.tolist() == [[Status.FAILED] * 2, [Status.DONE] * 2]

@@ -211,6 +211,15 @@ def test_boxes_follow_the_rows_whatever_their_size(study, most, monkeypatch):
     pd.testing.assert_frame_equal(rows(study, limit=4).iloc[:4], rows(study.chunk(velocity=2)).iloc[:4])
 
 
+@pytest.mark.parametrize(("limit", "first"), [(0, 12), (3, 3), (12, 12), (13, 12)])
+def test_a_limit_makes_no_more_rows_than_it_needs(study, limit, first, monkeypatch):
+    """Without one, or with one that all rows meet, whole chunks are read at once."""
+    monkeypatch.setattr(room, "ROWS", 100)
+    for array in study.data_vars.values():
+        array.encoding["chunks"] = SHAPE
+    assert len(next(table(study, Question(), limit, silent).frames)) == first
+
+
 def test_a_study_of_one_case_and_no_axis(study):
     one = study.isel(normal_force=2, velocity=3)
     assert rows(one, outputs=("rms_slope",))["rms_slope_mean"].tolist() == pytest.approx([0.02])

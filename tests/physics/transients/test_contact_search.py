@@ -7,6 +7,7 @@ from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, barriers_f
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches
+from mdr_dask.physics.transients.contact_loss import motion_at
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
 from mdr_dask.physics.transients.ends import PreparedLine
 from mdr_dask.physics.transients.free_flight import Instant
@@ -39,3 +40,17 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
         assert work.sums[patches.LOAD] == pytest.approx(sums[DISPLACEMENT], rel=2e-5)
         # the sweep adds up what is lost, the march forces: the same in a steady state
         assert work.sums[patches.DRAG] == pytest.approx(sums[DRAG], rel=2e-5)
+
+
+@pytest.mark.parametrize(("lowest", "overflown"), [(1.0, True), (1.2, False)])
+def test_the_motion_knows_how_fast_the_lift_fell_and_what_flew_over_the_highest_point(
+    lowest: float, overflown: bool
+) -> None:
+    """From depth 3 at time 0 elements are at 3 / e, 1.1, at time 1: over a lower depth there, not over a larger one."""
+    amplitude, phase = roughness.amplitudes(10, 0.7), roughness.phases(7, 1, 10)
+    line = PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, 20, order) for order in (0, 1))))
+    first = line.patches(0.5, 1.0, np.empty(SUMS))
+    history = History(np.arange(4.0), np.array([3.0, lowest, 2.0, 1.5]), np.zeros(4), 4, 1.0)
+    motion = motion_at(Instant(line.track, first, history, 3.0, 1.0, 0.0), 0.0)
+    assert (motion.fall, motion.deepest, motion.highest) == (3.0 - lowest, 3.0, 3.0)
+    assert motion.overflown == overflown

@@ -12,6 +12,7 @@ from mdr_dask.physics.transients.elements.follow import (
     Response,
     follow_line,
     steady_start,
+    untouched,
 )
 from mdr_dask.physics.transients.elements.foundation import KELVIN, Foundation, foundation
 from mdr_dask.physics.transients.elements.loading_history import SETTINGS, STEPS_PER_DECADE, Piece
@@ -208,6 +209,22 @@ def test_contact_that_leaves_the_line_is_a_status() -> None:
         line, KELVIN, Schedule(moments, 0.05 * moments, 0.05 * one, 0.05 * np.exp(moments)), state, depth
     )
     assert (status, found.status) == (Outcome.CONVERGED, Outcome.OUTSIDE_LINE)
+
+
+@pytest.mark.parametrize("solid", [KELVIN, SERIES])
+def test_elements_that_left_an_indenter_while_touched_are_new_ones(solid: Foundation) -> None:
+    """A step past the whole line leaves nothing of what was: the rest is as if nothing had been touched before."""
+    line, speed, travels = bowl(100), 10.0, np.array([0.0, 1.03, 1.05])
+    state, depth, _ = steady_start(line, solid, 0.05, 0.05)
+    schedule = Schedule(travels / speed, travels, np.full(3, speed), np.full(3, 0.05))
+    found, fresh = (
+        follow_line(line, solid, schedule, each, depth) for each in (state, untouched(100, solid.times.size))
+    )
+    assert state.touching.any()
+    assert (found.status, fresh.status) == (Outcome.CONVERGED, Outcome.CONVERGED)
+    np.testing.assert_allclose(found.displacement, fresh.displacement, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found.depth[1:], fresh.depth[1:], rtol=1e-9)
+    np.testing.assert_allclose(np.diff(found.work), np.diff(fresh.work), rtol=1e-9)
 
 
 def test_rest_is_static() -> None:

@@ -17,7 +17,7 @@ from mdr_dask.physics.wear import evolution
 from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced_rule import fast_forced
-from mdr_dask.physics.wear.forced_slip import forced_slip
+from mdr_dask.physics.wear.forced_slip import BEYOND, forced_slip
 
 PARABOLA = PowerProfile(2.0)
 exact_forced = partial(exact, constant_force=True)
@@ -114,6 +114,29 @@ def test_the_rise_of_the_plateau_is_the_integral_along_the_path():
     rise = problem.plateau_rise(part, np.array([cut]))[0]
     virgin = np.exp(problem.virgin.virgin_slip(problem.body.width * np.array([cut])))[0]
     assert problem.frozen_depth(path, np.array([cut]))[0] == pytest.approx(rise - virgin, rel=1e-12)
+
+
+def test_a_contact_that_grows_past_the_panels_of_the_moment_before_remembers_the_path():
+    """The rise of the plateau is kept on panels that end a little beyond the edge; past them it is integrated."""
+    problem = forced_slip(PARABOLA, 0.455, graded_panels(8, 6, 4), 3.0)
+    moving, start = problem.move(evolution.settled(problem))
+    last = evolution.march(moving, 0.5, 1e-3, 1e-4, start)[-1]
+    unknowns, size = last.unknowns.copy(), moving.size
+    unknowns[size - 1] *= 3.0 * BEYOND
+    border, width, _ = moving.place(unknowns)
+    places = border + width * moving.panels.nodes
+    beyond = places > border + width / 3.0
+    virgin = np.exp(moving.virgin.virgin_slip(moving.body.width * places[beyond]))
+    known = moving.memory([last], np.ones(1))(unknowns)[:size][beyond]
+    np.testing.assert_allclose(known, virgin - moving.plateau_rise(last.path, places[beyond]), rtol=1e-12)
+
+
+def test_the_image_is_at_the_depth_at_the_edge(worn):
+    """At the very edge, too, where rounding may put its place just outside of the ring."""
+    for contact in worn[1:]:
+        edge = contact.contact_radius
+        image = contact.image(np.array([edge, np.nextafter(edge, 0.0)]))
+        np.testing.assert_allclose(image, contact.depth, rtol=1e-9)
 
 
 def test_convergence_with_the_tolerance():
@@ -261,6 +284,13 @@ def test_a_march_goes_no_further_than_what_is_wanted(monkeypatch):
         taken.append(len(calls))
         monkeypatch.undo()
     assert taken[0] < 0.6 * taken[1]
+
+
+def test_steps_are_judged_by_the_depth_as_by_the_slip(monkeypatch):
+    """By a depth that counts a thousandfold there were eight times as many."""
+    tried = count_steps(monkeypatch)
+    exact_forced(PARABOLA, 0.455, [0.5], 1e-3, errors=False)
+    assert len(tried) < 80
 
 
 def test_a_march_whose_steps_shrink_without_end_gives_up(monkeypatch):
