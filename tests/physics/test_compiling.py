@@ -153,6 +153,7 @@ def test_a_kernel_is_what_its_functions_are_in_python():
 
 def test_what_only_kernels_call_has_neither_a_file_nor_what_python_calls():
     combined(1.0)
+    third.in_kernels.compile((numba.float64,))  # there already, unless `combined` came from its file
     (signature,) = third.in_kernels.overloads
     assert "cpython" not in third.in_kernels.inspect_llvm(signature)
     assert third.in_kernels.stats.cache_path is None
