@@ -1,0 +1,49 @@
+"""What was found when somebody last looked: whole results in numbers and words, kept as tables beside the tests.
+
+A record tells that something changed, not that it is right; closed forms, invariants and references tell that. What
+is meant to change is taken over by ``pytest --force-regen TESTS``, and read as a difference of text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+#: Other processors and libraries round otherwise: parts of a value that may differ.
+ROUNDING = 1e-5
+#: Columns whose unit is the root mean square of the values.
+OF_ALL = ("mean", "first", "last", "least", "largest")
+
+
+def check(regression, found: Mapping[str, object]) -> None:
+    """Compare numbers, arrays and texts with those on record, by `dataframe_regression` of pytest-regressions.
+
+    Of an array counts how many values it has, how many are finite, their weighted root mean square, and in units of
+    that the weighted mean, the ends and the extremes: no value can change by itself.
+    """
+    rows = {name: _row(value) for name, value in found.items()}
+    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("what").reset_index()
+    tolerances = {name: {"atol": ROUNDING, "rtol": 0.0} for name in OF_ALL}
+    regression.check(table, default_tolerance={"atol": 0.0, "rtol": ROUNDING}, tolerances=tolerances)
+
+
+def _row(value: object) -> dict[str, object]:
+    values = np.atleast_1d(np.asarray(value)).ravel()
+    row: dict[str, object] = {"words": "", "values": values.size, "finite": 0, "rms": 0.0, **dict.fromkeys(OF_ALL, 0.0)}
+    if values.dtype.kind not in "biuf":
+        return row | {"words": " | ".join(map(str, values))}
+    known = np.isfinite(values)
+    finite, weights = values[known].astype(float), _weights(values.size)[known]
+    rms = float(np.sqrt(np.average(finite**2, weights=weights))) if finite.size else 0.0
+    if rms == 0.0:
+        return row | {"finite": finite.size}
+    scaled = finite / rms
+    ends = (np.average(scaled, weights=weights), scaled[0], scaled[-1], scaled.min(), scaled.max())
+    return row | {"finite": finite.size, "rms": rms, **dict(zip(OF_ALL, map(float, ends), strict=True))}
+
+
+def _weights(size: int) -> np.ndarray:
+    """Return weights about one, each its own: values in each other's place are another mean."""
+    return 1.0 + 0.5 * np.sin(1.0 + np.arange(size))
