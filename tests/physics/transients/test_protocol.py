@@ -7,7 +7,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import CubicLine, indented_line, periodic_line
 from mdr_dask.physics.surfaces.shapes import PowerLaw
-from mdr_dask.physics.transients.elements import follow
+from mdr_dask.physics.transients.elements import edges, follow
 from mdr_dask.physics.transients.elements.follow import (
     Response,
     follow_line,
@@ -224,6 +224,8 @@ def test_elements_that_left_an_indenter_while_touched_are_new_ones(solid: Founda
     assert (found.status, fresh.status) == (Outcome.CONVERGED, Outcome.CONVERGED)
     np.testing.assert_allclose(found.displacement, fresh.displacement, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.depth[1:], fresh.depth[1:], rtol=1e-9)
+    np.testing.assert_allclose(found.drag[1:], fresh.drag[1:], rtol=1e-9)
+    assert (found.contact[1:] > 0).all()
     np.testing.assert_allclose(np.diff(found.work), np.diff(fresh.work), rtol=1e-9)
 
 
@@ -275,3 +277,19 @@ def test_a_steady_start_that_does_not_bear_the_load_is_told(monkeypatch):
         assert status == Outcome.DEPTH_NOT_FOUND
         if deborah == 0:
             assert 1e-6 < state.displacement.mean() / 0.2 - 1 < 1e-3
+
+
+@pytest.mark.parametrize("guess", [-1e6, -10.0, 0.0, 1e6])
+def test_the_rate_that_carries_a_load_is_found_from_a_guess_without_contact(guess):
+    place = np.arange(200) / 200
+    pulls = 0.1 + 0.3 * np.sin(23 * place)
+    nowhere = edges.Edges(np.full(200, -1.0), np.zeros(200))
+    contact = edges.Contact(
+        pulls, pulls, np.cos(7 * place), np.zeros(200), np.zeros(200), np.ones(200, dtype=bool), nowhere
+    )
+    deborah, load, viscosity = 0.4, 0.2, 0.7
+    rate, _, fraction = edges.carrying_rate(contact, viscosity, guess, edges.Drive(deborah, load, -1))
+    fine = np.linspace(0, 1, 200001)[:-1] * (199 / 200)
+    force = 0.1 + 0.3 * np.sin(23 * fine) + viscosity * (rate + deborah * np.cos(7 * fine))
+    assert np.maximum(force, 0).mean() == pytest.approx(load, rel=0.01)  # of the cell that closes the line
+    assert (force > 0).mean() == pytest.approx(fraction, abs=0.01)

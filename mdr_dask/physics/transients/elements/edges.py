@@ -168,6 +168,16 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
     return load / n, drag / n, length / n
 
 
+@nested
+def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
+    """Return the rate from which on every element that touches presses."""
+    rate = -np.inf
+    for j in range(contact.force.size):
+        if contact.touching[j]:
+            rate = max(rate, -contact.pulls[j] / weight - deborah * contact.slope[j])
+    return rate
+
+
 @compiled
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
     """Return the rate at which the load is carried, drag and fraction in contact; note the edges.
@@ -182,8 +192,11 @@ def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) ->
             force[j] = contact.pulls[j] + weight * (rate + drive.deborah * slope[j])
             power[j] = force[j] * slope[j]
         carried, drag, length = _forces(contact, drive.first, False)
-        if length <= 0 or abs(carried - drive.load) <= 1e-11 * drive.load or turn == 59:
+        if abs(carried - drive.load) <= 1e-11 * drive.load or turn == 59:
             break
-        rate += (drive.load - carried) / (length * weight)
+        if length > 0:
+            rate += (drive.load - carried) / (length * weight)
+        else:
+            rate = max(rate, _pressing_rate(contact, weight, drive.deborah)) + drive.load / weight
     _forces(contact, drive.first, True)
     return rate, drag, length

@@ -374,6 +374,8 @@ def follow_elements(
             return Outcome.OUTSIDE_LINE
         drive = Drive(deborahs[now], loads[now], first)
         exact, rate, drag, length = forces_now(solid, state, workspace, depth, rate, drive)
+        if length <= 0 and now > 0 and drive.load > 0:  # viscous elements begin before they touch
+            return Outcome.DEPTH_NOT_FOUND
         out[DRAG, now], out[DEPTH, now], out[RATE, now], out[CONTACT, now] = drag, exact, rate, length
         out[STORED, now], out[WORK, now], out[DISSIPATED, now] = _state_energy(solid, state), work, dissipated
     return Outcome.CONVERGED
