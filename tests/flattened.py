@@ -34,3 +34,10 @@ def _is_plain(values: list[object] | tuple[object, ...]) -> bool:
         return False
     sizes = np.abs([each for each in values if each and np.isfinite(each)])
     return bool(sizes.size == 0 or sizes.max() < 1e3 * sizes.min())
+
+
+def of_result(result) -> dict[str, object]:
+    """Return what a model gives back for a block: values, what became of the cases, and what is said of them."""
+    said = [f"{case} {position}: {text}" for (case, position), text in sorted(result.messages.items())]
+    status = [str(number) for number in result.status.ravel()]
+    return {**result.values, "status": status, "messages": said, "solves": result.solves}
