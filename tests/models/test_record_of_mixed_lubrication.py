@@ -65,7 +65,7 @@ def test_films_and_their_errors(dataframe_regression):
     found, thin = {}, {"rms_roughness": 5e-8, "rotation_speed": 900.0}
     for formula in ("pan_hamrock", "pan_hamrock_minimum", "dowson_higginson"):
         found |= {formula: solved(FILM, columns, film_formula=formula, slide_roll_ratio=0.07, rms_roughness=5e-8)}
-    for accuracy, law in itertools.product((1e-2, 2e-5), ("barus", "roelands")):
+    for accuracy, law in itertools.product((1e-2, 3e-4), ("barus", "roelands")):
         changes = {"film_formula": "ehl", "slide_roll_ratio": 0.07, "viscosity_law": law, "rms_roughness": 5e-8}
         found |= {f"ehl {accuracy} {law}": solved(FILM, columns, accuracy, **changes)}
     for alpha in (1.7e-8, "oil", "gold_mineral", "gold_ester", "gold_polyglycol", "wooster"):
@@ -134,7 +134,7 @@ def test_measured_surfaces(dataframe_regression, tmp_path, monkeypatch):
     others = {"hurst": None, "film_thickness": 4.1e-7, "slide_roll_ratio": 0.11}
     found = {"profiles": solved(ALL, rms_roughness=None, **profiles, **others)}
     found |= {"scaled": solved(NUMBERS, **profiles, **others | {"slide_roll_ratio": 0.0})}
-    found |= {"spectra": solved(NUMBERS, rms_roughness=None, **spectra, **others | {"film_thickness": 2e-7})}
+    found |= {"spectra": solved(NUMBERS, rms_roughness=None, **spectra, **others | {"film_thickness": 6e-8})}
     for name, surfaces, rms in (("profiles", profiles, None), ("scaled", profiles, 1e-7), ("spectra", spectra, None)):
         source = MODEL.parameters(**SMALL | {"rms_roughness": rms} | surfaces | others).source()
         perimeter = 2 * np.pi * 1.1e-3
