@@ -91,6 +91,11 @@ def test_what_models_share(dataframe_regression):
             found[f"size {value}"] = str(base._conceivable(base.LEAST, value))
         except ValueError as error:
             found[f"size {value}"] = str(error)
+    for given in ({"width": "0.5"}, {"widht": 0.5}, {"width": np.inf}, {"inner": {"count": 2.5}}):
+        with pytest.raises(ValueError, match="1 validation error for Outer"):
+            Outer(**given)
+    with pytest.raises(ValueError, match="frozen"):
+        Outer().width = 0.7
     with pytest.raises(ValueError, match="too shallow"):
         per_case(solve)(block.part(2, 0))
     record.check(dataframe_regression, flat("", found))

@@ -68,6 +68,7 @@ def test_worn_contacts(dataframe_regression):
         "pure history": block(ALL[8:13], **pure | few_steps),
         "pure sliding": block(FEW, path=1.1, points=5),
         "gross slip": block(FEW, {"amplitude": [1e-7, 1e-4, 1e-27]}, **STEEL | {"wear_rule": "limit"}),
+        "gross slip beside": block(FEW, {"amplitude": [1e-7, 1e-4]}, **STEEL | {"accuracy": 0.01}),
         "huge": block(FEW, {"cycles": [1e3, 1e29]}, **STEEL | {"wear_rule": "limit"}),
     }
     found = {name: of_result(MODEL.compute(one)) for name, one in scenes.items()}

@@ -55,15 +55,21 @@ def test_master_curves(shape, dataframe_regression):
 
 def test_two_shifts(dataframe_regression):
     """A sum that holds and one that does not, all pairs and some, with draws and vertical factors."""
-    velocity, temperature, curves = [], [], []
+    velocity, temperature, curves, summed = [], [], [], []
     for i, j in ((0, 0), (1, 0), (2, 0), (0, 1), (1, 1), (2, 1), (1, 2), (2, 2)):
         x = np.linspace(-1, 1.2, 15 + i)
         y = SHAPES["sigmoid"](x + 0.4 * i + 0.55 * j + 0.06 * i * j) + 0.004 * np.sin(41 * x + 3 * i + j)
         velocity.append([0.1, 1.0, 10.0][i])
         temperature.append([293.0, 310.0, 333.0][j])
         curves.append((x, y - 0.03 * i))
+        wiggle = np.sin(37 * x + 11 * i + 3 * j) + np.cos(91 * x + 5 * i - j)
+        summed.append((x, SHAPES["sigmoid"](x + 0.4 * i + 0.55 * j) + 0.05 * wiggle))
     found = {"plain": superpose_twice(velocity, temperature, curves)}
     found |= {"vertical": superpose_twice(velocity, temperature, curves, (10.0, 300.0), 2, 1, True)}
+    found |= {
+        "sum": superpose_twice(velocity, temperature, summed),
+        "few": superpose_twice([1, 1, 2], [3, 4, 3], summed[:3]),
+    }
     found |= {"parts": why(superpose_twice, [1, 2, 3, 4], [1, 1, 2, 2], curves[:4])}
     found |= {"one": why(superpose_twice, [1, 1, 1], [1, 2, 3], curves[:3])}
     record.check(dataframe_regression, flat("", found))

@@ -30,6 +30,7 @@ PARTS = ("accuracy", "wider", "fewer", "thinned", "step", "first", "newton", "sl
 PLACES = np.array([0.0, 0.11, 0.34, 0.451, 0.4561, 0.52, 0.67, 0.83, 0.95, 0.99, 1.013, 1.09, 1.21, 1.47])
 RADII = np.linspace(0.0, 3.1, 45)
 TABLE = from_table(1e-3 * RADII, 1e-4 * (RADII**2.3 + 0.04 * RADII**4), 0.9e-4)
+SHORT = from_table(1e-3 * RADII[:17], 1e-4 * RADII[:17] ** 2, 1.5e-4)
 BODIES = {"parabola": PowerProfile(2.0), "sharp": PowerProfile(0.7), "blunt": PowerProfile(4.6), "table": TABLE}
 
 
@@ -108,7 +109,11 @@ def test_exact_under_force(dataframe_regression):
     for name, c in scenes:
         contacts += exact(BODIES[name], c, [0.0, 0.01, 1.1, 9.0], 1e-2, constant_force=True)
         ends.append(limit_under_force(BODIES[name], c, 1e-2))
-    record.check(dataframe_regression, flat("", {"contacts": told(contacts, 2), "ends": told(ends)}))
+    ends.append(limit_under_force(PowerProfile(0.7), 0.2, 1e-2, errors=False))
+    refused = [why(limit_under_force, SHORT, c, 1e-2) for c in (0.4, 0.7, 0.0, 1.0)]
+    found = {"contacts": told(contacts, 2), "ends": told(ends), "refused": refused}
+    found |= {"exact": why(exact, SHORT, 0.4, [0.1], 1e-2, constant_force=True)}
+    record.check(dataframe_regression, flat("", found))
 
 
 def test_sliding(dataframe_regression):
