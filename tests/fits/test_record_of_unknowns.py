@@ -76,6 +76,7 @@ CALIBRATIONS = {
         study(lambda *of: curved(*of) - 0.1),
         points(lambda *of: curved(*of) - 0.1, given=False),
     ),
+    "errors unknown, a value of 0": lambda: (study(curved), _with_nothing(points(curved, given=False))),
     "errors much too small": lambda: (study(curved), replace(points(curved), errors=1e-4 * points(curved).values)),
     "one unknown, at values computed": lambda: (study(curved, lines=1), points(curved, THREE, at_values=True)),
     "one unknown, of another form": lambda: (study(curved), points(bounded, THREE, given=False, number=12)),
@@ -87,6 +88,10 @@ CALIBRATIONS = {
     "an axis of words": lambda: (study(curved).assign_coords(time=list("abcdef")), points(curved)),
     "lost results": lambda: (study(curved).where(study(curved).time > 2e-4), points(curved)),
 }
+
+
+def _with_nothing(measured):
+    return replace(measured, values=np.where(np.arange(measured.values.size) == 4, 0.0, measured.values))
 
 
 def _at(measured, name, value):
