@@ -106,7 +106,9 @@ def test_what_measured_points_say_is_on_record(dataframe_regression):
         except (DataError, FitError) as sentence:
             found[scene] = str(sentence)
             continue
-        found |= rows.of_dataset(scene, calibration.summary(calibrated), told=True)
+        found |= rows.of_dataset(
+            scene, calibration.summary(calibrated), told=scene in ("three unknowns", "errors unknown")
+        )
         found[f"{scene}: cells"] = [calibrated.posterior.width, calibrated.posterior.weights.size]
         found[f"{scene}: best"] = calibrated.best
         found[f"{scene}: noise"] = np.append(calibrated.noise[0], calibrated.noise[1])
@@ -136,7 +138,7 @@ def test_laws_as_tables_are_on_record(tmp_path, dataframe_regression):
         except FitError as sentence:
             found[scene] = str(sentence)
             continue
-        found |= rows.of_dataset(scene, table, told=True)
+        found |= rows.of_dataset(scene, table, told=scene.startswith("a law"))
         found |= {f"{scene} {axis}": rows.even(table[axis].values) for axis in table.coords}
         found[f"{scene}: sizes"] = [f"{axis}={size}" for axis, size in table.sizes.items()]
         path = tmp_path / f"{scene}.nc"
@@ -194,7 +196,7 @@ def _indices(scene, data):
         indices = sensitivity.sobol_indices(data, "y")
     except FitError as sentence:
         return {scene: str(sentence)}
-    return rows.of_dataset(scene, indices, told=True) | {f"{scene} inputs": indices.parameter.values}
+    return rows.of_dataset(scene, indices, told=scene == "few") | {f"{scene} inputs": indices.parameter.values}
 
 
 def test_velocity_steps_are_on_record(dataframe_regression):

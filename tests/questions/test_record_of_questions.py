@@ -25,7 +25,7 @@ LINE = "  length: 20 mm\n  points: 500\n  rms_roughness: 0.37 um\n  shear_modulu
 SLIDING = "model: sliding_friction\nparameters:\n" + LINE
 STUDIES = {
     "grid": f"{SLIDING}  hurst: [0.3, 0.74]\n  normal_force: [10 mN, 0.2 N, 7 N]\n"
-    "  velocity: {geometric: [1 mm/s, 3 m/s, 8]}\n",
+    "  velocity: {geometric: [1 mm/s, 3000 mm/s, 8]}\n",
     "sampled": f"{SLIDING}  velocity: {{geometric: [1 mm/s, 1 m/s]}}\n  normal_force: {{linear: [9 mN, 3 N]}}\n"
     "sampling: {sobol: 9}\n",
     "wear": "model: fretting_wear\noutputs: [wear_volume, contact_radius, worn_profile]\nparameters:\n  points: 21\n"
@@ -116,12 +116,12 @@ def test_answers_in_rows_and_arrays_are_on_record(study, parts, dataframe_regres
     for number, asked in enumerate(QUESTIONS[study]):
         told: list[str] = []
         try:
-            for limit in (0, 5):
-                answer = table(parts[study], Question(**asked), limit, told.append)
-                frames = list(answer.frames)
-                units = [f"{name} [{unit}]" for name, unit in answer.units.items()]
-                found[f"{number} first {limit}"] = [*units, str(answer.total), *(str(len(frame)) for frame in frames)]
-            for name in answer.units if frames else ():
+            limit = 5 if number % 4 == 1 else 0
+            answer = table(parts[study], Question(**asked), limit, told.append)
+            frames = list(answer.frames)
+            units = [f"{name} [{unit}]" for name, unit in answer.units.items()]
+            found[f"{number} first {limit}"] = [*units, str(answer.total), *(str(len(frame)) for frame in frames)]
+            for name in (name for name in answer.units if frames and name not in ("hurst", F, "case")):
                 column = np.concatenate([frame[name].to_numpy() for frame in frames])
                 found[f"{number} {name}"] = column if column.dtype.kind in "fiub" else column[:9].astype(str)
         except DataError as sentence:
@@ -291,7 +291,7 @@ def test_studies_from_python_are_on_record(tmp_path, parts, dataframe_regression
             found[name] = str(sentence).replace(str(tmp_path), "")
             continue
         found[f"{name}: columns"] = [*map(str, answer), str(getattr(answer, "attrs", {}).get("units"))]
-        for column in list(answer)[:12]:
+        for column in list(answer)[:5]:
             values = np.asarray(answer[column]).ravel()
             found[f"{name} {column}"] = values if values.dtype.kind in "fiub" else values[:4].astype(str)
     record.check(dataframe_regression, found)
