@@ -199,7 +199,7 @@ def aggregate(dataset: xr.Dataset, statistics: Sequence[str] = NAMES) -> xr.Data
     """
     for name in statistics:
         if name not in NAMES:
-            raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}; known: {', '.join(NAMES)}")
+            raise DataError(f"no statistic is called {name!r}{did_you_mean(name, NAMES)}")
     wanted = [statistic for statistic in STATISTICS if statistic.name in statistics]
     reduced = {}
     errors = {name: companion(dataset, name) for name in map(str, dataset.data_vars)}

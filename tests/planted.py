@@ -45,6 +45,25 @@ parameters:
 """
 
 
+def make_tables(folder: Path) -> None:
+    """Write the files of the surfaces, the material and the rig."""
+    random = np.random.default_rng(0)
+    q = np.geomspace(2 * np.pi / 0.02, 2 * np.pi / 8e-5, 30)
+    rows = "".join(f"{wave:.6g},{1e-9 * wave**-3.4:.6g}\n" for wave in q)
+    (folder / "road.csv").write_text(f"q [rad/m],C2D [m^4]\n{rows}")
+    wave = np.hypot(np.fft.fftfreq(64)[:, None], np.fft.rfftfreq(64))
+    wave[0, 0] = 1
+    phases = np.exp(2j * np.pi * random.random(wave.shape))
+    np.save(folder / "road.npy", 10 * np.fft.irfft2(wave**-1.7 * phases * (wave < 1)))
+    line = np.cumsum(random.standard_normal(200))
+    line -= np.linspace(line[0], line[-1], line.size)
+    rows = "".join(f"{0.1 * k:.1f},{height:.5f}\n" for k, height in enumerate(line))
+    (folder / "line.csv").write_text(f"x [mm],z [um]\n{rows}")
+    rows = "".join(f"{f:.4g},{3 + f**0.3:.4g},{0.4 * f**0.3:.4g}\n" for f in np.geomspace(0.01, 100, 9))
+    (folder / "dma.csv").write_text(f"f [Hz],E' [MPa],E'' [MPa]\n{rows}")
+    (folder / "rig.csv").write_text("normal_force [N],friction_coefficient\n0.01,0.02\n0.1,0.015\n1,0.012\n10,0.01\n")
+
+
 def make(folder: Path, text: str, realisations: int = 4, failed: bool = False) -> dict[str, xr.Dataset]:
     """Lay out the store of a campaign, plant numbers in it, and open it; some cases fail on request."""
     path = folder / "study.yaml"

@@ -101,7 +101,8 @@ def _indenter(data: xr.Dataset) -> Variables:
     logs = table.logarithms(used)
 
     def model(constants: FloatArray) -> FloatArray:
-        law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
+        with np.errstate(invalid="ignore"):  # one realisation has no resamples
+            law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 
     start = (math.log(laws.INDENTER_EXPONENT),)

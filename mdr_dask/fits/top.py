@@ -59,7 +59,8 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
         if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
             continue
         break
-    unbiased = top[0] + np.mean(top[0] - top[1 : 1 + bootstrap.RESAMPLES]) if count > 1 else top[0]
+    resamples = top[1 : 1 + bootstrap.RESAMPLES]  # NaN of those that draw nothing but lost lines
+    unbiased = top[0] + np.nanmean(top[0] - resamples) if count > 1 else top[0]
     if left.shape[1] > 3:
         errors = _parabola(x[near], bootstrap.moved(stack[0, near], left[0]))[0]
     else:  # three points leave nothing: what lies between them is known to what the parabola adds to the highest

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 from friction_store import store
 
+from mdr_dask import bootstrap
 from mdr_dask.errors import FitError
-from mdr_dask.fits import available
+from mdr_dask.fits import available, top
 from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
 
@@ -56,6 +57,15 @@ def test_plateau_lies_near_root_two(forces):
     high = found.isel(normal_force=slice(10, 13))
     assert np.all(high["law_holds"].str.startswith("yes"))
     assert high["plateau"].sel(hurst=0.7).values == pytest.approx(np.sqrt(2), rel=0.15)
+
+
+def test_a_lost_line_of_three_leaves_a_plateau():
+    """Some resamples draw nothing but the lost line."""
+    x = np.linspace(-1, 1, 5)
+    lines = np.array([1.0, 1.02, 0.97])[:, None] * (1 - 0.3 * x**2)
+    lines[1, 2] = np.nan
+    found = top.highest(x, bootstrap.means(lines), 2)
+    assert found.height[0] == pytest.approx(0.99, abs=0.03)
 
 
 def test_series_are_fitted_one_by_one(forces):
