@@ -58,7 +58,10 @@ def counts(progress):
 
 def values(url):
     with store.readable(url):
-        return {name: (dict(found.sizes), round(float(found["height"].sum()), 6)) for name, found in store.datasets(url).items()}
+        return {
+            name: (dict(found.sizes), round(float(found["height"].sum()), 6))
+            for name, found in store.datasets(url).items()
+        }
 
 
 def scene(url, campaign):
