@@ -53,7 +53,7 @@ def told(inspection):
 
 def counts(progress):
     kept = asdict(progress)
-    return {name: kept[name] for name in ("total", "kept", "done", "failed", "not_needed", "blocks", "solves")}
+    return [kept[name] for name in ("total", "kept", "done", "failed", "not_needed", "blocks", "solves")]
 
 
 def values(url):

@@ -126,7 +126,8 @@ TEXTS = {
     "no sampling": FORCE + "sampling: random\nrealisations: 0\nstore: {blocks: {realisation: 0}}\n",
 }
 FILES = {
-    "cases.csv": "velocity [mm/s],indenter.shape,indenter.angle [deg],points,shift\n3,cone,5,7,true\n4,cone,6,8,false\n",
+    "cases.csv": "velocity [mm/s],indenter.shape,indenter.angle [deg],points,shift\n"
+    "3,cone,5,7,true\n4,cone,6,8,false\n",
     "others.csv": "velocity,hurst [mm],normal_force,depth.x,indenter.angle,velocity\n1,2,3,4,5,6\n",
     "none.csv": "\n1,2\n",
     "numbers.csv": "1,2\n1,2\n",
