@@ -1,9 +1,11 @@
 """Record of what is said of stores that are damaged: by who verifies, repairs, reads, or runs on."""
 
+import itertools
 import json
 import random
 import re
 import shutil
+import uuid
 from dataclasses import asdict
 from pathlib import Path
 
@@ -19,8 +21,17 @@ from mdr_dask.execute import Resources
 from mdr_dask.store.records import name_of, sealed
 
 
+@pytest.fixture(autouse=True, scope="module")
+def names_in_order():
+    """Names of files that are random otherwise follow each other: files are read in the order of their names."""
+    numbers = itertools.count(1)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(uuid, "uuid4", lambda: uuid.UUID(int=next(numbers) << 80))
+        yield
+
+
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole(names_in_order, tmp_path_factory):
     """Sound stores to copy, without and with series, and their campaigns."""
     import toy
 

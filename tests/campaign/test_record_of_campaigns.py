@@ -25,7 +25,7 @@ from mdr_dask.campaign.definition import Spread
 from mdr_dask.errors import MdrDaskError
 
 DOCS = Path(__file__).parents[2] / "docs"
-REAL = ("sliding_friction", "velocity_jump", "fretting_wear", "ehl_line", "mixed_lubrication")
+REAL = ("sliding_friction", "mixed_lubrication")
 
 
 def said(act, *given):
