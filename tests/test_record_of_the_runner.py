@@ -14,12 +14,25 @@ import record
 from distributed.deploy import Cluster
 
 from mdr_dask import bootstrap, execute, plan, replication, store, task
-from mdr_dask.campaign import Replication, Tolerance, loads
+from mdr_dask.campaign import Replication, Tolerance, definition, document, expand, loads, measured, spec, variation
 from mdr_dask.errors import MdrDaskError
-from mdr_dask.execute import Event, Part, Resources, cells, clusters, events, executors
+from mdr_dask.execute import Event, Part, Resources, cells, clusters, crew, events, executors, rounds
 from mdr_dask.execute.progress import Progress
 from mdr_dask.models.base import Status
-from mdr_dask.store import copies, digests, expected, files, ledgers, seals
+from mdr_dask.store import (
+    copies,
+    digests,
+    expected,
+    files,
+    layout,
+    ledgers,
+    locks,
+    reading,
+    runners,
+    seals,
+    sound,
+    verifying,
+)
 from mdr_dask.store.locks import Hold
 
 MASKED = {"history", "created", "host", "python", "versions", "source"}
@@ -558,3 +571,20 @@ def test_record_of_faults_of_metadata(toy, url, dataframe_regression):
     store.lay_out(url, plan.templates(RUNS["blocks"](toy), 6))
     root = json.loads(Path(url, "zarr.json").read_text())
     record.check(dataframe_regression, {name: faulty(root, change) for name, change in FAULTS.items()})
+
+
+ROOMS = (bootstrap, plan, replication, task, clusters, crew, executors, rounds, digests, expected, files, seals, locks)
+ROOMS += (layout, reading, runners, sound, verifying, definition, document, expand, measured, spec, variation)
+
+
+def test_record_of_settings(dataframe_regression):
+    """How long is waited, how often is asked, how much is held at a time."""
+    record.check(
+        dataframe_regression,
+        {
+            f"{room.__name__}.{name}": value
+            for room in ROOMS
+            for name, value in vars(room).items()
+            if name.isupper() and isinstance(value, int | float | str | tuple) and name not in ("ROOT", "NO_LOCKS")
+        },
+    )
