@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import random
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -94,14 +96,20 @@ def earlier(study):
     return replace(study, series=tuple(shorter), replication=Replication(3, 3, {}))
 
 
+def in_order(path: Path) -> tuple[str, str]:
+    """Return what to sort files of a store by: the names of those that hold records of many blocks are random."""
+    blocks = re.findall(rb'"block": (.*?\])', path.read_bytes()) if path.suffix == ".jsonl" else path.name
+    return str(path.parent.relative_to(_root(path))), str(blocks)
+
+
 def build(toy, url: str, series: bool):
     """Run a study in two steps, the last block again, whose record stays loose; return its campaign."""
     study = campaign(toy, series)
     for step in (earlier(study), study):
         execute.run(step, url, Resources(threads=1), lambda _: None)
-    loose = max(Path(url).glob("**/status/records/*.jsonl"))
+    loose = max(Path(url).glob("**/status/records/*.jsonl"), key=in_order)
     line = loose.read_bytes().splitlines()[-1]
-    record = __import__("json").loads(line)
+    record = json.loads(line)
     name = f"{'.'.join(map(str, record['block']))}-{record['attempt']}.json"
     loose.with_name(name).write_bytes(line)
     loose.write_bytes(b"".join(one + b"\n" for one in loose.read_bytes().splitlines()[:-1]))
@@ -166,7 +174,7 @@ def try_harm(toy, sound: Path, study, work: Path, kind: str, harm: str, draw: ra
     url = str(work)
     for name in store.series_names(url) * draw.randrange(2):  # else it is a copy, of which nothing is sealed
         store.seal(url, name)
-    files = sorted(work.glob(KINDS[kind]))
+    files = sorted(work.glob(KINDS[kind]), key=in_order)
     if not files:
         return None
     before = {path: path.read_bytes() for path in work.rglob("*") if path.is_file()}

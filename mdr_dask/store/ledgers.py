@@ -16,7 +16,7 @@ from zarr.core.buffer import default_buffer_prototype
 
 from mdr_dask.errors import StoreError
 from mdr_dask.models.base import Status
-from mdr_dask.store.files import guarded, read_many
+from mdr_dask.store.files import group_name, guarded, read_many
 from mdr_dask.store.records import digest
 from mdr_dask.store.seals import Chunks, Contents, Seal, read_seal
 from mdr_dask.store.study import array_of, document
@@ -31,6 +31,8 @@ def ledger(url: str, series: str, shape: tuple[int, ...]) -> NDArray[np.int8]:
     held = document(url, series)
     if held is None:
         return found
+    if "axes" not in held.get("attributes", {}):  # of an array, say
+        raise StoreError(f"{url}: {group_name(series, 'zarr.json')} is damaged; 'mdr-dask verify {url}' looks into it")
     chunks = Chunks.of(series, held)
     seal = read_seal(url, series)
     if seal is None:

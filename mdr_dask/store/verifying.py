@@ -278,7 +278,8 @@ def _check_layout(url: str, group: Group, found: Inspection, present: set[str]) 
             if content in contents:
                 found.findings.append(Finding("swapped", name, f"holds what belongs to {contents[content]}"))
             else:
-                found.findings.append(Finding(fault, name, "not what was laid out" if content else "laid out once"))
+                what = "laid out once" if content is None else "not what was laid out"
+                found.findings.append(Finding(fault, name, what))
         return {*group.copy.files, copy_name(group.series)}
     path = _path(group.series)
     known = {copy_name(group.series), *group.documents}
