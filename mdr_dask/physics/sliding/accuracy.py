@@ -260,13 +260,11 @@ class Ladder:
         hardly = other.contact_fraction * points * oversampling < SETTINGS.hardly
         least = np.where(hardly, SETTINGS.of_a_peak / oversampling**2, 0.0)
         with np.errstate(all="ignore"):
-            drag = np.abs(steady.drag / other.drag - 1)
-        # where a coarse grid has no solution nothing is known
-        lost = np.isnan(drag) & (other.status == Outcome.CONVERGED)
-        drag = np.where(lost, np.inf, np.maximum(drag, SETTINGS.rounding))
-        with np.errstate(all="ignore"):
+            drag = np.maximum(np.abs(steady.drag / other.drag - 1), SETTINGS.rounding)
             errors = SETTINGS.safety * _changes(_columns(steady), _columns(other))
             errors[COLUMNS.index("drag")] = np.maximum(SETTINGS.safety * drag, least) * steady.drag
+        # where one of the grids has no solution nothing is known
+        errors = np.where(np.isnan(errors), np.inf, errors)
         return Errors(*errors)
 
 
