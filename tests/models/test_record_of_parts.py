@@ -194,6 +194,8 @@ def surface_files(directory):
         directory / "grooved.npy", (height + 2e-6 * np.sin(40 * np.pi * np.arange(POINTS) / POINTS)[:, None]).T * 1e6
     )
     place = np.arange(POINTS) * LENGTH / POINTS
+    steps = height + 1.2e-7 * np.sign(np.sin(34 * np.pi * (np.arange(POINTS) + 0.5) / POINTS))[None, :]
+    np.save(directory / "steps.npy", steps.T * 1e6)
     scan = "\n".join(f"{1e3 * x:.9g};{1e6 * z:.9g}" for x, z in zip(place, height[:, 7] + 2e-3 * place, strict=True))
     (directory / "scan.csv").write_text("x [mm];z [um]\n" + scan)
     q = np.geomspace(2e4, 2e6, 30)
@@ -219,6 +221,7 @@ def test_measured_surfaces(tmp_path, dataframe_regression):
         "damaged": {"map": maps | {"files": ["damaged.npy"], "direction": "x"}},
         "filled": {"map": maps | {"files": ["damaged.npy"], "outliers": "fill"}},
         "grooved": {"map": maps | {"files": ["grooved.npy"], "direction": "x"}},
+        "steps": {"map": maps | {"files": ["steps.npy"], "direction": "x"}},
         "two": {"map": maps | {"files": ["map.npy", "damaged.npy"], "outliers": "fill"}},
         "scan": {"scan": "scan.csv"},
         "closed scan": {"scan": {"files": ["scan.csv"], "window": "none", "detrend": "parabola"}},

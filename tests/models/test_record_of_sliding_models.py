@@ -1,4 +1,4 @@
-"""What campaigns of steady friction and of its kinetics name and get: declarations, values, errors, words, estimates."""
+"""What campaigns of steady friction and its kinetics name and get: declarations, values, errors, words, estimates."""
 
 from typing import Any
 

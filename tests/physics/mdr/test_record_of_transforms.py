@@ -121,7 +121,8 @@ def test_profiles_of_bodies(dataframe_regression):
         found[f"{name} rise from the tip"] = profile.rise(np.abs(gaps), 0.0)
         found[f"{name} inside"] = np.array([profile.inside(level) for level in (1e-6, 0.3, 0.99)])
         found[f"{name} largest"] = profile.largest_radius
-        pieces = profile.pieces()
+        pieces, level = profile.pieces(), float(profile.image(np.array(0.5)))
+        found[f"{name} compiled rise"] = [revolution.image_rise(pieces, 0.5, level, gap) for gap in (*gaps, -0.5, 0.09)]
         found[f"{name} pieces"] = np.append(pieces.knots, pieces.exponent)
         found[f"{name} coefficients"] = np.arcsinh(pieces.coefficients)
         if isinstance(profile, revolution.TableProfile):
@@ -141,11 +142,11 @@ def test_tables_that_are_no_profiles(dataframe_regression):
         "falls": (good, np.array([0.0, 0.5, 0.2, 1.0]), 0.1),
         "too deep": (good, good, 7.0),
     }.items():
-        with pytest.raises(ValueError) as told:
+        with pytest.raises(ValueError, match=r"profile|table") as told:
             revolution.from_table(radius, height, depth)
         found[name] = str(told.value)
     for exponent in (0.0, np.nan, np.inf):
-        with pytest.raises(ValueError) as told:
+        with pytest.raises(ValueError, match="exponent") as told:
             revolution.PowerProfile(exponent)
         found[f"exponent {exponent}"] = str(told.value)
     found["roots"] = np.array(
