@@ -105,6 +105,7 @@ def profiles():
     yield "power", revolution.PowerProfile(1.7)
     yield "round", revolution.PowerProfile(2.0)
     yield "smooth table", revolution.from_table(radius, 0.1 + 0.3 * radius**2, 0.21)
+    yield "flattening table", revolution.from_table(radius, radius**1.3, 0.4)
     yield "cornered table", revolution.from_table(radius, np.array([0.0, 0.001, 0.2, 0.21, 0.5, 0.5001, 3.0]), 0.4)
     yield "cone", revolution.from_body(RoundedCone(0.4, 0.3), 0.17)
     yield "body", revolution.from_body(PowerLaw(0.3, 2.4), 40.0)
