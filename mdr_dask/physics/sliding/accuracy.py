@@ -87,9 +87,11 @@ RELATIVE = [0, 2, 3]  # columns whose changes are over their size
 
 def relative(steady: Steady, errors: Errors, columns: Collection[str] = COLUMNS) -> FloatArray:
     """Return errors over the size of what they belong to, a row for every column."""
+    shape = len(columns), steady.status.size
+    absolute, values = (np.reshape([getattr(each, name) for name in columns], shape) for each in (errors, steady))
     with np.errstate(all="ignore"):
-        rows = [getattr(errors, name) / np.abs(getattr(steady, name)) for name in columns]
-    sizes = np.array(rows).reshape(len(rows), steady.status.size)
+        sizes = absolute / np.abs(values)
+    sizes[absolute == 0] = 0.0  # of what is 0 and known to be, too
     return np.where(np.isnan(sizes), np.inf, sizes)
 
 
@@ -260,13 +262,12 @@ class Ladder:
         hardly = other.contact_fraction * points * oversampling < SETTINGS.hardly
         least = np.where(hardly, SETTINGS.of_a_peak / oversampling**2, 0.0)
         with np.errstate(all="ignore"):
-            drag = np.abs(steady.drag / other.drag - 1)
-        # where a coarse grid has no solution nothing is known
-        lost = np.isnan(drag) & (other.status == Outcome.CONVERGED)
-        drag = np.where(lost, np.inf, np.maximum(drag, SETTINGS.rounding))
-        with np.errstate(all="ignore"):
+            drag = np.maximum(np.abs(steady.drag / other.drag - 1), SETTINGS.rounding)
             errors = SETTINGS.safety * _changes(_columns(steady), _columns(other))
-            errors[COLUMNS.index("drag")] = np.maximum(SETTINGS.safety * drag, least) * steady.drag
+            of_drag = np.maximum(SETTINGS.safety * drag, least) * steady.drag
+        errors[COLUMNS.index("drag")] = np.where(steady.drag == 0, errors[COLUMNS.index("drag")], of_drag)
+        # where one of the grids has no solution nothing is known
+        errors = np.where(np.isnan(errors), np.inf, errors)
         return Errors(*errors)
 
 
