@@ -14,6 +14,8 @@ import re
 import numpy as np
 import planted
 import pytest
+import record
+import seen
 import xarray as xr
 from drawn import LAST, check_colours, check_laws, check_limits, check_picture, check_words, expected, mismatches
 
@@ -248,7 +250,7 @@ RENDERED = {(name, model_of(text)): shape for shape, (text, _, holds) in TABLE.i
 
 
 @pytest.mark.parametrize(("shape", "name"), CASES)
-def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
+def test_every_figure_is_drawn_or_says_why_not(shape, name, stores, dataframe_regression):
     text, _, holds = TABLE[shape]
     plot, groups = available(model_of(text))[name], stores(shape)
     if name not in holds:
@@ -294,6 +296,7 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
         )
         if data[column].tail(1).notna().all() and data[column].abs().max() > 0:
             assert len(mismatches(moved, known)) == 1, f"a change of {column} by 0.1 % is not seen"
+    record.check_part(dataframe_regression, re.sub(r"\W+", "_", shape), name, seen.of(figure))
     if shape == RENDERED[name, model_of(text)]:
         figure.savefig(io.BytesIO(), dpi=20)
 
