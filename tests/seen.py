@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import groupby
 
 import numpy as np
@@ -12,6 +13,8 @@ from record import _weights
 
 #: Numbers of one row of a record: of more, a change of one would not be seen in their mean.
 MOST = 60
+#: What is left of a difference of equal numbers.
+NOISE = r"\d(\.\d+)?e-1[4-9]"
 
 
 def of(figure) -> dict[str, object]:
@@ -24,12 +27,12 @@ def of(figure) -> dict[str, object]:
     for axes in figure.axes:
         told.append(_words(axes))
         numbers += _numbers(axes)
-    for bar in figure.bars:
+    for bar in getattr(figure, "bars", ()):
         told.append(f"bar: {bar.drawn.cmap.name}, {type(bar.drawn.norm).__name__}, beside {len(bar.panels)}")
         numbers += [bar.drawn.vmin, bar.drawn.vmax]
     scaled = np.arcsinh(1e12 * np.array(numbers, dtype=float))
     parts = np.array_split(scaled, -(-scaled.size // MOST))
-    words = " / ".join(told).replace("\n", "|")
+    words = re.sub(NOISE, "0", " / ".join(told).replace("\n", "|"))
     return {"words": words} | {f"numbers {k}": part for k, part in enumerate(parts, start=1)}
 
 
@@ -95,6 +98,8 @@ def _numbers(axes) -> list[float]:
         place = axes.transAxes.inverted().transform(legend.get_bbox_to_anchor().get_points())
         found += [*place.ravel(), *(text.get_fontsize() for text in legend.get_texts()[:1])]
         found += [legend.get_title().get_fontsize(), legend.get_frame().get_alpha()]
+    for patch in axes.patches:
+        found += [*patch.get_path().get_extents(patch.get_patch_transform()).extents, patch.get_linewidth()]
     for line in axes.lines:
         found += _lies(np.c_[line.get_xdata(orig=False), line.get_ydata(orig=False)])
     for part in axes.collections:
