@@ -13,8 +13,8 @@ from record import _weights
 
 #: Numbers of one row of a record: of more, a change of one would not be seen in their mean.
 MOST = 60
-#: What is left of a difference of equal numbers.
-NOISE = r"\d(\.\d+)?e-1[4-9]"
+#: What is left of a difference of equal numbers, and where.
+NOISE = r"\d(\.\d+)?e-1[4-9]([ |]at[ |]mu_1[ |]/[ |]rms_slope[ |]=[ |][\d.e+-]+)?"
 
 
 def of(figure) -> dict[str, object]:
