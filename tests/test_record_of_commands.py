@@ -151,7 +151,7 @@ PRINTED = {
         "run toy.yaml --store u.zarr",
         "status r.zarr",
         "status r.zarr --failures",
-        "status r.zarr --messages --json",
+        "status r.zarr --messages",
         "status p.zarr",
         "status p.zarr --watch",
         "status u.zarr --json",
