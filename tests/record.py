@@ -23,10 +23,17 @@ def check(regression, found: Mapping[str, object]) -> None:
     Of an array counts how many values it has, how many are finite, their weighted root mean square, and in units of
     that the weighted mean, the ends and the extremes: no value can change by itself.
     """
+    _compare(regression, _table(found))
+
+
+def _table(found: Mapping[str, object]) -> pd.DataFrame:
     rows = {name: _row(value) for name, value in found.items()}
-    table = pd.DataFrame.from_dict(rows, orient="index").rename_axis("what").reset_index()
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("what").reset_index()
+
+
+def _compare(regression, table: pd.DataFrame, name: str | None = None) -> None:
     tolerances = {name: {"atol": ROUNDING, "rtol": 0.0} for name in OF_ALL}
-    regression.check(table, default_tolerance={"atol": 0.0, "rtol": ROUNDING}, tolerances=tolerances)
+    regression.check(table, basename=name, default_tolerance={"atol": 0.0, "rtol": ROUNDING}, tolerances=tolerances)
 
 
 def _row(value: object) -> dict[str, object]:
@@ -47,3 +54,15 @@ def _row(value: object) -> dict[str, object]:
 def _weights(size: int) -> np.ndarray:
     """Return weights about one, each its own: values in each other's place are another mean."""
     return 1.0 + 0.5 * np.sin(1.0 + np.arange(size))
+
+
+def check_part(regression, name: str, part: str, found: Mapping[str, object]) -> None:
+    """Compare what was found of one part of a record that several tests share."""
+    path = regression.original_datadir / f"{name}.csv"
+    here = _table({f"{part}: {what}": value for what, value in found.items()})
+    if path.exists():
+        there = pd.read_csv(path, index_col=0, keep_default_na=False)
+        of_part = there["what"].str.startswith(f"{part}: ")
+        before = there.index < (of_part.idxmax() if of_part.any() else len(there))
+        here = pd.concat([there[before], here, there[~before & ~of_part]], ignore_index=True)
+    _compare(regression, here, name)

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import record
+import seen
 import xarray as xr
 from scipy.stats import norm
 
@@ -32,7 +34,7 @@ def test_a_parameter_of_ones_own_has_its_words_and_its_unit():
     assert quantity("track_age", values)[:2] == ("track age", "s")
 
 
-def test_shades_are_the_intervals_of_the_fit():
+def test_shades_are_the_intervals_of_the_fit(dataframe_regression):
     """Of residuals 95 % of a normal distribution, of an unknown those of the table: light 95 %, dark 68 %."""
     velocity, height = np.geomspace(0.01, 1, 8), np.geomspace(1e-6, 1e-5, 9)
     friction = 0.3 * np.sqrt(height / 1e-6) * velocity[:, None] ** 0.2
@@ -45,7 +47,8 @@ def test_shades_are_the_intervals_of_the_fit():
     text = "velocity [m/s],mu,standard_error\n" + "\n".join(rows)
     data = xr.Dataset({"mu": (("velocity", "rms_roughness"), friction, {"units": "1"})}, coords)
     data = data.assign_attrs(measured={"name": "rig.csv", "text": text})
-    _, residuals, marginal = calibration({"": data}).axes
+    figure = calibration({"": data})
+    _, residuals, marginal = figure.axes
     (shade,) = residuals.patches
     np.testing.assert_allclose((shade.get_y(), shade.get_y() + shade.get_height()), norm.ppf([0.025, 0.975]), rtol=1e-4)
     ends = sorted((each.get_paths()[0].vertices[:, 0] for each in marginal.collections), key=np.ptp)
@@ -53,3 +56,4 @@ def test_shades_are_the_intervals_of_the_fit():
     for x, level in zip(ends, ("_68", ""), strict=True):
         told = [float(found[f"rms_roughness_{end}{level}"]) for end in ("low", "high")]
         np.testing.assert_allclose((x.min(), x.max()), 1e6 * np.array(told), rtol=1e-4)
+    record.check(dataframe_regression, seen.of(figure))
