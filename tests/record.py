@@ -13,7 +13,6 @@ import pandas as pd
 
 #: Other processors and libraries round otherwise: parts of a value that may differ.
 ROUNDING = 1e-5
-DIGITS = 8
 #: Columns whose unit is the root mean square of the values.
 OF_ALL = ("mean", "first", "last", "least", "largest")
 
@@ -49,8 +48,7 @@ def _row(value: object) -> dict[str, object]:
         return row | {"finite": finite.size}
     scaled = finite / rms
     ends = (np.average(scaled, weights=weights), scaled[0], scaled[-1], scaled.min(), scaled.max())
-    numbers = (float(f"{number:.{DIGITS}g}") for number in (rms, *ends))
-    return row | {"finite": finite.size, **dict(zip(("rms", *OF_ALL), numbers, strict=True))}
+    return row | {"finite": finite.size, "rms": rms, **dict(zip(OF_ALL, map(float, ends), strict=True))}
 
 
 def _weights(size: int) -> np.ndarray:
