@@ -71,6 +71,7 @@ def told(folder, monkeypatch, capsys):
     """Return a function from a command to what it says, prints, writes and draws."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("mdr_dask.cli.progress.PAUSE", 1e6)  # however busy the machine is
+    monkeypatch.setenv("COLUMNS", "100")
     drawn = []
 
     def picture(figure, path, **options):
