@@ -14,6 +14,7 @@ from mdr_dask.campaign import Replication, Tolerance, loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, FitError
 from mdr_dask.execute import Part, Resources
+from mdr_dask.execute.answers import FEWEST
 from mdr_dask.fits import answers
 from mdr_dask.fits.base import Fit
 
@@ -70,8 +71,8 @@ def own(toy, monkeypatch):
     monkeypatch.setattr("mdr_dask.fits.answers.available", lambda _: known)  # the first: it is loaded by now
     monkeypatch.setattr(fits, "available", lambda _: known)
 
-    def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0), answer="level.level"):
-        rounds = Replication(10, at_most, {}, {answer: tolerance})
+    def campaign(tolerance, at_most=120, positions=(5.0, 2.0, 1.0, 3.0), answer="level.level", at_least=10):
+        rounds = Replication(at_least, at_most, {}, {answer: tolerance})
         axes = toy.axis("slope", [0.0, 1.0, 9.0]), toy.axis("position", positions)
         return toy.campaign(*axes, realisations=rounds, noise=0.5)
 
@@ -93,6 +94,13 @@ def test_only_rows_and_columns_that_a_constant_follows_from_go_on(own, url):
     result = _level({"": store.datasets(url)[""].load()})
     half = (result.level_high - result.level_low) / 2
     assert (half <= np.maximum(0.25, 0.2 * abs(result.level))).all()
+
+
+def test_every_case_goes_on_until_there_are_enough_lines_to_know_an_interval(own, url):
+    run(own(Tolerance(absolute=100.0), at_least=4), url)
+    found = taken(url)
+    assert (found >= FEWEST).all()
+    assert (found < 2 * FEWEST).all()
 
 
 def test_the_same_bytes_however_often_it_stops_and_whoever_works(own, toy, tmp_path):

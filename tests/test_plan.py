@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from mdr_dask import plan
 from mdr_dask.campaign import Replication, Tolerance, load
 from mdr_dask.errors import CampaignError
 from mdr_dask.execute import Resources, run
+from mdr_dask.execute.cells import Cells
 
 SLOW_CASE = 0.05
 
@@ -197,3 +199,12 @@ def test_blocks_that_last_very_long_are_cut_even_where_it_repeats_work(toy, cost
     costs(1.0, whole=("position",), seconds=lambda block: 2 * plan.SHARED_SECONDS)
     (template,) = plan.templates(study(toy, (8, 6), 1), 1)
     assert template.chunks["position"] == 1
+
+
+def test_a_block_takes_the_share_of_its_time_that_is_wanted_of_it():
+    wanted = np.zeros((4, 6), dtype=bool)
+    wanted[0, :3] = True
+    template = SimpleNamespace(region=lambda index: (slice(2 * index, 2 * index + 2),), seconds=lambda _: 40.0)
+    cells = Cells(template, wanted, ~wanted, 0)
+    assert [cells.seconds(0), cells.seconds(1)] == [10.0, 0.0]
+    assert cells.new == wanted.size

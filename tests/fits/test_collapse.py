@@ -1,9 +1,12 @@
 """What a master curve says of its curves and of the law of their shifts."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from mdr_dask.fits.collapse import laws_of
 from mdr_dask.fits.master_curve import master_curve
 
 TEMPERATURES = np.arange(0.0, 61.0, 10.0)  # degrees Celsius
@@ -57,3 +60,21 @@ def test_too_few_curves_leave_a_law_untested():
     sentence = master_curve(table[table["temperature"].isin([20.0, 30.0])])["law_holds"].item()
     assert sentence.startswith("not tested: the curves collapse: yes")
     assert "law of the shifts: not tested: the law arrhenius needs more than 1 shift factors" in sentence
+
+
+def test_degrees_celsius_and_kelvin_follow_the_same_laws():
+    result = SimpleNamespace(
+        groups=TEMPERATURES,
+        horizontal=wlf(TEMPERATURES),
+        covariance=1e-4 * np.diag(TEMPERATURES != REFERENCE),
+        reference=REFERENCE,
+    )
+    warmer = SimpleNamespace(**vars(result) | {"groups": TEMPERATURES + 273.15, "reference": REFERENCE + 273.15})
+    celsius, _ = laws_of(result, "frequency", "degC", is_temperature=True)
+    kelvin, _ = laws_of(warmer, "frequency", "K", is_temperature=True)
+    assert celsius.keys() == kelvin.keys() > {"arrhenius_activation_energy", "wlf_c2_low"}
+    for name, value in celsius.items():
+        assert value.item() == pytest.approx(kelvin[name].item(), rel=1e-6), name
+    assert celsius["wlf_c2"].item() == pytest.approx(100.0, rel=1e-3)
+    rise = np.polyfit(1 / (TEMPERATURES + 273.15), np.log(10) * -wlf(TEMPERATURES), 1)[0]
+    assert abs(celsius["arrhenius_activation_energy"].item()) == pytest.approx(8.314462618 * abs(rise), rel=0.05)

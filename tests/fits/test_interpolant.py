@@ -10,6 +10,7 @@ import mdr_dask
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolant import law
+from mdr_dask.models.base import Status
 from mdr_dask.store import save
 
 FORCE, VELOCITY = np.geomspace(1e-3, 1e2, 20), np.geomspace(1e-4, 1e2, 36)
@@ -109,3 +110,20 @@ def test_the_command(toy, tmp_path, monkeypatch, capsys):
     assert height == pytest.approx(float(mean.sel(slope=1.25).sel(position=0.1, method="nearest")), rel=1e-6)
     assert error > 0
     assert main(["law", "results/a.zarr", "height", "-o", "height.csv"]) == 2
+
+
+@pytest.mark.parametrize("shape", ["changing sign", "friction"])  # over the values, and over their logarithms
+def test_cases_that_adaptive_axes_left_out_have_the_error_of_what_lies_between(shape):
+    data = study(shape)
+    data["status"] = ("force", "velocity", "realisation"), np.full(data.mu.shape, Status.DONE)
+    left_out = np.zeros(data.mu.shape, dtype=bool)
+    left_out[1, 3::4] = True
+    data = data.assign(
+        mu=data.mu.where(~left_out),
+        status=data.status.where(~left_out, Status.NOT_NEEDED),
+    )
+    table = law(data, "mu")
+    rows = table.sel(force=data.force[1], velocity=data.velocity[left_out[1, :, 0]])
+    error = np.abs(rows.mu - study(shape).mu[1, left_out[1, :, 0], 0].to_numpy())
+    assert np.all(error <= rows.mu_error)
+    assert np.all(rows.mu_error < np.maximum(50 * error, 0.05))

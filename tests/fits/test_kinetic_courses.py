@@ -83,6 +83,9 @@ def test_jumps_in_proportion_to_the_change_of_velocity(lines):
     curved = FIT["jump_linearity"].compute({"": studies(lines, 40, change=SIZES, zeta=lambda dv: 0.5 * (1 + 2 * dv))})
     assert judged(curved, "no: departs") == 1
     assert coverage(curved, "zeta_trend", 2.0) >= LEAST
+    # each interval is as wide as the departures of its own level: xi is 0.6 zeta
+    zeta, xi = ((curved[f"{name}_high"] - curved[f"{name}_low"]).median().item() for name in ("zeta", "xi"))
+    assert xi / zeta == pytest.approx(0.6, rel=0.3)
 
 
 def test_one_size_of_jump_says_so():

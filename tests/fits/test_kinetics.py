@@ -1,3 +1,4 @@
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +9,7 @@ from mdr_dask.fits import available, kinetics
 from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.kinetics import relaxation_curves
 from mdr_dask.fits.relaxation import exponential, widths
+from mdr_dask.plots import available as drawn
 
 FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-4, 20, 60)
@@ -225,3 +227,14 @@ def test_rates_count_in_a_power_as_well_as_their_logarithms_are_known():
     assert power[0] == pytest.approx(slope, rel=1e-9)
     assert factor == pytest.approx(np.exp(level), rel=1e-9)
     assert deviation == pytest.approx(np.std(logs[0, good] - slope * x[good] - level), rel=0.5)
+
+
+def test_a_figure_draws_each_exponential_that_was_fitted():
+    data = store(np.array([0.05]), 0.7, 0.3, shape=0.5)
+    figure = drawn("velocity_jump")["jump_fit"].figure({"": data.isel(velocity=0)})
+    found = relaxation_curves(data)
+    lines = {line.get_label(): line for line in figure.axes[0].lines}
+    for label, name in (("two exponentials", "two"), ("all times alike", "alike"), ("weights", "one")):
+        (line,) = (line for words, line in lines.items() if label in words)
+        np.testing.assert_allclose(np.sort(line.get_ydata()), np.sort(found[name].values))
+    plt.close(figure)
