@@ -51,6 +51,18 @@ def test_development_draws_every_cycle_and_the_limit(methods):
     figure.savefig(__import__("io").BytesIO())
 
 
+@pytest.mark.parametrize(("sticks", "drawn"), [((0.5, 0.7), True), ((0.52, 0.72), False)])
+def test_a_limit_is_drawn_of_the_same_case_only(sticks, drawn):
+    limit = study("limit", [8.0], sticks=sticks).expand_dims(wear_rule=["limit"])
+    figure = wear.draw_development({"development": study("exact", [0.5, 2.0]), "long": limit})
+    dotted = [line for line in figure.axes[0].lines if line.get_linestyle() == ":"]
+    assert len(dotted) == drawn
+    for line in dotted:
+        same = limit.worn_profile.isel(wear_rule=0, cycles=0, realisation=0)
+        shown = [np.allclose(line.get_ydata(), one) for one in same.transpose("stick_radius", "radius").to_numpy()]
+        assert sum(shown) == 1
+
+
 def test_profiles_draw_exact_dashed_fast_full_and_the_limit_dotted(methods):
     figure = wear.draw_profiles({"parabola": methods})
     assert len(figure.axes) == 4
