@@ -314,6 +314,17 @@ def test_dry_run_on_a_store_says_what_remains(campaign, filled, capsys):
     assert xr.open_zarr(filled).sizes["realisation"] == 8
 
 
+def test_a_plan_of_rounds_counts_the_first_of_them(toy, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("rounds.yaml").write_text(
+        "name: rounds\nmodel: toy\nrealisations: {at_least: 4, at_most: 40, until: {height: 5 %}}\n"
+        "parameters:\n  noise: 0.3\n  position: [1 m, 2 m]\n"
+    )
+    assert main(["run", "rounds.yaml", "--quiet"]) == 0
+    assert main(["run", "rounds.yaml", "--dry-run"]) == 0
+    assert "8 results of the first round are in the store already, 0 remain" in capsys.readouterr().out
+
+
 def test_a_reader_that_has_seen_enough_is_no_error(filled):
     line = subprocess.run(
         f"{sys.executable} -m mdr_dask show {filled} --realisations --limit 0 --json | head -1",

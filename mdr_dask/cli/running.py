@@ -94,7 +94,8 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
     click.echo("\n".join([f"{study.name} -> {url}", *study_lines(study, costs)]))
     if kept:
         left = seconds(costs.seconds * to_do / costs.results)
-        click.echo(f"{kept} results are in the store already, {to_do} remain: about {left} on one core")
+        what = "results of the first round" if study.replication.goes_on else "results"
+        click.echo(f"{kept} {what} are in the store already, {to_do} remain: about {left} on one core")
 
 
 def _resources(options: dict[str, Any]) -> Resources:
