@@ -10,6 +10,7 @@ from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.kinetics import relaxation_curves
 from mdr_dask.fits.relaxation import exponential, widths
 from mdr_dask.plots import available as drawn
+from mdr_dask.plots.kinetics import over_slope, relaxing
 
 FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-4, 20, 60)
@@ -110,6 +111,21 @@ def test_constant_of_the_jump_law_is_found() -> None:
     found = FIT["jump_law"].compute({"": both})
     assert found["hurst"].values.tolist() == ["0.7", "0.8", "all"]
     assert found["constant"].values[2] == pytest.approx(found["constant"].values[0], rel=1e-12)
+
+
+def test_two_cases_are_enough_for_the_jump_law_and_one_is_not() -> None:
+    data = store(ABOVE, 0.7, 0.3)
+    found = FIT["jump_law"].compute({"": data.isel(velocity=slice(-4, -2))}).squeeze()
+    assert found["constant"].item() == pytest.approx(0.42, rel=0.1)
+    with pytest.raises(FitError, match="two or more cases"):
+        FIT["jump_law"].compute({"": data.isel(velocity=slice(-4, -3))})
+
+
+def test_friction_is_drawn_as_it_is_where_no_slope_is_stored() -> None:
+    data = store(ABOVE, 0.7, 0.3)
+    divided, label = over_slope(data.drop_vars("rms_slope"))
+    assert (float(divided), label) == (1.0, r"$\mu$")
+    np.testing.assert_allclose(relaxing(data.drop_vars("rms_slope")), SLOPE * relaxing(data))
 
 
 def test_limits_of_the_jump() -> None:

@@ -12,7 +12,7 @@ import rows
 import xarray as xr
 from scipy.special import gamma
 
-from mdr_dask import fits
+from mdr_dask import fits, models
 from mdr_dask.errors import DataError, FitError
 
 LINE = "  length: 20 mm\n  points: 500\n  rms_roughness: 0.37 um\n"
@@ -139,3 +139,12 @@ def test_everything_that_every_fit_finds_is_on_record(study, tmp_path, dataframe
             for series, result in results.items():
                 found |= rows.of_dataset(f"{mood} {name}{series}", result, study in TOLD and mood == "scattered", 2)
     record.check(dataframe_regression, found)
+
+
+def test_what_every_fit_says_of_itself_is_on_record(dataframe_regression):
+    found = {
+        name: [fit.models, fit.summary, fit.apart, "of the campaign" if callable(fit.constants) else fit.constants]
+        for model in models.names()
+        for name, fit in fits.available(model).items()
+    }
+    record.check(dataframe_regression, {name: [str(part) for part in said] for name, said in found.items()})

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import problem, viscoelastic
 from mdr_dask.physics.sliding.problem import Aim, Arms, solve
-from mdr_dask.physics.sliding.viscoelastic import ViscoelasticLadder, steady_viscoelastic_sliding
+from mdr_dask.physics.sliding.viscoelastic import FRACTION, ViscoelasticLadder, steady_viscoelastic_sliding
 from mdr_dask.physics.solids import complex_modulus, kelvin, power_law_series, prony, standard_solid
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
@@ -297,6 +297,7 @@ def test_an_accuracy_solves_no_grid_twice(seen, monkeypatch):
     [
         (np.full(64, np.nan), 1.0, "the heights must be finite"),
         (np.zeros(63), 1.0, "a multiple of four cells and at least eight, got 63"),
+        (np.zeros(4), 1.0, "a multiple of four cells and at least eight, got 4"),
         (np.zeros(64), np.inf, "the load must be positive and finite, got inf"),
         (np.zeros(64), -1.0, "the load must be positive and finite, got -1.0"),
     ],
@@ -304,6 +305,13 @@ def test_an_accuracy_solves_no_grid_twice(seen, monkeypatch):
 def test_bad_input_is_refused(height, load, message):
     with pytest.raises(ValueError, match=message):
         steady_viscoelastic_sliding(periodic_line(height, None), kelvin(1e6, 1e-3), load)
+
+
+def test_eight_cells_are_a_line():
+    height = np.cos(2 * np.pi * np.arange(8) / 8)
+    slope = -2 * np.pi * np.sin(2 * np.pi * np.arange(8) / 8)
+    found = steady_viscoelastic_sliding(periodic_line(height, slope), kelvin(0.5, 0.2), 3.0)
+    assert (found.status, found.values[FRACTION]) == (Outcome.CONVERGED, pytest.approx(1.0))
 
 
 @settings(max_examples=150, deadline=None)
