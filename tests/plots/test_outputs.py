@@ -384,3 +384,12 @@ def test_an_axis_of_less_than_two_decades_has_plain_numbers(low):
     axes.figure.draw_without_rendering()
     shown = [float(label.get_text()) for label in axes.get_xticklabels() if label.get_text()]
     assert shown == pytest.approx([low, 2.5 * low, 5 * low])
+
+
+@pytest.mark.parametrize(("unit", "boiling"), [("K", 373.15), ("degC", 100.0)])
+def test_a_temperature_is_drawn_on_the_scale_that_was_asked_for(unit, boiling):
+    values = xr.DataArray([373.15], dims="temperature", attrs={"units": "K"})
+    with page.with_units({"temperature": unit}):
+        shown = style.quantity("temperature", values.rename("temperature"))
+    assert shown.unit == unit
+    assert 373.15 * shown.factor + shown.offset == pytest.approx(boiling)
