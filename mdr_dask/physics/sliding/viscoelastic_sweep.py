@@ -332,13 +332,12 @@ def _into_flight(
 ) -> None:  # pragma: no cover
     """Turn stretches into modes, after the strain has given way by `excess`; the shortest arm makes the stress zero."""
     stress = strain - excess
-    for m in range(e.size):
+    for m in range(moduli.size):
         e[m] -= excess
         if m > 0:
             stress += moduli[m] * e[m]
-    if e.size:
+    if moduli.size:
         e[0] = -stress / moduli[0]
-    if e.size:
         multiply(amplitude_of, e, modes)
 
 
