@@ -32,7 +32,7 @@ def _table(found: Mapping[str, object]) -> pd.DataFrame:
 
 
 def _compare(regression, table: pd.DataFrame, name: str | None = None) -> None:
-    tolerances = {name: {"atol": ROUNDING, "rtol": 0.0} for name in OF_ALL}
+    tolerances = {column: {"atol": ROUNDING, "rtol": 0.0} for column in OF_ALL}
     regression.check(table, basename=name, default_tolerance={"atol": 0.0, "rtol": ROUNDING}, tolerances=tolerances)
 
 
@@ -42,7 +42,7 @@ def _row(value: object) -> dict[str, object]:
     if values.dtype.kind not in "biuf":
         return row | {"words": " | ".join(map(str, values))}
     known = np.isfinite(values)
-    finite, weights = values[known].astype(float), _weights(values.size)[known]
+    finite, weights = values[known].astype(float), weights_of(values.size)[known]
     rms = float(np.sqrt(np.average(finite**2, weights=weights))) if finite.size else 0.0
     if rms == 0.0:
         return row | {"finite": finite.size}
@@ -51,7 +51,7 @@ def _row(value: object) -> dict[str, object]:
     return row | {"finite": finite.size, "rms": rms, **dict(zip(OF_ALL, map(float, ends), strict=True))}
 
 
-def _weights(size: int) -> np.ndarray:
+def weights_of(size: int) -> np.ndarray:
     """Return weights about one, each its own: values in each other's place are another mean."""
     return 1.0 + 0.5 * np.sin(1.0 + np.arange(size))
 

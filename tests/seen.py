@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.ticker import FixedLocator
-from record import _weights
+from record import weights_of
 
 #: Numbers of one row of a record: of more, a change of one would not be seen in their mean.
 MOST = 60
@@ -117,7 +117,7 @@ def _numbers(axes) -> list[float]:
 def _lies(points) -> list[float]:
     """Weighted means of the logarithms of coordinates: points in each other's place have others."""
     points = np.ma.filled(np.ma.asarray(points, dtype=float), np.nan)
-    scaled, weights = np.arcsinh(1e12 * points), _weights(len(points))
+    scaled, weights = np.arcsinh(1e12 * points), weights_of(len(points))
     known = np.isfinite(scaled)
     return [
         float(np.sinh(np.average(column[here], weights=weights[here]))) * 1e-12 if here.any() else 0.0

@@ -7,8 +7,6 @@ import pkgutil
 
 import pytest
 
-import mdr_dask
-
 #: Classes that gather while they live.
 CHANGING = {"Document", "_Group", "Inspection", "Group"}
 #: Classes that hold arrays, which have no truth value: one is equal to itself alone.
@@ -26,6 +24,6 @@ def test_data_is_frozen_and_compared_as_declared(room):
         for name, kind in vars(importlib.import_module(module.name)).items():
             if inspect.isclass(kind) and kind.__module__ == module.name and dataclasses.is_dataclass(kind):
                 found[name] = kind.__dataclass_params__
-    assert found, mdr_dask.__name__
+    assert found
     assert {name for name, told in found.items() if not told.frozen} <= CHANGING
     assert {name for name, told in found.items() if not told.eq} == BY_IDENTITY & found.keys()
