@@ -2,6 +2,7 @@
 
 A *stack* has a mean in its first row, `RESAMPLES` means of resampled realisations behind it, and perhaps means moved by
 their errors behind those. What is computed from a stack row by row is a stack, too, and `interval` joins all of it.
+A resample is NaN where it draws nothing but lost realisations: it says nothing, and is left out of all that follows.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ RESAMPLES = 400
 GROUPS = 32
 #: Probabilities of the ends of an interval.
 TAILS = (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)
+#: Fewest resamples that reach into the tails.
+FEWEST = round(1 / TAILS[0])
+#: Logarithm of what is not positive: its exponential is 0.
+NOTHING = -1000.0
 
 
 @lru_cache(maxsize=8)
@@ -71,6 +76,13 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     return rows
 
 
+def logarithms(stack: FloatArray) -> FloatArray:
+    """Return logarithms of what is positive by nature: scatter and errors that take it to zero or below lie lowest."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        logs: FloatArray = np.where(stack <= 0, NOTHING, np.log(stack))
+    return logs
+
+
 def _reach(shifts: FloatArray) -> FloatArray:
     """Return how far errors reach up together, from the shifts of every group up and down; NaN is none."""
     known = np.where(np.isnan(shifts), 0.0, shifts)
@@ -101,9 +113,9 @@ def interval(stack: FloatArray, count: ArrayLike, positive: bool = False) -> tup
     positive : bool
         Whether to widen in logarithms, for what is positive.
     """
-    with np.errstate(invalid="ignore"):
-        values = np.log(np.where(stack > 0, stack, np.nan)) if positive else stack
-    known = np.isfinite(values[0]) & np.any(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) & (np.asarray(count) > 1)
+    values = logarithms(stack) if positive else stack
+    enough = np.count_nonzero(np.isfinite(values[1 : 1 + RESAMPLES]), axis=0) >= FEWEST
+    known = np.isfinite(values[0]) & ((stack[0] > 0) | (not positive)) & enough & (np.asarray(count) > 1)
     ends = np.full((2, *values.shape[1:]), np.nan)
     ends[:, known] = np.nanquantile(values[1 : 1 + RESAMPLES, known], TAILS, axis=0)
     with np.errstate(invalid="ignore"):
@@ -126,6 +138,8 @@ def widening(count: ArrayLike) -> FloatArray:
 def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     """Return how often scatter and errors alone leave residuals as large as those of the first row.
 
+    NaN where too few resamples know the scatter, as of one realisation.
+
     Parameters
     ----------
     residuals : array, shape (1 + RESAMPLES + 2 groups, ...)
@@ -138,5 +152,7 @@ def chance(residuals: FloatArray, count: int, draws: int = RESAMPLES) -> float:
     flat = residuals.reshape(residuals.shape[0], -1)
     size = np.sqrt(np.sum(flat[0] ** 2))
     away = np.sqrt(np.sum((flat[1:] - flat[0]) ** 2, axis=1))
-    alone = widening(count) * away[:draws] + _reach(away[draws:])
-    return float(np.mean(alone >= size))
+    scatter = away[:draws][~np.isnan(away[:draws])]
+    if count < 2 or scatter.size < FEWEST:
+        return np.nan
+    return float(np.mean(widening(count) * scatter + _reach(away[draws:]) >= size))

@@ -87,3 +87,43 @@ def test_errors_reach_as_far_up_as_they_move_up_and_as_far_down_as_they_move_dow
     same = np.full((1 + bootstrap.RESAMPLES, 1), 5.0)
     low, high = bootstrap.interval(np.concatenate([same, [[8.0]], [[4.0]], [[4.5]], [[5.2]]]), 10)
     assert (low[0], high[0]) == pytest.approx((3.5, 8.2))
+
+
+@pytest.mark.parametrize("lost", [0, 2, 3])
+def test_resamples_of_lost_lines_alone_say_nothing_of_a_law(lost: int) -> None:
+    """A law is doubted as often with lost lines as without; those that draw nothing else are no sign against it."""
+    values = np.random.default_rng(12).normal(0.0, 1.0, (4, 3, 500))
+    values[:lost, 0] = np.nan
+    count = 4 - lost
+    stacks = [bootstrap.means(case) for case in np.moveaxis(values, 2, 0)]
+    if count == 1:
+        assert all(np.isnan(bootstrap.chance(stack, count)) for stack in stacks)
+        return
+    known = np.all(np.isfinite(stacks[0]), axis=1)
+    assert known.all() == (lost == 0)
+    found = [bootstrap.chance(stack, count) for stack in stacks]
+    told = [bootstrap.chance(stack[known], count, np.count_nonzero(known[1:])) for stack in stacks]
+    assert np.array_equal(found, told)
+
+
+def test_too_few_resamples_know_no_tails() -> None:
+    stack = bootstrap.means(np.random.default_rng(13).normal(1.0, 1.0, (9, 1)))
+    few, enough, fewest = stack.copy(), stack.copy(), round(1 / bootstrap.TAILS[0])
+    few[fewest:] = np.nan
+    enough[1 + fewest :] = np.nan
+    assert np.isnan(bootstrap.chance(few, 9))
+    assert np.all(np.isnan(bootstrap.interval(few, 9)))
+    assert bootstrap.chance(enough, 9) > 0
+    assert np.all(np.isfinite(bootstrap.interval(enough, 9)))
+
+
+def test_scatter_and_errors_that_reach_zero_leave_no_least_value_of_what_is_positive() -> None:
+    """Resamples at or below zero, and errors larger than the value, are not left out of the interval."""
+    stack = np.full((1 + bootstrap.RESAMPLES, 2), 1.0)
+    stack[1:41, 0] = -0.5
+    low, high = bootstrap.interval(stack, 9, positive=True)
+    assert low[0] == 0
+    assert low[1] == high[1] == high[0] == 1
+    low, high = bootstrap.interval(np.concatenate([stack, [[1.0, 3.0], [1.0, -1.0]]]), 9, positive=True)
+    assert (low[1], high[1]) == pytest.approx((0.0, 3.0))
+    assert np.all(np.isnan(bootstrap.interval(-stack[:, 1:], 9, positive=True)))

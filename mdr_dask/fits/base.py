@@ -109,7 +109,7 @@ class Fitted(NamedTuple):
     departures : array, shape (...)
         Data less law.
     chance : float
-        How often scatter and errors alone leave as much; NaN where one realisation has no scatter.
+        How often scatter and errors alone leave as much; NaN where too few realisations know the scatter.
     """
 
     constants: FloatArray
@@ -138,7 +138,7 @@ def fitted(
     """
     constants = fit(data)
     residuals = left(data, constants)
-    probability = bootstrap.chance(residuals, count) if count > 1 else np.nan
+    probability = bootstrap.chance(residuals, count)
     if not probability >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])
     return Fitted(constants, residuals[0], probability)
@@ -169,7 +169,7 @@ def law_holds(
     if max(rms, largest / 2) <= within:
         return f"yes: {departs}, within {within:g} and {2 * within:g}"
     if np.isnan(chance):
-        return f"not tested: one realisation knows no scatter; {departs}"
+        return f"not tested: too few realisations to know the scatter; {departs}"
     if chance >= DOUBTFUL:
         return f"yes: {departs}, which the scatter explains (probability {chance:.2g})"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"

@@ -162,7 +162,7 @@ class Table(NamedTuple):
         """Return the stack of the logarithms of the means, which relative errors move: a mean may err by its size."""
         means = bootstrap.means(self.friction[used].T)
         relative = self._errors(used) / means[0]
-        return self._moved(np.log(means), np.where(np.isinf(relative), 1.0, relative))
+        return self._moved(bootstrap.logarithms(means), np.where(np.isinf(relative), 1.0, relative))
 
     def _errors(self, used: Any) -> FloatArray:
         known = ~np.isnan(self.error[used])
@@ -256,7 +256,7 @@ def _zone_one(data: xr.Dataset) -> Variables:
 
 def _velocity_of(top: FloatArray, x: FloatArray, count: int, meaning: str, unit: str) -> Variables:
     """Return the velocity of the largest friction from the stack of its logarithm; no ends where it may lie beyond."""
-    beyond = np.isinf(top)
+    beyond = np.isinf(top[~np.isnan(top)])
     found = constant("plateau_velocity", np.exp(np.clip(top, x[0], x[-1])), count, meaning, positive=True)
     if beyond[0] or beyond.mean() > bootstrap.TAILS[0]:
         found |= {f"plateau_velocity_{end}": xr.Variable((), np.nan) for end in ("low", "high")}

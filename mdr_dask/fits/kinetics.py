@@ -297,7 +297,7 @@ def _power(x: FloatArray, rates: FloatArray, counts: NDArray[np.int64]) -> tuple
     found = fitted(
         lambda logs: logs @ solve,
         lambda logs, constants: logs - constants @ design,
-        np.log(bootstrap.regrouped(rates[:, good])),
+        bootstrap.regrouped(bootstrap.logarithms(rates[:, good])),
         int(counts[good].min()),
     )
     power, level = found.constants.T

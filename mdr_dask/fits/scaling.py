@@ -303,7 +303,7 @@ def _spread(x: FloatArray, row: FloatArray) -> float:
 
 def _collapsed(found: Collapse, spread: float, loads: FloatArray, stated: FloatArray, count: int) -> Variables:
     """Return how well curves collapse, and whether they do."""
-    chance = bootstrap.chance(found.residuals, count) if count > 1 else np.nan
+    chance = bootstrap.chance(found.residuals, count)
     rms = float(np.sqrt(np.mean(found.residuals[0] ** 2)))
     names = {
         "force_number": (loads, "F_N / (G h L) of every curve"),

@@ -56,7 +56,7 @@ def highest(x: FloatArray, stack: FloatArray, count: int) -> Top:
     for drop in TOPS:
         near = _about_the_top(stack[0], drop)
         top, at, rise, left = _parabola(x[near], stack[:, near])
-        if left.shape[1] > 3 and (count < 2 or bootstrap.chance(left, count) < DOUBTFUL):
+        if left.shape[1] > 3 and not bootstrap.chance(left, count) >= DOUBTFUL:
             continue
         break
     resamples = top[1 : 1 + bootstrap.RESAMPLES]  # NaN of those that draw nothing but lost lines

@@ -254,3 +254,14 @@ def test_a_figure_draws_each_exponential_that_was_fitted():
         (line,) = (line for words, line in lines.items() if label in words)
         np.testing.assert_allclose(np.sort(line.get_ydata()), np.sort(found[name].values))
     plt.close(figure)
+
+
+def test_a_limit_is_not_tested_where_one_line_is_left() -> None:
+    data = store(np.array([1e-6, 2e-6]), 0.7, 0.3, realisations=5)
+    levels = [name for name in data.data_vars if name.startswith("friction_coefficient")]
+    for name in levels:
+        data[name][1, 1:] = np.nan
+    data["friction_coefficient_jump"] = 2 * data["friction_coefficient_jump"]
+    found = FIT["jump_limits"].results({"one": data})["one"].sel(limit="region I")
+    assert found["cases"].item() == 2
+    assert found["law_holds"].item().startswith("not tested: too few realisations")

@@ -39,7 +39,7 @@ def test_sentences():
     # a step in few of many cases is not small because its mean square is
     assert law_holds(np.append(np.zeros(99), 0.3), 0.0).startswith("no: departs by 0.03 rms, at most 0.3")
     assert law_holds(large, 0.0, constants=3).startswith("not tested: 3 cases for 3 constants")
-    assert law_holds(large, np.nan).startswith("not tested: one realisation knows no scatter")
+    assert law_holds(large, np.nan).startswith("not tested: too few realisations to know the scatter")
 
 
 def test_a_law_that_does_not_hold_moves_its_constants():
