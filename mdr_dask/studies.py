@@ -29,6 +29,7 @@ from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
 from mdr_dask.questions.table import MEANS, Question
 from mdr_dask.questions.table import table as rows_of
+from mdr_dask.tables import is_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -253,8 +254,10 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     FitError
         If the study has not what the law needs.
     """
-    if isinstance(study, str | Path) and Path(study).is_file():
-        return _of_table(study, law)
+    if isinstance(study, str | Path) and is_table(study):
+        from mdr_dask.fits.velocity_steps import of_file
+
+        return of_file(study, law)
     groups = _groups(study)
     if measured is not None:
         from mdr_dask.fits.calibration import with_table
@@ -263,15 +266,6 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     model = _model(groups)
     found: dict[str, xr.Dataset] = _named(fits.available(model), law, f"law for {model}").results(groups)
     return next(iter(found.values())) if len(found) == 1 else _tree(found)
-
-
-def _of_table(path: str | Path, law: str) -> xr.Dataset:
-    from mdr_dask.fits.calibration import read_file
-    from mdr_dask.fits.velocity_steps import of_table
-
-    found = read_file(path)
-    constants: xr.Dataset = _named({"rate_and_state": of_table}, law, "law for a table")(found["text"], found["name"])
-    return constants
 
 
 def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
@@ -341,7 +335,7 @@ def master_curve(
 
     from mdr_dask.fits import curve_tables, master_curve
 
-    if isinstance(study, str | Path) and Path(study).is_file():
+    if isinstance(study, str | Path) and is_table(study):
         study = curve_tables.read_table(study)
     if not isinstance(study, DataFrame):
         groups = _groups(study)

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -129,6 +130,11 @@ class Sheet:
     names: tuple[Cell, ...]
     units: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
+
+
+def is_table(path: str | Path) -> bool:
+    """Say whether there is a file that may hold a table, not a campaign or a published study."""
+    return Path(path).is_file() and Path(path).suffix not in (".yaml", ".zip")
 
 
 def decoded(content: bytes, source: str) -> str:

@@ -1,13 +1,16 @@
 """Wrong options, wrong files, full disks, damaged stores: one error with the exit code 2, and nothing written."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 from test_cli import CAMPAIGN
 
+import mdr_dask
 from mdr_dask.cli import main
+from mdr_dask.errors import MdrDaskError
 
 #: Command line, and what the error has to say; STORE is a filled store, FOREIGN a Zarr group of somebody else.
 WRONG = [
@@ -22,7 +25,7 @@ WRONG = [
     ("run small.yaml --store small.yaml", "small.yaml: a file, expected the folder of a store or nothing"),
     ("run small.yaml --store FOREIGN", "FOREIGN: Zarr, but not a study that mdr_dask made"),
     ("run small.yaml --store nobody://x", "nobody://x: expected a path, or a URL that fsspec can open: Protocol not"),
-    ("run small.yaml --store small.yaml/x.zarr", "small.yaml/x.zarr: making it failed: Not a directory"),
+    ("run small.yaml --store small.yaml/x.zarr", "small.yaml/x.zarr: small.yaml is a file, expected the folder of"),
     ("run other.yaml --store STORE", "STORE: made from another campaign; name another store, or remove this one:"),
     ("run other.yaml --store STORE --dry-run", "hurst: 0.7 in the store, 0.6 in the campaign"),
     ("run large.yaml", "large.yaml: one case needs about"),
@@ -152,6 +155,7 @@ def folder(tmp_path_factory):
         "broken.yaml": "class: distributed.LocalCluster\narguments: {nobody: 1}\n",
         "number.yaml": "class: distributed.LocalCluster\narguments: 3\n",
         "list.yaml": "[class]\n",
+        "notes.txt": "what we did\n",
     }.items():
         (folder / name).write_text(text)
     (folder / "latin.yaml").write_bytes("µ: 1\n".encode("latin-1"))
@@ -177,6 +181,79 @@ def test_one_error_and_nothing_written(folder, monkeypatch, capsys, line, told):
     assert streams.out == ""
     assert told.replace("STORE", "STORE.zarr") in streams.err
     assert contents(folder) == before
+
+
+#: Commands that take a store, and the same from Python.
+COMMANDS = [
+    "status FILE",
+    "status FILE --watch",
+    "show FILE",
+    "aggregate FILE",
+    "fit FILE zone_one",
+    "plot FILE",
+    "plot FILE velocity -o new/x.png",
+    "master-curve FILE",
+    "law FILE friction_coefficient -o new/x.nc",
+    "sensitivity FILE friction_coefficient",
+    "report FILE -o new/x.html",
+    "serve FILE",
+    "publish FILE -o new/x.zip",
+    "verify FILE",
+    "verify FILE --repair",
+    "verify FILE --repair --campaign small.yaml",
+    "run small.yaml --store FILE",
+    "run small.yaml --store FILE --dry-run",
+    "run small.yaml --store FILE --part 1/2",
+]
+CALLS = {
+    "open": lambda file: mdr_dask.open(file),
+    "fit": lambda file: mdr_dask.fit(file, "zone_one"),
+    "plot": lambda file: mdr_dask.plot(file, "velocity"),
+    "table": lambda file: mdr_dask.table(file),
+    "aggregate": lambda file: mdr_dask.aggregate(file),
+    "master_curve": lambda file: mdr_dask.master_curve(file),
+    "run": lambda file: mdr_dask.run("small.yaml", store=file),
+}
+FILES = {
+    "small.yaml": "small.yaml: a file, expected the folder of a store",
+    "small.yaml/x": "small.yaml/x: small.yaml is a file, expected the folder of a store",
+    "notes.txt": "notes.txt: a file, expected the folder of a store",
+}
+#: What may also be given a table, and speaks of tables.
+OF_TABLES = ("master-curve", "master_curve")
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("line", COMMANDS)
+def test_every_command_says_that_a_file_is_no_store(folder, monkeypatch, capsys, line, file):
+    monkeypatch.chdir(folder)
+    before = contents(folder)
+    assert main(line.replace("FILE", file).split()) == 2
+    errors = capsys.readouterr().err
+    if line.split()[0] not in OF_TABLES or file == "small.yaml":
+        assert errors.startswith(FILES[file])
+        assert errors.count("\n") == 1
+        assert ("'mdr-dask run small.yaml' runs a campaign" in errors) == (file != "notes.txt")
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("name", CALLS)
+def test_every_function_says_that_a_file_is_no_store(folder, monkeypatch, name, file):
+    monkeypatch.chdir(folder)
+    before = contents(folder)
+    told = FILES[file] if name not in OF_TABLES or file != "notes.txt" else "notes.txt:1:1: "
+    with pytest.raises(MdrDaskError, match=re.escape(told)):
+        CALLS[name](file)
+    assert contents(folder) == before
+
+
+def test_a_published_study_is_to_be_unpacked(folder, tmp_path, capsys):
+    packed = tmp_path / "study.zip"
+    assert main(["publish", str(folder / "STORE.zarr"), "-o", str(packed)]) == 0
+    assert main(["status", str(packed)]) == 2
+    assert f"{packed}: a file, expected the folder of a store; unpack it first" in capsys.readouterr().err
+    assert main(["verify", str(packed)]) == 0
 
 
 READING = [(f"{command} damaged.zarr", "friction_coefficient") for command in ("show", "aggregate")]

@@ -62,9 +62,10 @@ def fit(
     from mdr_dask import store as stores
     from mdr_dask.fits.calibration import with_table
     from mdr_dask.questions import selection
+    from mdr_dask.tables import is_table
 
     require_suffix(figure, FIGURES)
-    if Path(store).is_file():
+    if is_table(store):
         _fit_table(Path(store), names, form)
         return
     model = stores.attributes(store)["model"]
@@ -97,12 +98,10 @@ def fit(
 
 def _fit_table(path: Path, names: tuple[str, ...], form: str | None) -> None:
     """Fit what there is for tables."""
-    from mdr_dask.fits.calibration import read_file
-    from mdr_dask.fits.velocity_steps import of_table
+    from mdr_dask.fits.velocity_steps import of_file
 
-    require_known(names or ("rate_and_state",), ["rate_and_state"], "law for a table")
-    named = read_file(path)
-    _print(of_table(named["text"], named["name"]), "", form, 0)
+    for name in names or ("rate_and_state",):
+        _print(of_file(path, name), "", form, 0)
 
 
 def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:

@@ -118,9 +118,10 @@ def _open(source: str, series: str | None, selections: tuple[str, ...]) -> xr.Da
     from mdr_dask.fits.curve_tables import read_table
     from mdr_dask.fits.master_curve import friction_of_roughness
     from mdr_dask.questions import selection
+    from mdr_dask.tables import is_table
 
     path = Path("/dev/stdin" if source == "-" else source)
-    if path.is_file() or path.is_fifo() or source == "-":
+    if is_table(path) or path.is_fifo() or source == "-":
         if series is not None:
             raise click.UsageError(f"a table has no series, got --series {series}")
         return _rows(read_table(path), selections)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,8 @@ from scipy.optimize import brentq
 from scipy.special import stdtr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, FitError
+from mdr_dask.fits.calibration import read_file
 from mdr_dask.fits.determined import ENDS, SHARES, quantiles
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.tables import Column, read_table
@@ -237,3 +239,11 @@ def _dataset(trace: Trace, found: Mapping[str, FloatArray], left: FloatArray, is
 def of_table(text: str, source: str) -> xr.Dataset:
     """Return the rate-and-state constants of a table with the columns time, velocity and friction_coefficient."""
     return rate_and_state(read_trace(text, source))
+
+
+def of_file(path: str | Path, law: str = "rate_and_state") -> xr.Dataset:
+    """Return the constants of the table in a file; all laws but this one are those of stores."""
+    if law != "rate_and_state":
+        raise FitError(f"{path}: a file, expected the folder of a store for {law!r}; of a table it is rate_and_state")
+    found = read_file(path)
+    return of_table(found["text"], found["name"])

@@ -13,6 +13,7 @@ from mdr_dask.store.relaid import lay_out_again
 from mdr_dask.store.runners import alone
 from mdr_dask.store.seals import seal_name
 from mdr_dask.store.sound import unsound_files
+from mdr_dask.store.study import refuse_file
 from mdr_dask.store.verifying import Finding, Group, Inspection, inspect
 
 
@@ -30,6 +31,7 @@ def repair(url: str, campaign: Campaign | None = None) -> tuple[Inspection, Insp
     StoreBusyError
         If a run is at work on it.
     """
+    refuse_file(url)
     with alone(url):
         lost = lay_out_again(url, campaign) if campaign else []
         found = inspect(url)

@@ -65,6 +65,18 @@ def laying_out_again(url: str) -> str:
     return f"'mdr-dask verify --repair --campaign FILE {url}' lays it out again"
 
 
+def refuse_file(url: str, expected: str = "the folder of a store") -> None:
+    """Refuse a file, and a place below one, where a store is expected."""
+    path = local(url)
+    for place in () if path is None else (path, *path.parents):
+        if place.is_file():
+            found = "a file" if place == path else f"{place} is a file"
+            raise StoreError(f"{url}: {found}, expected {expected}{_HINTS.get(place.suffix, '').format(place)}")
+
+
+_HINTS = {".yaml": "; 'mdr-dask run {}' runs a campaign", ".zip": "; unpack it first"}
+
+
 def exists(url: str) -> bool:
     """Say whether there is a study at a path or URL, whoever made it.
 
@@ -73,10 +85,8 @@ def exists(url: str) -> bool:
     StoreError
         If there is something else.
     """
-    path = local(url)
-    if path is not None and path.is_file():
-        raise StoreError(f"{url}: a file, expected the folder of a store or nothing")
-    found = _root_attributes(url)
+    refuse_file(url, "the folder of a store or nothing")
+    path, found = local(url), _root_attributes(url)
     if found is None and path is not None and path.is_dir():
         others = sorted(entry.name for entry in path.iterdir() if entry.suffix != ".partial" and entry.name not in KEPT)
         if others:
@@ -118,9 +128,7 @@ def attributes(url: str) -> dict[str, Any]:
     StoreError
         If there is no study of mdr_dask at `url`, or one with a newer layout.
     """
-    path = local(url)
-    if path is not None and path.is_file():
-        raise StoreError(f"{url}: a file, expected the folder of a store; 'mdr-dask run {url}' runs a campaign")
+    refuse_file(url)
     found = _root_attributes(url)
     if found is None:
         raise StoreError(f"{url}: no store here; 'mdr-dask run CAMPAIGN' makes one")

@@ -23,7 +23,7 @@ from mdr_dask.store.records import digest, folder, lines, name_of, opened
 from mdr_dask.store.runners import at_work
 from mdr_dask.store.seals import read_seal, seal_name
 from mdr_dask.store.sound import is_root_sound, unsound_files
-from mdr_dask.store.study import attributes, document, laying_out_again
+from mdr_dask.store.study import attributes, document, laying_out_again, refuse_file
 
 IGNORED = (".partial", ASIDE)
 #: What lies beside the files of a store that was published: page, campaign and data, and what is said of all.
@@ -141,6 +141,7 @@ def verify(url: str) -> Inspection:
     StoreBusyError
         If a run is at work on it.
     """
+    refuse_file(url)
     runner, parts = at_work(url)
     if runner or parts:
         who = runner or f"part {', '.join(map(str, parts))}"
