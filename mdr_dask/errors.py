@@ -1,8 +1,8 @@
-"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home; and hints in messages."""
+"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home; and parts of messages."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 
@@ -39,6 +39,25 @@ class DataError(MdrDaskError):
 
 class FitError(MdrDaskError):
     """A law that cannot be fitted to the data given."""
+
+
+#: Digits that tell any two numbers of a computer apart.
+_ALL_DIGITS = 17
+
+
+def _rounded(number: float, digits: int) -> str:
+    return f"{number:.{digits}g}"
+
+
+def apart(
+    value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
+) -> tuple[str, ...]:
+    """Return a number and its limits with the fewest digits, some at least, that tell it from those it differs from."""
+    for more in range(digits, _ALL_DIGITS):
+        told, *others = (write(number, more) for number in (value, *limits))
+        if all(text != told for text, limit in zip(others, limits, strict=True) if limit != value):
+            return told, *others
+    return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
 #: What words in a name stand for others that people use.

@@ -231,7 +231,7 @@ def test_points_that_the_accuracy_chooses_meet_it_or_it_is_said():
     met = stated <= 0.1 * value
     assert np.mean(met) >= 0.7
     assert np.all(errors[met] <= 0.1 * value[met])
-    assert {at for at, note in found.messages.items() if "was asked for" in note} == set(
+    assert {at for at, note in found.messages.items() if "is missed" in note} == set(
         zip(*np.nonzero(~met), strict=True)
     )
 
@@ -338,7 +338,7 @@ def test_what_misses_the_accuracy_is_named():
     result = MODEL.compute(dataclasses.replace(asked, accuracy=1e-6))
     error = result.values["breakthrough_probability_error"] / result.values["breakthrough_probability"]
     assert result.messages[0, 0] == (
-        f"estimated relative errors: breakthrough_probability {error[0, 0]:.1e}; 1.0e-06 was asked for; raise points"
+        f"an accuracy of 1e-06 is missed: breakthrough_probability by {error[0, 0]:.2g} (estimated); raise points"
     )
 
 

@@ -113,6 +113,27 @@ def test_a_smooth_plane_has_no_friction_and_misses_no_accuracy():
     assert not found.messages
 
 
+TIMES = {"relaxation_times": (0.0, 0.5, 1.5), "points": 32}
+#: Bodies whose friction does not change at once, or is none before.
+WITHOUT = {
+    "no dashpot": {"material": STANDARD},
+    "ramp": {"protocol": {"shape": "ramp", "duration": 4e-4, "velocity": 0.07, "force": 0.2}, **KELVIN},
+    "from rest": {"protocol": {"shape": "ramp", "duration": 4e-4, "start": "rest"}, **KELVIN},
+}
+
+
+@pytest.mark.parametrize("what", WITHOUT)
+def test_a_jump_that_is_none_misses_an_accuracy_only_where_its_error_counts_beside_friction(what):
+    model, few = MODELS["jump"], {"velocity": np.array([0.02, 0.3])}
+    loose, strict = (model.compute(block("jump", few, (0,), each, **WITHOUT[what], **TIMES)) for each in (0.5, 1e-7))
+    jump, error = (loose.values[f"friction_coefficient_jump{end}"] for end in ("", "_error"))
+    assert np.all(np.abs(jump) <= error)
+    assert not loose.messages
+    assert all("friction_coefficient_jump by " in told for told in strict.messages.values())
+    assert len(strict.messages) == 2
+    assert not any("inf" in told or "unknown" in told for told in strict.messages.values())
+
+
 def test_kinetics_of_blocks(dataframe_regression):
     times = {"relaxation_times": (0.0, 0.003, 0.2, 1.1, 9.0), "points": 32}
     changes = SPEEDS | {"velocity_change": np.array([0.2, -0.3, 1.7, 0.2])}

@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.ehl_line.declaration import ACCURACY, MODEL, EhlLineParameters, groups, positions
+from mdr_dask.models.parts.accuracy import missed, share
 from mdr_dask.physics.lubrication import traction
 from mdr_dask.physics.lubrication.film_formulas import (
     PAN_HAMROCK_CENTRAL,
@@ -89,20 +90,13 @@ def _relative_error(name: str, found: Limit) -> float:
     scale = np.ones_like(found.value) if name in _POSITIONS else np.abs(found.value)
     if name == "pressure":
         scale = np.full_like(scale, np.max(scale))
-    scale = scale[np.isfinite(found.value)]
-    return float(np.max(error[error > 0] / scale[error > 0], initial=0.0))
+    return float(np.max(share(error, scale[np.isfinite(found.value)]), initial=0.0))
 
 
 def _missed(solution: LineSolution, estimates: dict[str, Limit], accuracy: float) -> str:
     """Say which outputs miss the accuracy and by how much; an empty string if none does."""
     errors = {name: _relative_error(name, found) for name, found in estimates.items()}
-    missed = [f"{name} {error:.1e}" for name, error in errors.items() if error > accuracy]
-    if not missed:
-        return ""
-    return (
-        f"estimated relative errors on {solution.finest.nodes.size} nodes: {', '.join(missed)}; "
-        f"{accuracy:.1e} was asked for"
-    )
+    return missed(errors, accuracy, f" on {solution.finest.nodes.size} nodes")
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:

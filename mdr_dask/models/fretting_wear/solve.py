@@ -20,6 +20,7 @@ from mdr_dask.models.fretting_wear.reduction import (
     refuse_gross_slip,
     table_profile,
 )
+from mdr_dask.models.parts.accuracy import missed, share
 from mdr_dask.physics.mdr.revolution import PowerProfile, Profile
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import rules
@@ -222,12 +223,12 @@ def _solve_each(
                 status[position], messages[position] = kind, str(problem)
             continue
         solves += _solves_of(task, wanted)
-        for positions, (records, missed) in zip(wanted.values(), contacts, strict=True):
+        for positions, (records, told) in zip(wanted.values(), contacts, strict=True):
             for name, array in values.items():
                 answer = _answer(records, name, places)
                 for position in positions:
                     array[position] = answer
-            messages.update(dict.fromkeys(positions, missed) if missed else {})
+            messages.update(dict.fromkeys(positions, told) if told else {})
     return solves
 
 
@@ -259,19 +260,13 @@ class _Demand:
         if self.accuracy is None:
             return "", 0.0
         shares = {name: self._share(records, name) for name in self.outputs}
-        told = [f"{name} {share:.1e}" for name, share in shares.items() if share > self.accuracy]
-        times = max(shares.values(), default=0.0) / self.accuracy
-        return (
-            f"estimated relative error of {', '.join(told)}, {self.accuracy:.1e} was asked for" if told else "",
-            times,
-        )
+        return missed(shares, self.accuracy), max(shares.values(), default=0.0) / self.accuracy
 
     def _share(self, records: Sequence[Worn], name: str) -> float:
         """Return the error of an output over its largest value; 0 over 0 is none."""
         error, value = (np.asarray(_answer(records, each, self.places)) for each in (MODEL.companions[name].name, name))
         known = np.isfinite(error) & np.isfinite(value)
-        largest = np.max(error, initial=0.0, where=known)
-        return float(largest / np.max(np.abs(value), initial=0.0, where=known)) if largest > 0.0 else 0.0
+        return float(share(*(np.max(np.abs(each), initial=0.0, where=known) for each in (error, value))))
 
 
 def _solves_of(task: Task, wanted: Collection[tuple[float, float]]) -> int:

@@ -24,11 +24,14 @@ from mdr_dask.models.mixed_lubrication.turn import (
     trace,
     turn_values,
 )
+from mdr_dask.models.parts.accuracy import missed, share
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
 FILM_RATIO_WARNING = 0.5
 #: Outputs of the turn of two lines, beside traces and profiles.
 _OF_TURN = {"breakthrough_probability", "turn_error"} | points.OF_LENGTH
+#: What a value that is zero within its error is a part of.
+_WHOLE = {"asperity_load_share": 1.0}
 _PROFILES = {"upper_profile", "lower_profile"}
 
 
@@ -105,15 +108,14 @@ def _missed(
     """
     if block.accuracy is None:
         return ""
-    missed = []
-    for name in block.outputs:
-        value, error = found.get(name, 0.0), found.get(f"{name}_error", 0.0)
-        value = (judged_by or {}).get(name, value)
-        if np.isfinite(value) and error > block.accuracy * abs(value):
-            missed.append(f"{name} {error / abs(value) if value else np.inf:.1e}")
-    if not missed:
-        return ""
-    return f"estimated relative errors: {', '.join(missed)}; {block.accuracy:.1e} was asked for{advice}"
+    values = {**found, **(judged_by or {})}
+    known = {name: values[name] for name in block.outputs if np.isfinite(values.get(name, np.nan))}
+    shares = {
+        name: float(share(found.get(f"{name}_error", 0.0), value, _WHOLE.get(name, 0.0)))
+        for name, value in known.items()
+    }
+    told = missed(shares, block.accuracy)
+    return f"{told}{advice}" if told else ""
 
 
 def _realise(

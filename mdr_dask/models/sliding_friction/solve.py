@@ -10,6 +10,7 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.parts.accuracy import missed
 from mdr_dask.models.parts.material import fit_error
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
@@ -138,12 +139,12 @@ class _Group:
             yield int(k), Outcome(int(steady.status[k])).sentence
         if self.aim.oversampling != "auto":
             return
-        missed = relative(steady, errors, self.aim.columns)
-        late = ~(missed <= self.aim.accuracy)
+        shares = relative(steady, errors, self.aim.columns)
+        late = np.any(~(shares <= self.aim.accuracy), axis=0)
         outputs = [output for output, column in COLUMNS.items() if column in self.aim.columns]
-        for k in np.flatnonzero(late.any(axis=0) & ~failed):
-            named = ", ".join(f"{output} by {missed[i, k]:.2g}" for i, output in enumerate(outputs) if late[i, k])
-            yield int(k), f"an accuracy of {self.aim.accuracy:.2g} is missed on the finest grid: {named} (estimated)"
+        for k in np.flatnonzero(late & ~failed):
+            of_case = dict(zip(outputs, shares[:, k].tolist(), strict=True))
+            yield int(k), missed(of_case, self.aim.accuracy, " on the finest grid")
 
 
 CONVERGED = np.int8(Outcome.CONVERGED)  # many times faster to compare with than the name

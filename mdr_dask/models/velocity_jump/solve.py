@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import Block, Result, Status
+from mdr_dask.models.parts.accuracy import missed, share
 from mdr_dask.models.parts.loading_history import pieces
 from mdr_dask.models.parts.measured_line import line_of
 from mdr_dask.models.parts.rough_line import Measured, Roughness
@@ -137,31 +138,33 @@ class _Group:
 
     def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
         """Yield why a case failed, or which outputs miss the accuracy and by how much."""
-        missed = {name: self._relative(found, name) for name in self.outputs}
+        shares = {name: self._shares(found, name) for name in self.outputs}
+        accuracy = self.block.accuracy or ACCURACY
         for k, outcome in enumerate(found.outcome):
             if outcome != Outcome.CONVERGED:
                 more = ": fewer points or a shorter time" if outcome == Outcome.TOO_MANY_STEPS else ""
                 yield k, Outcome(int(outcome)).sentence + more
                 continue
-            named = ", ".join(
-                f"{name} by {late[k]:.2g}" for name, late in missed.items() if late[k] > self._allowed(name)
-            )
-            if named:
-                yield k, f"an accuracy of {self.block.accuracy or ACCURACY:.2g} is missed: {named} (estimated)"
+            sentence = missed({name: float(each[k]) for name, each in shares.items()}, accuracy)
+            if sentence:
+                yield k, sentence
 
-    def _allowed(self, name: str) -> float:
-        """Return the relative error allowed: of a transient only where the campaign says."""
-        if self.block.accuracy is not None:
-            return self.block.accuracy
-        return np.inf if name in TRANSIENT else ACCURACY
+    def _shares(self, found: _Found, name: str) -> FloatArray:
+        """Return the relative errors of an output, of every case at the worst time; 0 of unknown.
 
-    def _relative(self, found: _Found, name: str) -> FloatArray:
-        """Return the estimated errors of an output over its size, of every case at the worst time; 0 of unknown."""
-        with np.errstate(all="ignore"):
-            sizes = found.errors[name] / np.abs(found.values[name])
-        worst: FloatArray = (
-            np.where(np.isnan(sizes), 0.0, sizes).reshape(found.outcome.size, -1).max(axis=1, initial=0.0)
-        )
+        A transient counts only where the campaign states an accuracy. What is zero within its error, as a jump that
+        no dashpot makes or the friction of a body at rest, counts beside the largest friction of the case.
+        """
+        cases = found.outcome.size
+        if self.block.accuracy is None and name in TRANSIENT:
+            return np.zeros(cases)
+        beside = [name] if name == "indentation_depth" else [each for each in LEVELS if each != "indentation_depth"]
+        known = [
+            np.nan_to_num(np.abs(found.values[each])).reshape(cases, -1) for each in beside if each in found.values
+        ]
+        whole = np.concatenate(known, axis=1).max(axis=1, initial=0.0)
+        errors, values = (each[name].reshape(cases, -1) for each in (found.errors, found.values))
+        worst: FloatArray = np.nan_to_num(share(errors, values, whole[:, None]), posinf=np.inf).max(axis=1, initial=0.0)
         return worst
 
 
