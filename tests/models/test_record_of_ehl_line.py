@@ -36,7 +36,11 @@ def test_contacts(dataframe_regression):
         ),
         "none": block(FILMS[:1], **NUMBERS | {"load_parameter": 0.9, "speed_parameter": 1e-19}),
     }
-    found = {name: of_result(MODEL.compute(one)) for name, one in scenes.items()}
+    results = {name: MODEL.compute(one) for name, one in scenes.items()}
+    for result in results.values():
+        if "load_error" in result.values:  # rounding, which other tests before this one change
+            result.values["load_error"] = np.round(result.values["load_error"], 12)
+    found = {name: of_result(result) for name, result in results.items()}
     found |= {"seconds": np.array([seconds(one) for one in scenes.values()])}
     found |= {"distinct": [str(distinct(one)) for one in scenes.values()]}
     found |= {"coordinates": MODEL.coordinates(scenes["units"].parameters)}
