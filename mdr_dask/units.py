@@ -9,7 +9,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.errors import did_you_mean
+from mdr_dask.errors import apart, did_you_mean
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -220,6 +220,11 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     rounded = float(f"{value:.{digits}g}")
     power = min(max(3 * math.floor(math.log10(abs(rounded)) / 3 + 1e-12), -12), 12)
     return f"{float(Decimal(repr(rounded)).scaleb(-power)):.{digits}g} {_PREFIXES[power]}{unit}"
+
+
+def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
+    """Return a quantity and its limits as a reader writes them, with the digits that tell one from the other."""
+    return apart(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
 def seconds(duration: float) -> str:

@@ -17,7 +17,7 @@ import xarray as xr
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign import Campaign
-from mdr_dask.errors import FitError
+from mdr_dask.errors import FitError, apart
 
 #: Departure of a law, rms and half of the largest, that counts as none: laws of friction are not meant to hold better.
 WITHIN = 0.05
@@ -165,9 +165,10 @@ def law_holds(
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
     rms, largest = np.sqrt(np.mean(departures**2)), np.max(np.abs(departures))
-    departs = f"departs by {rms:.2g} rms, at most {largest:.2g}{f' at {where}' if where else ''}"
+    (mean, of_mean), (most, of_most) = apart(rms, within, digits=2), apart(largest, 2 * within, digits=2)
+    departs = f"departs by {mean} rms, at most {most}{f' at {where}' if where else ''}"
     if max(rms, largest / 2) <= within:
-        return f"yes: {departs}, within {within:g} and {2 * within:g}"
+        return f"yes: {departs}, within {of_mean} and {of_most}"
     if np.isnan(chance):
         return f"not tested: too few realisations to know the scatter; {departs}"
     if chance >= DOUBTFUL:

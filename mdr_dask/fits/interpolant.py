@@ -15,7 +15,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, bent, cubic, dense, linear, missed
 from mdr_dask.models.base import Status
-from mdr_dask.questions.selection import written
+from mdr_dask.questions.selection import written_apart
 from mdr_dask.refinement import departure
 
 #: Numbers that a table holds at most, and pieces into which it cuts a cell of the study at most.
@@ -214,6 +214,6 @@ class Law:
             outside = values[~((values >= ends[0]) & (values <= ends[1]))]
             if outside.size:
                 unit = str(self.table[axis].attrs.get("units", "1"))
-                low, high = (written(end, unit) for end in ends)
-                raise DataError(f"expected {axis} from {low} to {high}, got {written(outside.flat[0], unit)}")
+                told, low, high = written_apart(unit, outside.flat[0], *ends)
+                raise DataError(f"expected {axis} from {low} to {high}, got {told}")
         return found

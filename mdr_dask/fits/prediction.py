@@ -16,7 +16,7 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits.interpolation import FEWEST, Scale, cubic, dense, linear, missed
-from mdr_dask.questions.selection import written
+from mdr_dask.questions.selection import written_apart
 
 #: Most unknowns, and most numbers of the dense table between whose values straight lines are drawn.
 MOST, LARGEST = 4, 4e6
@@ -127,22 +127,19 @@ def _at_fixed(dataset: xr.Dataset, measured: Measured) -> xr.Dataset:
     for name, wanted in measured.conditions.items():
         held = dataset[name]
         if held.ndim == 0:
+            ends = [float(held)]
             off = ~np.isclose(wanted, float(held), rtol=SAME, atol=0)
-            problem = f"this study holds it at {_written(held, float(held))}"
         else:
-            low, high = float(held.min()), float(held.max())
+            low, high = ends = [float(held.min()), float(held.max())]
             slack = SAME * max(abs(low), abs(high))
             off = (wanted < low - slack) | (wanted > high + slack)
-            problem = f"this study has it from {_written(held, low)} to {_written(held, high)}"
         if off.any():
             worst = int(np.flatnonzero(off)[0])
+            told, *known = written_apart(str(held.attrs.get("units", "1")), wanted[worst], *ends)
             place = f"{measured.source}:{measured.lines[worst]}"
-            raise DataError(f"{place}: {name} of {_written(held, wanted[worst])}: {problem}")
+            has = f"has it from {' to '.join(known)}" if held.ndim else f"holds it at {known[0]}"
+            raise DataError(f"{place}: {name} of {told}: this study {has}")
     return dataset
-
-
-def _written(axis: xr.DataArray, value: float) -> str:
-    return written(float(value), str(axis.attrs.get("units", "1")))
 
 
 def _unknowns(dataset: xr.Dataset, measured: Measured) -> dict[str, FloatArray]:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import apart
 
 
 class Status(IntEnum):
@@ -95,7 +96,7 @@ def _looks_numeric(value: Any) -> bool:
 
 
 #: Smallest size of a quantity other than 0, in SI; its reciprocal is the largest.
-LEAST = 1e-30
+LEAST, MOST = 1e-30, 1e30
 
 
 def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any:
@@ -139,8 +140,9 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
 def _conceivable(least: float, value: Any) -> Any:
     """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
     for number in value if isinstance(value, tuple) else (value,):
-        if isinstance(number, float) and number != 0 and not least <= abs(number) <= 1 / LEAST:
-            raise ValueError(f"expected a size between {least:g} and {1 / LEAST:g} in SI units, got {number:g}")
+        if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
+            told, low, high = apart(number, least, MOST, digits=6)
+            raise ValueError(f"expected a size between {low} and {high} in SI units, got {told}")
     return value
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import DataError, apart, did_you_mean
 from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import Columns, fixed_words
 from mdr_dask.units import to_si
@@ -111,11 +111,16 @@ def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
     return dataset[list(dict.fromkeys([*kept, *(error for error in errors if error in known)]))]
 
 
-def written(value: Any, unit: str | None) -> str:
+def written(value: Any, unit: str | None, digits: int = 6) -> str:
     """Return a value with its unit as a selection would take it."""
     if not isinstance(value, int | float | np.number):
         return str(value)
-    return f"{value:g}" if unit in (None, "1", "") else f"{value:g} {unit}"
+    return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
+
+
+def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
+    """Return a value and its limits with their unit and the digits that tell one from the other."""
+    return apart(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
 def _parsed(text: str) -> tuple[str, str]:

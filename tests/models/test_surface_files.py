@@ -116,7 +116,7 @@ def test_an_anisotropic_map_needs_a_direction(tmp_path):
         ("map.npy", HEIGHT[0], {}, "expected rows and columns of heights, got 1 dimensions"),
         ("map.npy", 0 * HEIGHT, {}, "expected a rough map, got a flat one"),
         ("map.npy", HEIGHT.astype(complex), {}, "expected heights, got numbers of the type complex128"),
-        ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), {}, "expected at most 5% of missing points"),
+        ("map.npy", np.where(HEIGHT > 0, HEIGHT, np.nan), {}, "expected at most 5 % of missing points"),
         ("map.npy", b"nothing", {}, "expected an array of numpy"),
         ("map.npy", b"", {}, "expected an array of numpy"),
         ("map.txt", b"1 2 3\n4 5\n", {}, "expected rows of heights of one length"),

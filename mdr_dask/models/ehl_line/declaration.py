@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import apart
 from mdr_dask.models.base import Block, Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
@@ -84,9 +85,8 @@ class EhlLineParameters(Parameters):
         if self.viscosity_law == "roelands" and self.viscosity is None:
             raise ValueError("viscosity_law roelands needs viscosity, which it refers to a pole in Pa s")
         if self.profile_end <= self.profile_start:
-            raise ValueError(
-                f"expected profile_end above profile_start {self.profile_start:g}, got {self.profile_end:g}"
-            )
+            end, start = apart(self.profile_end, self.profile_start, digits=6)
+            raise ValueError(f"expected profile_end above profile_start {start}, got {end}")
         return self
 
 

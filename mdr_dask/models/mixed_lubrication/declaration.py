@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, apart
 from mdr_dask.models.base import (
     Block,
     Coordinate,
@@ -198,9 +198,10 @@ class MixedLubrication(Parameters):
             return ""
         least = LEAST_PER_WAVE * self.perimeter / MOST_POINTS
         if self.shortest_wavelength < least:
+            wave, limit = apart(self.shortest_wavelength, least, digits=4)
             return (
-                f"expected a shortest_wavelength of at least {least:.4g} m, {LEAST_PER_WAVE} spacings of {MOST_POINTS} "
-                f"points, got {self.shortest_wavelength:.4g} m"
+                f"expected a shortest_wavelength of at least {limit} m, {LEAST_PER_WAVE} spacings of {MOST_POINTS} "
+                f"points, got {wave} m"
             )
         return ""
 
@@ -208,7 +209,8 @@ class MixedLubrication(Parameters):
         length = source.points * source.spacing(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
-            return f"the contact is wider than the line: expected 2a of at most {length:.4g} m, got {width:.4g} m"
+            told, most = apart(width, length, digits=4)
+            return f"the contact is wider than the line: expected 2a of at most {most} m, got {told} m"
         return ""
 
     def oil_data(self) -> Oil:

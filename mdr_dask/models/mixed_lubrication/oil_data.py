@@ -14,7 +14,7 @@ from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants, walther_fit
 from mdr_dask.tables import Column, read_sheet, read_table
-from mdr_dask.units import conversion, shown
+from mdr_dask.units import conversion, shown, shown_apart
 
 _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 
@@ -96,7 +96,8 @@ class OilData(Parameters):
         ends = ((self.lowest_temperature, min(one, two), "below"), (self.highest_temperature, max(one, two), "above"))
         for wanted, end, side in ends:
             if wanted is not None and (wanted < end if side == "below" else wanted > end):
-                told.append(f"oil: its viscosity is extrapolated {side} {shown(end, 'K')}, to {shown(wanted, 'K')}")
+                reached, known = shown_apart("K", wanted, end)
+                told.append(f"oil: its viscosity is extrapolated {side} {known}, to {reached}")
         return tuple(told)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError
+from mdr_dask.errors import DataError, apart
 from mdr_dask.models.base import Parameters, Ways, quantity
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.measured_line import ProfileFile
@@ -113,14 +113,21 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
         spectrum = spectrum.continued(*ends)
     longest, shortest = spectrum.wavelengths
     beyond = [
-        f"expected {name} of at {'most' if end > longest else 'least'} {longest if end > longest else shortest:.4g} m, "
-        f"where the spectrum ends, got {end:.4g} m: `extrapolate: true` goes on by a power law"
+        _beyond(name, end, *(("most", longest) if end > longest else ("least", shortest)))
         for name, end in zip(("longest_wavelength", "shortest_wavelength"), ends, strict=True)
         if end and not shortest * (1 - 1e-9) <= end <= longest * (1 + 1e-9)
     ]
     if beyond:
         raise DataError("; ".join(f"{file.name}: {sentence}" for sentence in beyond))
     return spectrum.between(ends[0], ends[1] or min(found.resolution, longest))
+
+
+def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
+    told, limit = apart(wavelength, end, digits=4)
+    return (
+        f"expected {name} of at {which} {limit} m, where the spectrum ends, got {told} m: "
+        "`extrapolate: true` goes on by a power law"
+    )
 
 
 @lru_cache(maxsize=64)
@@ -138,9 +145,10 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):
             longest, shortest = spectrum.wavelengths
+            (last, least), (first, most) = apart(length, shortest, digits=4), apart(length / modes, longest, digits=4)
             raise DataError(
-                f"{file.name}: expected a line with waves of {shortest:.4g} to {longest:.4g} m, "
-                f"got {length / modes:.4g} to {length:.4g} m: change length or points"
+                f"{file.name}: expected a line with waves of {least} to {most} m, "
+                f"got {first} to {last} m: change length or points"
             )
         line.flags.writeable = False
     return lines

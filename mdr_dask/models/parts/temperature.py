@@ -13,7 +13,7 @@ from mdr_dask.errors import DataError
 from mdr_dask.models.base import Parameters, quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import shown
+from mdr_dask.units import shown_apart
 
 
 class Wlf(Parameters):
@@ -29,7 +29,8 @@ class Wlf(Parameters):
 
         lowest, end = float(np.min(temperature)), self.reference - self.c2
         if lowest <= end:
-            raise ValueError(f"wlf holds above reference - c2 = {shown(end, 'K')}, got {shown(lowest, 'K')}")
+            told, limit = shown_apart("K", lowest, end)
+            raise ValueError(f"wlf holds above reference - c2 = {limit}, got {told}")
         return wlf_factor(temperature, self.reference, self.c1, self.c2)
 
 
@@ -77,8 +78,8 @@ class ShiftFactors(Parameters):
         known, decades = _shifts(self)
         wanted = np.asarray(temperature, dtype=np.float64)
         for outside in wanted[(wanted < known[0]) | (wanted > known[-1])].ravel():
-            ends = f"{shown(known[0], 'K')} to {shown(known[-1], 'K')}"
-            raise ValueError(f"{self.file.name}: has shift factors for {ends}, got {shown(outside, 'K')}")
+            told, first, last = shown_apart("K", outside, known[0], known[-1])
+            raise ValueError(f"{self.file.name}: has shift factors for {first} to {last}, got {told}")
         return np.asarray(10 ** np.interp(wanted, known, decades), dtype=np.float64)
 
 

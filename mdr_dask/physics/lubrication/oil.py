@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
+from mdr_dask.errors import apart
 
 _MM2 = 1e-6
 #: Density of water at 15.6 C in kg/m^3, to which a specific gravity refers.
@@ -208,10 +209,8 @@ class Oil:
         """Say that a temperature lies outside the oil's data; an empty string if it does not."""
         if self.lowest <= temperature <= self.highest:
             return ""
-        return (
-            f"expected a temperature within the oil's data, {self.lowest:g} to {self.highest:g} K, "
-            f"got {temperature:g} K"
-        )
+        told, lowest, highest = apart(temperature, self.lowest, self.highest, digits=6)
+        return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {told} K"
 
 
 #: Oils by name.

@@ -107,7 +107,7 @@ def test_missing_points_and_spikes_are_filled():
     mended = spectrum_of_map(filled(SurfaceMap(spikes, heights.size)), hann=False)
     assert mended.rms_gradient == pytest.approx(known.rms_gradient, rel=0.01)
     damaged[: int(256 * MOST_MISSING) + 1] = np.nan
-    with pytest.raises(DataError, match="expected at most 5% of missing points"):
+    with pytest.raises(DataError, match="expected at most 5 % of missing points"):
         filled(SurfaceMap(damaged, heights.size))
 
 
