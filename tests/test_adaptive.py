@@ -1,5 +1,6 @@
 """Axes whose values a study chooses: enough of them and not too many, and the same however the run went."""
 
+import json
 import threading
 from contextlib import suppress
 
@@ -239,10 +240,19 @@ def test_what_may_come_is_said_before(study, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().out
     assert "1 mm to 1 km, 5 to 60 values, geometric, until y is interpolated within 1 % of its largest value" in told
     assert "10 to 120 cases x 1 realisation = 10 to 120 results" in told
+    assert main(["run", "c.yaml", "--dry-run", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert (plan["counted"], plan["results"], plan["results_at_most"]) == ("values chosen so far", 10, 120)
     assert main(["run", "c.yaml", "--quiet"]) == 0
     capsys.readouterr()
     assert main(["run", "c.yaml", "--dry-run"]) == 0
     assert "results are there already; nothing to do" in capsys.readouterr().out
+    assert main(["run", "c.yaml", "--dry-run", "--json"]) == 0
+    plan = json.loads(capsys.readouterr().out)
+    assert (plan["counted"], plan["to_do"]) == ("all", 0)
+    (tmp_path / "c.yaml").write_text(text.replace("0.2]", "0.2, 0.4]"))
+    assert main(["run", "c.yaml", "--dry-run"]) == 0
+    assert "results of the values chosen so far are in the store already" in capsys.readouterr().out
 
 
 WRONG = {

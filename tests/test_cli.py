@@ -85,6 +85,9 @@ def test_dry_run_says_how_far_rounds_may_go(campaign, capsys):
     assert main(["run", str(campaign), "--dry-run", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["realisations"], document["at_most"], document["results"]) == (8, 24, 64)
+    assert (document["results_at_most"], document["solves_at_most"]) == (192, 192)
+    assert document["seconds_at_most"] == pytest.approx(3 * document["seconds"])
+    assert (document["counted"], document["kept"], document["to_do"]) == ("first round", 0, 64)
 
 
 def test_a_fitted_material_says_how_well_it_holds(campaign, capsys):
@@ -323,6 +326,9 @@ def test_a_plan_of_rounds_counts_the_first_of_them(toy, tmp_path, monkeypatch, c
     assert main(["run", "rounds.yaml", "--quiet"]) == 0
     assert main(["run", "rounds.yaml", "--dry-run"]) == 0
     assert "8 results of the first round are in the store already, 0 remain" in capsys.readouterr().out
+    assert main(["run", "rounds.yaml", "--dry-run", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["counted"], document["kept"], document["to_do"]) == ("first round", 8, 0)
 
 
 def test_a_reader_that_has_seen_enough_is_no_error(filled):

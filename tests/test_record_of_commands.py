@@ -46,7 +46,7 @@ MASKED = (
     (r"\b[\d.]+ (ms|s|min|h)\b(?= in the model| writing|: \d)", "TIME"),
     (r"about [\d.]+ (ms|s|min|h)\b", "about TIME"),
     (r"\d\d:\d\d:\d\d", "CLOCK"),
-    (r'"(time|host|process|seconds)": [^,}]*', r'"\1": ...'),
+    (r'"(time|host|process|seconds|seconds_at_most)": [^,}]*', r'"\1": ...'),
     (r"\d+(\.\d+)? (B|kB|MB)\b", "SIZE"),
     (re.escape(__version__), "VERSION"),
     (r"sha256 \w+", "DIGEST"),

@@ -156,7 +156,8 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
             click.echo("\n".join([f"{path}: {campaign.model}", *study_lines(campaign, costs)]))
             ask(campaign)
     if rows and form == "json":
-        print_json({"units": {"bytes": "B", "seconds": "s", "compiling": "s"}, "rows": rows})
+        units = {"bytes": "B", "bytes_at_most": "B", "seconds": "s", "seconds_at_most": "s", "compiling": "s"}
+        print_json({"units": units, "rows": rows})
     if problems:
         raise CampaignError(*problems)
 

@@ -88,14 +88,24 @@ def _print_plan(study: Campaign, url: str, form: str | None) -> None:
             return
     costs = estimate(study)
     to_do = costs.results if to_do is None else to_do
+    counted = _counted(study, to_do)
     if form == "json":
-        print_json({"campaign": study.name, "store": url, **costs_row(costs), "kept": kept, "to_do": to_do})
+        of_store = {"counted": counted or "all", "kept": kept, "to_do": to_do}
+        print_json({"campaign": study.name, "store": url, **costs_row(costs), **of_store})
         return
     click.echo("\n".join([f"{study.name} -> {url}", *study_lines(study, costs)]))
     if kept:
         left = seconds(costs.seconds * to_do / costs.results)
-        what = "results of the first round" if study.replication.goes_on else "results"
+        what = f"results of the {counted}" if counted else "results"
         click.echo(f"{kept} {what} are in the store already, {to_do} remain: about {left} on one core")
+
+
+def _counted(study: Campaign, to_do: int) -> str:
+    """Return which results are counted of a store, where more may follow them; an empty string where none do."""
+    if study.replication.goes_on:
+        return "first round"
+    is_adaptive = any(axis.refinement is not None for series in study.series for axis in series.axes)
+    return "values chosen so far" if is_adaptive and to_do else ""
 
 
 def _resources(options: dict[str, Any]) -> Resources:

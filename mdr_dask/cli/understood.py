@@ -101,18 +101,17 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study under stable keys."""
+    """Return counts, bytes and seconds of a study under stable keys: of the first round, and of all there may be."""
+    first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,
         "cases_at_most": round(costs.cases * costs.growth),
         "realisations": costs.realisations,
         "at_most": costs.at_most,
-        "results": costs.results,
-        "solves": costs.solves,
-        "blocks": costs.blocks,
-        "bytes": costs.bytes,
-        "files": costs.files,
+        **first,
+        **{f"{name}_at_most": round(count * costs.rounds) for name, count in first.items()},
         "seconds": float(costs.seconds),
+        "seconds_at_most": float(costs.seconds * costs.rounds),
         "compiling": costs.compiling,
         "notes": list(costs.notes),
     }
