@@ -134,7 +134,7 @@ def laid_out(url):
         below = held.pop("consolidated_metadata", {"metadata": {}})["metadata"]
         held["attributes"] = {name: value for name, value in held["attributes"].items() if name not in MASKED}
         usual = ("chunk_key_encoding", "storage_transformers", "zarr_format", "node_type")
-        told = [f"{name} {json.dumps(value)}" for name, value in held.items() if name not in usual]
+        told = [record.unversioned(f"{name} {json.dumps(value)}") for name, value in held.items() if name not in usual]
         found[str(path.relative_to(url))] = [*told, *sorted(below)]
     return found
 

@@ -199,9 +199,7 @@ def declared(name):
         found[f"output {output.name}"] = str(output)
     for number in model.numbers:
         found[f"number {number.name}"] = str(number)
-    found[f"model {name}"] = " | ".join(
-        map(str, (model.name, model.version, model.summary, model.whole, model.compiling))
-    )
+    found[f"model {name}"] = " | ".join(map(str, (model.name, model.summary, model.whole, model.compiling)))
     found[f"companions of {name}"] = " ".join(model.with_companions(tuple(output.name for output in model.outputs)))
     return found
 
