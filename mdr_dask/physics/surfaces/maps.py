@@ -18,7 +18,7 @@ Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # along each axis
 MOST_MISSING = 0.05  # share of the points that may be filled
-FAR = 12.0  # robust standard deviations, of the distance from the four neighbours, that no roughness reaches
+FAR = 19.0  # robust standard deviations, of the distance from the neighbours, that no roughness reaches
 BAND = 128  # rows that stay in the cache
 TELLING = 1e-3  # of the largest ring
 MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
@@ -43,7 +43,7 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return which points stick out of their four neighbours, by `FAR` times what is usual."""
+    """Return which points stick out of their neighbours along both axes, by `FAR` times what is usual."""
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
     for first in range(0, away.shape[0], BAND):
@@ -64,16 +64,14 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far inner points are from the mean of their neighbours without the highest and the lowest."""
-    neighbours = height[2:, 1:-1], height[:-2, 1:-1], height[1:-1, 2:], height[1:-1, :-2]
-    middle, most, least = (neighbours[0].copy() for _ in range(3))
-    for neighbour in neighbours[1:]:
-        middle += neighbour
-        np.maximum(most, neighbour, out=most)
-        np.minimum(least, neighbour, out=least)
-    middle -= most
-    middle -= least
-    return np.asarray(np.abs(height[1:-1, 1:-1] - 0.5 * middle), dtype=np.float64)
+    """Return how far inner points are from the middle between their neighbours, along the axis that tells them better.
+
+    A crest is level along itself: where points lie closer along one axis, those on it are far from the others only.
+    """
+    middle = height[1:-1, 1:-1]
+    along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
+    across = np.abs(middle - 0.5 * (height[1:-1, 2:] + height[1:-1, :-2]))
+    return np.asarray(np.minimum(along, across, out=along), dtype=np.float64)
 
 
 def filled(surface: SurfaceMap) -> SurfaceMap:

@@ -111,6 +111,35 @@ def test_missing_points_and_spikes_are_filled():
         filled(SurfaceMap(damaged, heights.size))
 
 
+def crests(points=(300, 61)):
+    """Waves across the grid, so smooth that no point sticks out, and closer to each other along x."""
+    x, y = (np.arange(number)[:, None] / number for number in points)
+    return sum(
+        np.cos(2 * np.pi * (a * x + b * y.T) + a * b) / (1 + a * a + b * b) for a in range(-5, 6) for b in range(8)
+    )
+
+
+MAPS = {
+    "crests": crests,
+    "longer than a band": lambda: crests((1000, 40)),
+    "noise": lambda: np.random.default_rng(5).standard_normal((300, 300)),
+    "noise with tails": lambda: np.random.default_rng(6).laplace(size=(300, 300)),
+    "as rough": lambda: surface(0.5)[0].height,
+    "as rough, closer along x": lambda: surface(0.5, size=(LENGTH, 30 * LENGTH))[0].height,
+}
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_no_roughness_sticks_out_however_the_points_lie_and_spikes_do(name):
+    height = MAPS[name]()
+    for turned in (height, height.T):
+        assert not outliers(SurfaceMap(turned, (1e-3, 1e-3))).any()
+        spiky, places = turned.copy(), [(5, 4), (12, 20), (13, 20), (22, 29)]
+        for row, column in places:
+            spiky[row, column] += 60 * np.std(height)
+        assert [*map(tuple, np.argwhere(outliers(SurfaceMap(spiky, (1e-3, 1e-3)))).tolist())] == places
+
+
 def test_direction_is_seen():
     isotropic, _ = surface(0.5)
     assert spectrum_of_map(without_trend(isotropic, "plane")).anisotropy() < 0.1
