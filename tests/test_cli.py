@@ -349,3 +349,10 @@ def test_a_store_may_be_named_by_a_file_url(campaign, tmp_path, capsys):
     assert main(["show", url, "friction_coefficient"]) == 0
     assert main(["run", str(campaign), "--quiet", "--store", str(tmp_path / "named.zarr")]) == 0
     assert "all 64 results are there already" in capsys.readouterr().out
+
+
+def test_one_solve_is_one(toy, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("one.yaml").write_text("name: one\nmodel: toy\nrealisations: 1\nparameters:\n  position: 1 m\n")
+    assert main(["run", "one.yaml", "--quiet"]) == 0
+    assert "s: 1 solve in 1 block" in capsys.readouterr().err

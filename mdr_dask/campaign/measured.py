@@ -76,7 +76,8 @@ def read_measured(
     of_outputs = {name: Column(name, unit) for name, unit in outputs.items()}
     found = [name for name, column in of_outputs.items() if any(column.holds(heading) for heading in names)]
     if len(found) != 1:
-        hint = "" if found else next(filter(None, (did_you_mean(name, [*outputs]) for name in names)), "")
+        near = () if found else (did_you_mean(name, [*outputs]) for name in names)
+        hint = next((each for each in near if "mean" in each), "")
         got = ", ".join(found or names) or "no names"
         wanted = f"a column with one output of the study ({', '.join(outputs)})"
         raise DataError(f"{source}: expected {wanted}, got {got}{hint}")

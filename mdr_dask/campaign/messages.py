@@ -57,6 +57,9 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
             continue
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
+        inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
+        if inside and group[0]["type"] == "too_short":  # a list is short of the entries that are told of themselves
+            continue
         _report_group(path, group, kind, data, report)
 
 

@@ -66,6 +66,8 @@ def fit(
 
     require_suffix(figure, FIGURES)
     if is_table(store):
+        if series is not None or selections or measured or figure:
+            raise click.UsageError("--series, --select, --measured and --figure are for stores")
         _fit_table(Path(store), names, form)
         return
     model = stores.attributes(store)["model"]

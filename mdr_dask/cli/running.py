@@ -145,8 +145,9 @@ def _print_outcome(what: str, url: str, progress: Progress, form: str | None) ->
     spared = f", {progress.not_needed} not needed" if progress.not_needed else ""
     click.echo(f"{what}: {kept}{progress.done} done, {progress.failed} failed{spared}")
     blocks = "1 block" if progress.blocks == 1 else f"{progress.blocks} blocks"
+    solves = "1 solve" if progress.solves == 1 else f"{progress.solves} solves"
     click.echo(
-        f"{seconds(progress.wall_seconds)}: {progress.solves} solves{_shared(progress)} in {blocks}, "
+        f"{seconds(progress.wall_seconds)}: {solves}{_shared(progress)} in {blocks}, "
         f"{seconds(progress.compute_seconds)} in the model, {seconds(progress.write_seconds)} writing",
         err=True,
     )

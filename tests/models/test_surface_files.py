@@ -80,7 +80,8 @@ def test_noise_outliers_and_missing_points_are_told(tmp_path):
     told = " ".join(filled.notes())
     assert "are noise, left out" in told
     assert "2 points stuck out of their neighbours and were filled" in told
-    assert "1 points stick out" not in told
+    assert "stick out" not in told
+    assert "sticks out" not in told
     (spectrum,) = spectra_of(filled)
     assert spectrum.rms_gradient() == pytest.approx(SPECTRUM.rms_gradient(), rel=0.1)
     (everything,) = spectra_of(
@@ -137,6 +138,34 @@ def test_a_scan_is_no_map_and_a_map_no_scan(tmp_path):
     topography.UniformLineScan(HEIGHT[0], 1.0, unit="m").to_netcdf(str(tmp_path / "line.nc"))
     assert "expected a line scan, got a map" in refused(tmp_path, scan="map.nc")
     assert "expected a map, got a line scan" in refused(tmp_path, map="line.nc")
+    np.save(tmp_path / "map.npy", HEIGHT)
+    told = refused(tmp_path, scan="map.npy")
+    assert "map.npy: expected a table of x and z, got an array: a map is named by surface: {map: ...}" in told
+    assert told.count("map.npy") == 1
+
+
+@pytest.mark.parametrize(
+    ("spikes", "kept", "filled"),
+    [
+        (
+            1,
+            "1 point sticks out of its neighbours: `outliers: fill` takes it out",
+            "1 point stuck out of its neighbours and was",
+        ),
+        (
+            2,
+            "2 points stick out of their neighbours: `outliers: fill` takes them out",
+            "2 points stuck out of their neighbours and were",
+        ),
+    ],
+)
+def test_outliers_are_counted_in_words_that_fit(tmp_path, spikes, kept, filled):
+    spiky = HEIGHT.copy()
+    spiky[40, 50 : 50 + 10 * spikes : 10] = 1e-3
+    np.save(tmp_path / "map.npy", spiky)
+    options = {"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m"}
+    for choice, told in (("keep", kept), ("fill", f"{filled} filled")):
+        assert told in " ".join(surface(tmp_path, map=options | {"outliers": choice}).notes())
 
 
 def test_a_spectrum_goes_on_by_its_power_law_where_that_is_asked_for(tmp_path):

@@ -92,6 +92,10 @@ def recorded(file: DataFile, unit: str) -> tuple[FloatArray, FloatArray]:
     DataError
         If the file does not hold a line.
     """
+    if file.name.lower().endswith(".npy"):
+        raise DataError(
+            f"{file.name}: expected a table of x and z, got an array: a map is named by surface: {{map: ...}}"
+        )
     if not file.name.lower().endswith(TEXT):
         line, metre = topography(file, unit)
         if line.dim != 1:

@@ -153,8 +153,9 @@ def scanned(scans: ScanFiles, file: DataFile) -> Found:
     """Return the spectrum of the surface that a scan cuts."""
     from mdr_dask.physics.surfaces.scans import cut_of_lines
 
+    line = line_of_scan(scans, file)  # names the file itself
     try:
-        return of_surface_cut(cut_of_lines([line_of_scan(scans, file)], scans.window == "hann"))
+        return of_surface_cut(cut_of_lines([line], scans.window == "hann"))
     except DataError as problem:
         raise DataError(f"{file.name}: {problem}") from None
 
@@ -214,12 +215,14 @@ def rings_of(maps: MapFiles, file: DataFile) -> tuple[MapSpectrum, tuple[str, ..
     far = int(np.count_nonzero(stick_out := outliers(surface)))
     if far and maps.outliers == "fill":
         surface.height[stick_out] = np.nan
-        remarks.append(f"{far} points stuck out of their neighbours and were filled")
+        told = "1 point stuck out of its" if far == 1 else f"{far} points stuck out of their"
+        remarks.append(f"{told} neighbours and {'was' if far == 1 else 'were'} filled")
     elif far:
-        remarks.append(f"{far} points stick out of their neighbours: `outliers: fill` takes them out")
+        told = "1 point sticks out of its" if far == 1 else f"{far} points stick out of their"
+        remarks.append(f"{told} neighbours: `outliers: fill` takes {'it' if far == 1 else 'them'} out")
     missing = int(np.count_nonzero(~np.isfinite(surface.height)))
     if missing and not (far and maps.outliers == "fill"):
-        remarks.append(f"{missing} missing points were filled")
+        remarks.append("1 missing point was filled" if missing == 1 else f"{missing} missing points were filled")
     try:
         surface = without_trend(filled(surface), maps.detrend)
         return spectrum_of_map(surface, maps.window == "hann"), tuple(remarks)
