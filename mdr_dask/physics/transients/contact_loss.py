@@ -131,4 +131,4 @@ def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
         wakes.earliest[k] -= now.track.cells
         wakes.places[k] -= now.track.cells
         wakes.farthest[k] -= now.track.cells
-    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
+    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest, 0)

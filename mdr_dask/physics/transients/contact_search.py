@@ -26,6 +26,7 @@ from mdr_dask.physics.transients.free_flight import (
     gap_at,
     meeting,
     wake_at,
+    surpassed,
     worth_keeping,
 )
 from mdr_dask.physics.transients.patches import (
@@ -204,6 +205,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     oldest = earliest[0] if known > 0 else begin
     seen, seen_at = 0.0, begin  # what free elements were seen to have last, and where
     least_free, known_at = 0.0, 0.0
+    met, earlier = 0.0, 0  # displacement where the line met a wake last, and how many places were known there
     sums[:] = 0.0
     if not contact:  # it may have been left there
         known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
@@ -268,7 +270,8 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, wakes, until, w, deepest)
+                    gone = surpassed(now, wakes, met, until, w, earlier)
+                    known = worth_keeping(now, wakes, until, w, deepest, gone)
                     least_free, known_at = (w - CLEAR * recent.spread[over(KNOWN_FOR)]) * fade_of_cell, until
                     seen, seen_at, oldest = w, until, earliest[0] if known > 0 else until
                     contact, free_from, x, pulled = False, off, off, True
@@ -297,7 +300,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
-                    probe, gap = (top, above) if above > 0 else (probe, gap)
+                    probe, gap, rise = (top, above, 0.0) if above > 0 else (probe, gap, rise)
                 least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
                 if (
                     weak
@@ -307,13 +310,15 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, guess)
+                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, rise, guess)
                     _add_edge(now, lift, begin, (rise, gain, opening), sums)
                     contact, x, held, firm_until = True, begin, begin, 0.0
+                    met, earlier = depth + height_at(track, begin)[0], known
                     continue
                 if not pulls:
                     break
-                known = worth_keeping(now, wakes, probe, depth + h, deepest)
+                if known > 1:
+                    known = worth_keeping(now, wakes, probe, depth + h, deepest, 0)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
                 free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:

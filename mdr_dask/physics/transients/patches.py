@@ -16,7 +16,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barr
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-6  # of a cell: a step of Newton after which the next one is below rounding
+CLOSE = 1e-4  # of a cell: a step of Newton after which the next one is 1e-8, and the force there that times its slope
 NEARBY = 8  # patches to look at one by one before halving
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8

@@ -12,6 +12,7 @@ from mdr_dask.physics.transients.patches import History, Patches
 
 WINDOW = 8.0  # cells: the shortest way
 WINDOWS = 16  # each twice as long as the one before
+LONGER = np.frexp(np.arange(1024))[1]  # how often a way is doubled to pass so many of the shortest
 
 
 class Recent(NamedTuple):
@@ -60,8 +61,5 @@ def write_recent(history: History, first: Patches, deborah: float, recent: Recen
 @inlined
 def over(distance: float) -> int:
     """Return which of the bounds holds over a distance."""
-    k = 0
-    while k < WINDOWS - 1 and distance > WINDOW:
-        distance *= 0.5
-        k += 1
-    return k
+    ways = max(distance * (1 / WINDOW), 0.0)
+    return int(LONGER[np.uintp(ways)]) if ways < LONGER.size else WINDOWS - 1
