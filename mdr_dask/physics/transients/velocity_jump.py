@@ -358,9 +358,10 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
 
     Where the depth is less by some length, displacements are less by that length at most.
     """
-    floor, (low, high) = np.empty(track.height.size), limits
-    k, decay, free, flying = -1, np.exp(-1 / slower.deborah), -np.inf, False
-    for i in range(floor.size):
+    (low, high), last = limits, track.height.size - 1
+    from_depth, runs, count = np.empty(last + 1), np.empty((last // 2 + 1, 2), np.int64), 0
+    k, decay, free, flying, before = -1, np.exp(-1 / slower.deborah), -np.inf, False, -np.inf
+    for i in range(last + 1):
         while k + 1 < slower.count and slower.start[k + 1] <= i:
             k += 1
         if k >= 0 and i <= slower.end[k]:
@@ -369,21 +370,22 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
             free *= decay
         elif k >= 0:
             free, flying = slower.pressed[k] * np.exp(-(i - slower.end[k]) / slower.deborah), True
-        floor[i] = free - (slower.depth - low)
-    last = floor.size - 1
-    runs, count = np.empty((last // 2 + 1, 2), np.int64), 0
-    for i in range(last):
-        if high + track.peak[i] > min(floor[i], floor[i + 1]):
-            begin, end = max(i - 1, 0), min(i + 2, last)
-            if count > 0 and begin <= runs[count - 1, 1]:
-                runs[count - 1, 1] = end
-            else:
-                runs[count, 0], runs[count, 1] = begin, end
-                count += 1
+        floor = free - (slower.depth - low)
+        from_depth[i] = -np.inf
+        if i > 0:
+            from_depth[i - 1] = min(before, floor) - track.peak[i - 1]
+            if high > from_depth[i - 1]:
+                begin, end = max(i - 2, 0), min(i + 1, last)
+                if count > 0 and begin <= runs[count - 1, 1]:
+                    runs[count - 1, 1] = end
+                else:
+                    runs[count, 0], runs[count, 1] = begin, end
+                    count += 1
+        before = floor
     second = -np.inf
     for i in range(int(np.ceil(slower.end[0])), int(slower.start[slower.count - 1])):
         second = max(second, track.peak[i])
-    return Reachable(runs[:count].copy(), floor, second)
+    return Reachable(runs[:count].copy(), from_depth, second)
 
 
 def _at_times(
