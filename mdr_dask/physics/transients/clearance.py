@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined, kernel
+from mdr_dask.physics.compiling import inlined
 from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.recent import WINDOWS, Recent
 
@@ -34,12 +34,11 @@ class Clearance(NamedTuple):
     state: FloatArray
 
 
-@kernel
-def clearance_of(cells: int) -> Clearance:
-    """Return what is known of a line before the first search: nothing."""
+def clearance_from(until: FloatArray) -> Clearance:
+    """Return what is known before the first search: up to which depth beyond the first one cells are not touched."""
     state = np.zeros(5)
     state[TIME] = np.nan
-    return Clearance(np.full(cells + 2, -np.inf), state)
+    return Clearance(until, state)
 
 
 @inlined
@@ -54,7 +53,7 @@ def approached(now: Instant, recent: Recent, state: FloatArray) -> float:
         nearer = depth - before + (now.time - state[TIME]) * max(push, state[PUSH])
         state[APPROACH] += GUESSED * abs(before - state[DEPTH]) + max(nearer, 0.0)
     else:
-        state[APPROACH] = state[LARGEST]
+        state[APPROACH] = state[LARGEST] + max(depth - history.depth[0], 0.0)
     state[TIME], state[DEPTH], state[PUSH] = now.time, depth, push
     return float(state[APPROACH])
 

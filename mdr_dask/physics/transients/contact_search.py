@@ -10,7 +10,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
-from mdr_dask.physics.transients.clearance import APPROACH, TIME, Clearance, approached, clearance_of, rests
+from mdr_dask.physics.transients.clearance import APPROACH, TIME, Clearance, approached, rests
 from mdr_dask.physics.transients.contact_loss import (
     Motion,
     loss,
@@ -87,13 +87,12 @@ class Workspace(NamedTuple):
     barriers: Barriers
 
 
-def workspace_for(patches: int, barriers: Barriers) -> Workspace:
-    """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
+def workspace_for(patches: int, barriers: Barriers, clearance: Clearance) -> Workspace:
+    """Return the workspace of a number of patches and some more, with what is known of the cells."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
     earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
     recent = Recent(*np.empty((5, WINDOWS)))
-    clearance = clearance_of(barriers.cell.size)
     return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, clearance, barriers)
 
 
@@ -220,7 +219,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
         while i < stop:
             if not contact:
                 lowest = (lowest - pull) * fade + pull
-                if deepest <= from_depth[np.uintp(i)] or approach < until_approach[np.uintp(i)]:
+                if approach < until_approach[np.uintp(i)] or deepest <= from_depth[np.uintp(i)]:
                     i += 1
                     continue
                 gap = lowest - depth - peak[np.uintp(i)]
