@@ -16,6 +16,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
 from mdr_dask.physics.sliding.kelvin import (
+    BLOCK,
     DISPLACEMENT,
     DRAG,
     DRAG_RATE,
@@ -35,6 +36,7 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
+OUTLINES, OUTLINED = 12, 0.02  # looks at the blocks of a line for a first guess of the depth, and how near it is
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
@@ -57,6 +59,27 @@ def _next(depth: float) -> float:
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
     """Begin a `trail` where nothing but a depth for a load is known."""
     trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), 0.7, 0.0
+
+
+@compiled
+def _outline(peak: FloatArray, deborah: float, load: float, trail: FloatArray) -> None:
+    """Begin a `trail` at a load with the depth of an element that the highest points of blocks alone press."""
+    fade = np.exp(-BLOCK / deborah)
+    memory, depth, slope = deborah * (1 - fade), load / (peak.size * BLOCK), 1.0
+    for _ in range(OUTLINES):
+        free, gain, carried, stiffness = 0.0, 0.0, 0.0, 0.0
+        for i in range(peak.size):
+            if depth + peak[i] > free:
+                free, gain = depth + peak[i], 1.0
+            carried += free
+            stiffness += gain
+            free, gain = free * fade, gain * fade
+        slope = carried / (stiffness * depth)
+        ahead = slope * (math.log(load) - math.log(memory * carried))
+        depth *= math.exp(ahead)
+        if abs(ahead) < OUTLINED:
+            break
+    trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), slope, 0.0
 
 
 @compiled
@@ -291,7 +314,10 @@ def _swept(
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order] + cells.top, np.zeros(4)
-    _begin(first, loads[0] / (cells.mean.size - 1), loads[0])
+    if blocks.peak.size:
+        _outline(blocks.peak, deborah[0], loads[0], first)
+    else:
+        _begin(first, loads[0] / (cells.mean.size - 1), loads[0])
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
