@@ -158,8 +158,8 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
-    near = begin + width / 3 * (q + y * (2 * r + y * 3 * c))
-    far = end - width / 3 * (q + 2 * r + 3 * c)
+    near = begin + width * (1 / 3) * (q + y * (2 * r + y * 3 * c))
+    far = end - width * (1 / 3) * (q + 2 * r + 3 * c)
     if near > 0 and far > 0 and end > 0:
         return NONE
     if not (begin >= near >= far >= end and begin > 0 >= end):
