@@ -222,9 +222,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                 if approach < until_approach[np.uintp(i)] or deepest <= from_depth[np.uintp(i)]:
                     i += 1
                     continue
-                gap = lowest - depth - peak[np.uintp(i)]
-                if gap > 0 and gap > recent.apart[over(2 * (i + 1 - oldest) + NEARBY)]:
-                    rests(clearance, i, gap)
+                clear = lowest - depth - peak[np.uintp(i)]
+                if clear > 0 and clear > recent.apart[over(2 * (i + 1 - oldest) + NEARBY)]:
+                    rests(clearance, i, clear)
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
@@ -298,17 +298,16 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     break
                 wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
+                lowest = (u - pull) * fade + pull if pulls else u
+                clear = lowest - depth - peak[np.uintp(cell)]
+                if clear > 0 and clear > recent.apart[over(2 * (i - oldest) + NEARBY)]:
+                    rests(clearance, cell, clear)
+                    break
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
                     probe, gap, rise = (top, above, 0.0) if above > 0 else (probe, gap, rise)
-                lowest = (u - pull) * fade + pull if pulls else u
-                nearest = peak[np.uintp(cell)] - h + gap
-                if (
-                    weak
-                    and nearest > -recent.apart[over(2 * (probe - oldest) + NEARBY)]
-                    and may_have_left(track, motion, deborah, cell)
-                ):
+                if weak and may_have_left(track, motion, deborah, cell):
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
