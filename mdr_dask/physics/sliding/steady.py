@@ -66,7 +66,7 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
     """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press."""
     fade = np.exp(-BLOCK / deborah)
-    memory, depth, slope = deborah * (1 - fade), math.exp(start), 1.0
+    memory, depth, slope = -deborah * math.expm1(-BLOCK / deborah), math.exp(start), 1.0
     for _ in range(OUTLINES):
         free, gain, carried, stiffness = 0.0, 0.0, 0.0, 0.0
         for i in range(peak.size):
@@ -75,6 +75,9 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
             carried += free
             stiffness += gain
             free, gain = free * fade, gain * fade
+        if not carried > 0:  # the highest point is in no whole block
+            depth *= 2
+            continue
         slope = carried / (stiffness * depth)
         ahead = slope * (math.log(load) - math.log(memory * carried))
         depth *= math.exp(ahead)
