@@ -26,8 +26,8 @@ from mdr_dask.physics.transients.free_flight import (
     foreseen,
     gap_at,
     meeting,
-    wake_at,
     surpassed,
+    wake_at,
     worth_keeping,
 )
 from mdr_dask.physics.transients.patches import (
