@@ -16,6 +16,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
 from mdr_dask.physics.sliding.kelvin import (
+    BLOCK,
     DISPLACEMENT,
     DRAG,
     DRAG_RATE,
@@ -35,6 +36,8 @@ from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 
 ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
+OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the depth, and the change that is the last
+OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
@@ -57,6 +60,30 @@ def _next(depth: float) -> float:
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
     """Begin a `trail` where nothing but a depth for a load is known."""
     trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), 0.7, 0.0
+
+
+@compiled
+def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
+    """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press."""
+    fade = np.exp(-BLOCK / deborah)
+    memory, depth, slope = -deborah * math.expm1(-BLOCK / deborah), math.exp(start), 1.0
+    for _ in range(OUTLINES):
+        free, gain, carried, stiffness = 0.0, 0.0, 0.0, 0.0
+        for i in range(peak.size):
+            if depth + peak[i] > free:
+                free, gain = depth + peak[i], 1.0
+            carried += free
+            stiffness += gain
+            free, gain = free * fade, gain * fade
+        if not carried > 0:  # the highest point is in no whole block
+            depth *= 2
+            continue
+        slope = carried / (stiffness * depth)
+        ahead = slope * (math.log(load) - math.log(memory * carried))
+        depth *= math.exp(ahead)
+        if abs(ahead) < OUTLINED:
+            break
+    return math.log(depth), slope
 
 
 @compiled
@@ -292,10 +319,18 @@ def _swept(
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
     deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order] + cells.top, np.zeros(4)
     _begin(first, loads[0] / (cells.mean.size - 1), loads[0])
+    outlined, beyond = first[0], 0.0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
+        speed, load = deborah[some.start], loads[some.start]
+        outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
+        if outlines:
+            outlined, slope = _outlined(blocks.peak, speed, load, outlined)
+            first[:] = outlined + beyond, np.log(load), slope, 0.0
         _states(_Swept(cells, blocks, near), alike, starts[some], close, first, ordered[some], ordered_status[some])
+        outlined = outlined if outlines else first[0]
+        beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
     results[:, 1] -= cells.top

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, greater, inlined, kernel, lesser
+from mdr_dask.physics.compiling import compiled, greater, inlined, kernel, lesser
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # a position in a cell that is not there
@@ -143,14 +143,16 @@ def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[Fl
     peaks = np.empty(enter.size)
     best, place = 0, 0.0
     for i in range(enter.size):
-        rise = height[i + 1] - height[i]
-        b, c = 3 * rise - 2 * enter[i] - leave[i], enter[i] + leave[i] - 2 * rise
+        first, last, rise = enter[i], leave[i], height[i + 1] - height[i]
         x = 0.0 if height[i] >= height[i + 1] else 1.0
         peaks[i] = max(height[i], height[i + 1])
-        inside = summit(enter[i], b, c)
-        top = height[i] + inside * (enter[i] + inside * (b + inside * c))
-        if inside < 1 and top > peaks[i]:
-            x, peaks[i] = inside, top
+        between = 3 * rise - first - last  # a control point of the slope: where all three agree in sign, none is inside
+        if not (min(first, between, last) >= 0 or max(first, between, last) <= 0):
+            b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
+            inside = summit(first, b, c)
+            top = height[i] + inside * (first + inside * (b + inside * c))
+            if inside < 1 and top > peaks[i]:
+                x, peaks[i] = inside, top
         if i == 0 or peaks[i] > peaks[best]:
             best, place = i, x
     return peaks, best, place
@@ -158,19 +160,12 @@ def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[Fl
 
 def cut(line: CubicLine) -> Cells:
     """Cut a line into its cells, a periodic one at its highest point."""
-    nodes, enter, leave, n = line.height, line.enter, line.leave, line.enter.size
-    peaks, best, place = _peaks(nodes, enter, leave)
-    top = float(peaks[best])
-    mean, stretch = _integrals(nodes, enter, leave, top)
+    peaks, best, place = _peaks(line.height, line.enter, line.leave)
+    top, first = float(peaks[best]), best if line.periodic else 0
+    columns = _turned(line, peaks, top, first)
     if line.smooth:
-        stretch = _resummed(stretch, enter, best)
-    first = best if line.periodic else 0
-    height, enter, leave, peaks, mean, stretch = (
-        _closed(array, first) for array in (nodes[:n] - top, enter, leave, peaks - top, mean, stretch)
-    )
-    after = height[:2] if line.periodic else np.full(2, nodes[-1] - top)
-    height = np.append(height[:n], after)
-    return Cells(height, enter, leave, peaks, mean, stretch, place if line.periodic else 0.0, top, line.periodic)
+        _resum(columns[1], columns[5])
+    return Cells(*columns, place if line.periodic else 0.0, top, line.periodic)
 
 
 @kernel
@@ -185,45 +180,51 @@ def running(integrals: FloatArray) -> FloatArray:
 
 
 @kernel
-def _closed(array: FloatArray, first: int) -> FloatArray:
-    """Return an array turned to begin at a place, with that place once more at the end."""
-    n = array.size
-    turned = np.empty(n + 1)
-    copy_into(turned[: n - first], array[first:])
-    copy_into(turned[n - first : n], array[:first])
-    turned[n] = turned[0]
-    return turned
+def _turned(
+    line: CubicLine, peaks: FloatArray, top: float, first: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the arrays of the cells from a cell on, with that cell once more at the end, heights from the top."""
+    nodes, n = line.height, line.enter.size
+    height, enter, leave, peak, mean, stretch = (
+        np.empty(n + 2),
+        np.empty(n + 1),
+        np.empty(n + 1),
+        np.empty(n + 1),
+        np.empty(n + 1),
+        np.empty(n + 1),
+    )
+    for k in range(n + 1):
+        i = first + k if first + k < n else first + k - n
+        e, f, rise = line.enter[i], line.leave[i], nodes[i + 1] - nodes[i]
+        height[k], enter[k], leave[k], peak[k] = nodes[i] - top, e, f, peaks[i] - top
+        mean[k] = 0.5 * (nodes[i + 1] + nodes[i]) + (e - f) / 12 - top
+        stretch[k] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
+    height[n + 1] = height[1]
+    if not line.periodic:
+        height[n] = height[n + 1] = nodes[n] - top
+    return height, enter, leave, peak, mean, stretch
 
 
 @kernel
-def _integrals(nodes: FloatArray, enter: FloatArray, leave: FloatArray, top: float) -> tuple[FloatArray, FloatArray]:
-    """Return the integrals over every cell of the height, from the top, and of the slope squared."""
-    mean, stretch = np.empty(enter.size), np.empty(enter.size)
-    for i in range(enter.size):
-        rise, e, f = nodes[i + 1] - nodes[i], enter[i], leave[i]
-        mean[i] = 0.5 * (nodes[i + 1] + nodes[i]) + (e - f) / 12 - top
-        stretch[i] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
-    return mean, stretch
-
-
-@kernel
-def _resummed(stretch: FloatArray, slope: FloatArray, first: int) -> FloatArray:
-    """Return the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
+def _resum(slope: FloatArray, stretch: FloatArray) -> None:
+    """Write the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
 
     The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
     """
-    n = slope.size
-    square = slope * slope
-    correction = np.empty(n)
+    n, kept = slope.size - 1, stretch[0]
+    before, here, after = slope[n - 1] ** 2, slope[0] ** 2, slope[1] ** 2
+    correction, difference = (after - before) / 24, 0.0
     for i in range(n):
-        correction[i] = (square[(i + 1) % n] - square[i - 1]) / 24
-    summed = np.empty(n)
-    for i in range(n):
-        after = (i + 1) % n
-        summed[i] = 0.5 * (square[i] + square[after]) + correction[i] - correction[after]
-    summed += (summed[first] - stretch[first]) / max(n - 1, 1)
-    summed[first] = stretch[first]
-    return summed
+        further = slope[i + 2] ** 2 if i + 2 <= n else slope[i + 2 - n] ** 2
+        next_correction = (further - here) / 24
+        stretch[i] = 0.5 * (here + after) + correction - next_correction
+        if i == 0:
+            difference = (stretch[0] - kept) / max(n - 1, 1)
+            stretch[0] = kept
+        else:
+            stretch[i] += difference
+        here, after, correction = after, further, next_correction
+    stretch[n] = kept
 
 
 @compiled

@@ -104,9 +104,12 @@ def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
     if x > held:
         depth = now.history.depth[now.history.count - 1]
         w, pressed = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0]
-        fade = np.exp((held - x) / max(now.deborah, now.first.deborah))
         push = wakes.recent.push[over(x - wakes.earliest[0]) if wakes.count > 0 else 0]
-        if w >= pressed * fade + push * (1 - fade):
+        surely = w >= max(pressed, push)
+        if not surely:
+            fade = np.exp((held - x) / max(now.deborah, now.first.deborah))
+            surely = w >= pressed * fade + push * (1 - fade)
+        if surely:
             return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
     return wake_at(now, wakes, x)[0]
 
@@ -131,4 +134,4 @@ def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
         wakes.earliest[k] -= now.track.cells
         wakes.places[k] -= now.track.cells
         wakes.farthest[k] -= now.track.cells
-    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)
+    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest, 0)

@@ -10,6 +10,7 @@ from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, inlined, nested
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
+from mdr_dask.physics.transients.clearance import APPROACH, TIME, Clearance, approached, rests
 from mdr_dask.physics.transients.contact_loss import (
     Motion,
     loss,
@@ -25,6 +26,7 @@ from mdr_dask.physics.transients.free_flight import (
     foreseen,
     gap_at,
     meeting,
+    surpassed,
     wake_at,
     worth_keeping,
 )
@@ -45,9 +47,8 @@ from mdr_dask.physics.transients.patches import (
 )
 from mdr_dask.physics.transients.recent import WINDOW, WINDOWS, Recent, over, write_recent
 
-CLEAR = 8.0  # ranges of the depth by which the line stays below elements where it is not looked at
 CANDIDATES = 1024  # most places of leaving whose wakes are compared
-KNOWN_FOR = 64.0  # cells in which what free elements have at least is taken for known
+NEARBY = 64.0  # cells more than twice the way, over which contact may have been where it is not now
 ROUNDING = 1e-9  # of a displacement
 TURNS = 3  # of the line that an element may fly over
 VISITS = 6  # of one cell: a force that is a cubic changes sign three times at most
@@ -60,19 +61,19 @@ class Reachable(NamedTuple):
     ----------
     runs : int array, shape (m, 2)
         First and last node of the stretches in which contact is possible.
-    floor : array, shape (n + 2,)
-        Displacement that an element has at least, at the nodes.
+    from_depth : array, shape (n + 2,)
+        Depth up to which the line touches no element in a cell.
     second : float
         Height of the highest point outside of the patch of the highest of all.
     """
 
     runs: IntArray
-    floor: FloatArray
+    from_depth: FloatArray
     second: float
 
 
 class Workspace(NamedTuple):
-    """What a search writes: patches and their sums, the places of leaving now and the farthest, ranges, barriers."""
+    """What a search writes: patches and their sums, the places of leaving now and the farthest, bounds, barriers."""
 
     start: FloatArray
     end: FloatArray
@@ -82,16 +83,17 @@ class Workspace(NamedTuple):
     farthest: FloatArray
     barrier: FloatArray
     recent: Recent
+    clearance: Clearance
     barriers: Barriers
 
 
-def workspace_for(patches: int, barriers: Barriers) -> Workspace:
-    """Return the workspace of a number of patches and some more, with the barriers of a Deborah number."""
+def workspace_for(patches: int, barriers: Barriers, clearance: Clearance) -> Workspace:
+    """Return the workspace of a number of patches and some more, with what is known of the cells."""
     most = 4 * patches + 4096
     start, end = np.empty((2, most))
     earliest, places, farthest, barrier = np.empty((4, CANDIDATES))
-    recent = Recent(*np.empty((4, WINDOWS)))
-    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, barriers)
+    recent = Recent(*np.empty((5, WINDOWS)))
+    return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, clearance, barriers)
 
 
 @inlined
@@ -169,8 +171,11 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """
     motion = motion_at(now, reachable.second)
     write_recent(now.history, now.first, now.deborah, work.recent)
+    state = work.clearance.state
+    approached(now, work.recent, state)
     found, known = _turn(now, motion, reachable, work, 0)
     if motion.overflown:
+        state[TIME] = np.nan  # what a turn knows does not hold for the next moment
         for _ in range(min(int(now.deborah * now.time / now.track.cells) + 1, TURNS)):
             known = turned(
                 now, Wakes(work.earliest, work.places, work.farthest, work.barrier, work.recent, known), motion
@@ -189,8 +194,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     """
     track, history, deborah = now.track, now.history, now.deborah
     height, enter, leave, peak = track.height, track.enter, track.leave, track.peak
-    runs, floor = reachable.runs, reachable.floor
-    start, end, sums, earliest, places, farthest, least_lift, recent, barriers = work
+    runs, from_depth = reachable.runs, reachable.from_depth
+    start, end, sums, earliest, places, farthest, least_lift, recent, clearance, barriers = work
+    until_approach, approach = clearance.until, clearance.state[APPROACH]
     depth = history.depth[history.count - 1]
     lift = depth + history.rate[history.count - 1]
     deepest, highest = motion.deepest, motion.highest  # elements may fly from where the line is no longer touched
@@ -199,24 +205,26 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     free_from = held = begin
     firm, firm_until = 0.0, 0.0
     contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
-    slowing = 1 / min(deborah, now.first.deborah)
-    fade_of_cell = np.exp(-slowing)
+    fade, pull = np.exp(-1 / min(deborah, now.first.deborah)), recent.pull[WINDOWS - 1]
     oldest = earliest[0] if known > 0 else begin
-    seen, seen_at = 0.0, begin  # what free elements were seen to have last, and where
-    least_free, known_at = 0.0, 0.0
+    lowest = 0.0  # what a free element has at least at the end of a cell
+    met, earlier = 0.0, 0  # displacement where the line met a wake last, and how many places were known there
     sums[:] = 0.0
     if not contact:  # it may have been left there
         known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            known_at = -np.inf
+            lowest = 0.0  # nothing is known of what is left between the stretches
         while i < stop:
             if not contact:
-                least_free *= fade_of_cell
-                most = deepest + peak[np.uintp(i)]
-                least = min(floor[np.uintp(i)], floor[np.uintp(i + 1)])
-                if most <= least or (most < least_free and i + 1 - known_at < KNOWN_FOR):
+                lowest = (lowest - pull) * fade + pull
+                if approach < until_approach[np.uintp(i)] or deepest <= from_depth[np.uintp(i)]:
+                    i += 1
+                    continue
+                clear = lowest - depth - peak[np.uintp(i)]
+                if clear > 0 and clear > recent.apart[over(2 * (i + 1 - oldest) + NEARBY)]:
+                    rests(clearance, i, clear)
                     i += 1
                     continue
             positive = i < n and keeps_pressed(track, barriers, deborah, i, lift)
@@ -268,9 +276,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    known = worth_keeping(now, wakes, until, w, deepest)
-                    least_free, known_at = (w - CLEAR * recent.spread[over(KNOWN_FOR)]) * fade_of_cell, until
-                    seen, seen_at, oldest = w, until, earliest[0] if known > 0 else until
+                    gone = surpassed(now, wakes, met, until, w, earlier)
+                    known = worth_keeping(now, wakes, until, w, deepest, gone)
+                    lowest, oldest = (w - pull) * fade + pull, earliest[0] if known > 0 else until
                     contact, free_from, x, pulled = False, off, off, True
                     if not pulls:
                         break
@@ -286,34 +294,32 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                 pulls = cell + high < x1
                 probe = cell + high if pulls else x1
                 h, slope, _ = height_at(track, probe)
-                pull = recent.pull[over(probe - oldest)]
-                lowest_free = (seen - pull) * np.exp((seen_at - probe) * slowing) + pull
-                spread = recent.spread[over(2 * (probe - oldest) + KNOWN_FOR)]
-                if not pulls and depth + peak[np.uintp(cell)] + (2 * spread if weak else 0.0) <= lowest_free:
+                if not (pulls or weak) and depth + peak[np.uintp(cell)] <= lowest:
                     break
                 wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
-                seen, seen_at = u, probe
+                lowest = (u - pull) * fade + pull if pulls else u
+                clear = lowest - depth - peak[np.uintp(cell)]
+                if clear > 0 and clear > recent.apart[over(2 * (i - oldest) + NEARBY)]:
+                    rests(clearance, cell, clear)
+                    break
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
-                    probe, gap = (top, above) if above > 0 else (probe, gap)
-                least_free, known_at = (u - CLEAR * spread) * fade_of_cell, probe
-                if (
-                    weak
-                    and gap + peak[np.uintp(cell)] - h > -2 * spread
-                    and may_have_left(track, motion, deborah, cell)
-                ):
+                    probe, gap, rise = (top, above, 0.0) if above > 0 else (probe, gap, rise)
+                if weak and may_have_left(track, motion, deborah, cell):
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, guess)
+                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, rise, guess)
                     _add_edge(now, lift, begin, (rise, gain, opening), sums)
                     contact, x, held, firm_until = True, begin, begin, 0.0
+                    met, earlier = depth + height_at(track, begin)[0], known
                     continue
                 if not pulls:
                     break
-                known = worth_keeping(now, wakes, probe, depth + h, deepest)
+                if known > 1:
+                    known = worth_keeping(now, wakes, probe, depth + h, deepest, 0)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
                 free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:

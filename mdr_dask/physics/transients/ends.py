@@ -30,7 +30,7 @@ from mdr_dask.physics.transients.patches import (
 
 KNOWN, FEWEST = 2**21, 4  # cells whose barriers are kept, 16 bytes each, at least those of some Deborah numbers
 NEWTON_STEPS = 60
-EXACT, NEARLY = 1e-13, 1e-9  # of the load: where the search for the rate ends, and what it may miss
+NEARLY = 1e-6  # of the load: what the last step of Newton may still find missing, whose square is left out
 
 
 class PreparedLine(NamedTuple):
@@ -160,13 +160,14 @@ def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:
     """Return the drag right after a jump, the rate of the depth that carries the load, their slope, and the outcome."""
-    rate, sums, missed = 0.0, np.empty(SUMS), np.inf
+    rate, sums = 0.0, np.empty(SUMS)
     for _ in range(NEWTON_STEPS):
         released(track, first, barriers, deborah, rate, sums)
-        miss = abs(sums[LOAD] - load)
-        # Newton's steps on a convex sum come nearer until rounding is all that is left
-        if miss <= EXACT * load or sums[LENGTH] <= 0 or (miss <= NEARLY * load and miss >= missed):
+        if sums[LENGTH] <= 0:
             break
-        rate, missed = rate + (load - sums[LOAD]) / sums[LENGTH], miss
-    found = abs(sums[LOAD] - load) <= NEARLY * load
-    return sums[DRAG], rate, sums[TILT], Outcome.CONVERGED if found else Outcome.DEPTH_NOT_FOUND
+        miss = load - sums[LOAD]
+        step = miss / sums[LENGTH]
+        rate += step
+        if abs(miss) <= NEARLY * load:
+            return sums[DRAG] + step * sums[TILT], rate, sums[TILT], Outcome.CONVERGED
+    return sums[DRAG], rate, sums[TILT], Outcome.DEPTH_NOT_FOUND

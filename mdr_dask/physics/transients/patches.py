@@ -16,7 +16,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barr
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-6  # of a cell: a step of Newton after which the next one is below rounding
+CLOSE = 1e-4  # of a cell: a step of Newton after which the next one is 1e-8, and the force there that times its slope
 NEARBY = 8  # patches to look at one by one before halving
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
@@ -158,8 +158,8 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """
     width = 1 - y
     begin, end = p + y * (q + y * (r + y * c)), p + q + r + c
-    near = begin + width / 3 * (q + y * (2 * r + y * 3 * c))
-    far = end - width / 3 * (q + 2 * r + 3 * c)
+    near = begin + width * (1 / 3) * (q + y * (2 * r + y * 3 * c))
+    far = end - width * (1 / 3) * (q + 2 * r + 3 * c)
     if near > 0 and far > 0 and end > 0:
         return NONE
     if not (begin >= near >= far >= end and begin > 0 >= end):

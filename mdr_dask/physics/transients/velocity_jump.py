@@ -13,6 +13,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
+from mdr_dask.physics.transients.clearance import clearance_from
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, workspace_for
 from mdr_dask.physics.transients.curve import curve_through
 from mdr_dask.physics.transients.ends import Ends, PreparedLine, ends_on
@@ -335,7 +336,8 @@ class _Relaxation(NamedTuple):
         reachable = _reachable(self.line.track, self.slower, limits)
         onset = self.pace.first / (self.pace.growth - 1)
         marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
-        return marching, found, workspace_for(self.first.count, self.line.barriers(self.deborah[1]))
+        barriers, clearance = self.line.barriers(self.deborah[1]), clearance_from(reachable.from_depth - self.depth[0])
+        return marching, found, workspace_for(self.first.count, barriers, clearance)
 
     def retrace(self, path: FloatArray) -> FloatArray:
         """Return the path on this grid at the moments of a path on another one, NaN where none is found."""
@@ -354,27 +356,24 @@ class _Relaxation(NamedTuple):
 
 @kernel
 def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Reachable:
-    """Return where elements can be in contact between two depths, from the steady state at the lower velocity.
+    """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
 
-    Where the depth is less by some length, displacements are less by that length at most.
+    The steady state at the lower velocity bounds them: where the depth is less by some length, displacements are less
+    by that length at most.
     """
-    floor, (low, high) = np.empty(track.height.size), limits
-    k, decay, free, flying = -1, np.exp(-1 / slower.deborah), -np.inf, False
-    for i in range(floor.size):
-        while k + 1 < slower.count and slower.start[k + 1] <= i:
-            k += 1
-        if k >= 0 and i <= slower.end[k]:
-            free, flying = slower.depth + track.height[i], False
-        elif flying and slower.start[k] <= i - 1:
+    (low, high), cells, decay = limits, track.peak.size, np.exp(-1 / slower.deborah)
+    from_depth = np.full(cells + 1, -np.inf)
+    for k in range(slower.count):
+        first = int(slower.end[k]) + 1  # node in flight
+        last = int(np.ceil(slower.start[k + 1])) - 1 if k + 1 < slower.count else cells
+        free = slower.pressed[k] * np.exp(-(first - slower.end[k]) / slower.deborah)
+        for i in range(first, last):
             free *= decay
-        elif k >= 0:
-            free, flying = slower.pressed[k] * np.exp(-(i - slower.end[k]) / slower.deborah), True
-        floor[i] = free - (slower.depth - low)
-    last = floor.size - 1
-    runs, count = np.empty((last // 2 + 1, 2), np.int64), 0
-    for i in range(last):
-        if high + track.peak[i] > min(floor[i], floor[i + 1]):
-            begin, end = max(i - 1, 0), min(i + 2, last)
+            from_depth[i] = free - (slower.depth - low) - track.peak[i]
+    runs, count = np.empty((cells // 2 + 1, 2), np.int64), 0
+    for i in range(cells):
+        if high > from_depth[i]:
+            begin, end = max(i - 1, 0), min(i + 2, cells)
             if count > 0 and begin <= runs[count - 1, 1]:
                 runs[count - 1, 1] = end
             else:
@@ -383,7 +382,7 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
     second = -np.inf
     for i in range(int(np.ceil(slower.end[0])), int(slower.start[slower.count - 1])):
         second = max(second, track.peak[i])
-    return Reachable(runs[:count].copy(), floor, second)
+    return Reachable(runs[:count].copy(), from_depth, second)
 
 
 def _at_times(

@@ -7,6 +7,7 @@ from mdr_dask.physics.sliding.kelvin import DISPLACEMENT, DRAG, SUMS, barriers_f
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import patches
+from mdr_dask.physics.transients.clearance import clearance_from
 from mdr_dask.physics.transients.contact_loss import motion_at
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
 from mdr_dask.physics.transients.ends import PreparedLine
@@ -29,7 +30,7 @@ def test_contact_is_that_of_the_sweep(hurst: float, oversampling: int, deborah: 
         first, barriers = line.patches(0.5 * depth, 2 * deborah, np.empty(SUMS)), line.barriers(deborah)
         history = History(np.array([0.0, LONG]), np.array([depth, depth]), np.zeros(2), 2, 1.0)
         everywhere = Reachable(np.array([[0, nodes + 1]]), np.full(nodes + 2, -np.inf), 0.0)
-        work = workspace_for(nodes, barriers)
+        work = workspace_for(nodes, barriers, clearance_from(everywhere.from_depth - depth))
         found = touch(Instant(line.track, first, history, LONG, deborah, 0.0), everywhere, work)
         sums = np.empty(SUMS)
         start, end = patches_at(line.cells, line.blocks, barriers_for(int(line.track.cells)), deborah, depth, sums)

@@ -7,6 +7,7 @@ from references.largest_displacement import judged
 from mdr_dask.physics.sliding.kelvin import SUMS
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
+from mdr_dask.physics.transients.clearance import clearance_from
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
 from mdr_dask.physics.transients.ends import PreparedLine
 from mdr_dask.physics.transients.free_flight import Instant
@@ -43,7 +44,7 @@ def test_more_places_of_leaving_than_fit_are_told() -> None:
     history = History(np.array([0.0, 1e-3]), np.array([1.0, 1.0]), np.zeros(2), 2, 1.0)
     instant = Instant(line.track, first, history, 1e-3, 3.0, np.exp(-1e-3))
     everywhere = Reachable(np.array([[0, 4 * points + 1]]), np.full(4 * points + 2, -np.inf), 0.0)
-    work = workspace_for(points, line.barriers(3.0))
+    work = workspace_for(points, line.barriers(3.0), clearance_from(everywhere.from_depth - 1.0))
     assert touch(instant, everywhere, work) > 0
     few = work._replace(places=np.empty(6))
     assert touch(instant, everywhere, few) == -1
@@ -58,7 +59,7 @@ def test_wakes_are_within_their_bounds(ratio: float, size: float, growth: float)
     deborah = 100.0
     line = PreparedLine.of(periodic_line(np.cos(2 * np.pi * np.arange(64) / 64), None))
     first = line.patches(2.0, deborah / ratio, np.empty(SUMS))._replace(depth=2.0)
-    recent = Recent(*np.empty((4, WINDOWS)))
+    recent = Recent(*np.empty((5, WINDOWS)))
     write_recent(History(time, depth, rate, time.size, 0.0), first, deborah, recent)
     for k in range(WINDOWS):
         within = time[-1] - time <= WINDOW * 2**k / deborah

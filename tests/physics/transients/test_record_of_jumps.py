@@ -10,6 +10,7 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
 from mdr_dask.physics.transients import accuracy
 from mdr_dask.physics.transients.accuracy import JumpAim, JumpProblem, solve_jumps
+from mdr_dask.physics.transients.clearance import clearance_from
 from mdr_dask.physics.transients.contact_loss import motion_at
 from mdr_dask.physics.transients.contact_search import Reachable, touch, workspace_for
 from mdr_dask.physics.transients.curve import curve_through
@@ -132,13 +133,13 @@ def test_contact_at_moments_of_given_histories(kind, dataframe_regression):
         for deborah in (0.05, 1.7, 40.0, 700.0):
             for ratio in (0.1, 0.83, 1.2, 12.0):
                 first = line.patches(depth[0], deborah / ratio, np.empty(SUMS))
-                work = workspace_for(n, line.barriers(deborah))
+                work = workspace_for(n, line.barriers(deborah), clearance_from(everywhere.from_depth.copy()))
                 sums, edges, bounds, motions, counts = [], [], [], [], []
                 for count in (1, 2, 9, 17, 24):
                     history = History(time, depth, rate, count, 1.3 / time[max(count - 1, 1)])
                     now = Instant(line.track, first, history, time[count - 1], deborah, np.exp(-time[count - 1]))
                     number = touch(now, everywhere, work)
-                    recent = Recent(*np.empty((4, WINDOWS)))
+                    recent = Recent(*np.empty((5, WINDOWS)))
                     write_recent(history, first, deborah, recent)
                     sums.append(work.sums.copy())
                     edges.append(np.append(work.start[: max(number, 0)], work.end[: max(number, 0)]))
