@@ -31,8 +31,8 @@ from typing import NamedTuple
 from coverage import CoverageData
 
 ROOT = Path(__file__).parents[2]
-#: Tests that a mutant meets, the time that they take without it, and the processor time that they have.
-TESTS, SECONDS, LIMIT = 200, 60.0, 200
+#: Seconds that the tests take which a mutant meets, and processor time that they have.
+SECONDS, LIMIT = 60.0, 200
 PYTEST = [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
 PHASE = re.compile(r"\|(setup|run|teardown)$")
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
@@ -275,7 +275,7 @@ class Suite:
         near = {file: sum(part in file for part in parts) for file in files}
         beside.sort(key=lambda test: (test not in tests, -near[_file(test)], self.seconds[test]))
         before = accumulate((self.seconds[test] for test in beside), initial=0.0)
-        return [test for test, seconds in zip(beside[:TESTS], before, strict=False) if seconds < SECONDS]
+        return [test for test, seconds in zip(beside, before, strict=False) if seconds < SECONDS]
 
 
 def _file(test: str) -> str:
