@@ -184,8 +184,8 @@ def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
             parts = [*(each.annotation for each in arguments), node.returns, *node.decorator_list]
         case ast.AnnAssign():
             parts = [node.annotation]
-        case ast.ClassDef() if node.name.endswith("Settings"):
-            parts = [node]
+        case ast.ClassDef():  # that data is frozen has a test of its own
+            parts = [node] if node.name.endswith("Settings") else node.decorator_list
         case ast.Raise() | ast.JoinedStr() | ast.Assert():
             parts = [node]
         case ast.If(ast.Name("TYPE_CHECKING")):
