@@ -34,6 +34,8 @@ ROOT = Path(__file__).parents[2]
 #: Seconds that the tests take which a mutant meets, and processor time that they have.
 SECONDS, LIMIT = 60.0, 200
 PYTEST = [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+#: Decorators of functions that are compiled; a test that runs one in Python says little of it.
+KERNELS = {"kernel", "compiled", "spliced", "nested", "inlined", "fused"}
 PHASE = re.compile(r"\|(setup|run|teardown)$")
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
@@ -96,8 +98,8 @@ class Source:
         return [mutant for mutant in found if mutant.new != mutant.old]
 
     def lines(self, mutant: Mutant) -> range:
-        """Return the lines of the statement that holds a change, without its body; none beyond functions."""
-        functions = [node for node in ast.walk(self.tree) if isinstance(node, ast.FunctionDef)]
+        """Return the lines of a changed statement, without its body; in kernels and beyond functions none."""
+        functions = [node for node in ast.walk(self.tree) if isinstance(node, ast.FunctionDef) and not _is_kernel(node)]
         inner = [
             node
             for function in functions
@@ -174,6 +176,10 @@ class Source:
                 yield "statement", start, end, "pass"
             case ast.AugAssign() | ast.Assign(targets=[ast.Subscript()]) | ast.Continue() | ast.Break():
                 yield "statement", start, end, "pass"
+
+
+def _is_kernel(function: ast.FunctionDef) -> bool:
+    return any(isinstance(each, ast.Name) and each.id in KERNELS for each in function.decorator_list)
 
 
 def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
