@@ -3,6 +3,8 @@
 import json
 import threading
 from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
 
 import curves
 import numpy as np
@@ -22,6 +24,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots.outputs import View, of_output
 from mdr_dask.plots.style import DATA
 from mdr_dask.questions.table import Question, table
+from mdr_dask.refinement import Mean, Stage, refined
 
 AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
 
@@ -81,13 +84,36 @@ def test_what_jumps_or_bends_ends_and_starves_no_other_curve(study, url, shape, 
 
 def test_the_spaces_beside_a_top_are_alike(study, url):
     """Where the top lies is known as well as the widest space beside it allows, down to a 16th of the axis."""
-    run(study("shape: bump, shift: [-0.6, 0.9]", AXIS.replace("1 %", "30 %")), url)
+    run(study("shape: bump, shift: [-2.0, -0.4, 1.2]", AXIS.replace("1 %", "5 %")), url)
     x, curves_ = means(url)
     for curve in curves_:
         known = np.isfinite(curve)
         place, top = np.log10(x[known]), int(np.argmax(curve[known]))
         near = np.diff(place)[max(top - 2, 0) : top + 2]
         assert near.max() <= max(near.min(), 6 / 16) * (1 + 1e-9)
+
+
+def test_where_there_is_room_for_few_values_the_widest_spaces_get_theirs(study):
+    """A value halves a space that is twice as wide as its place on the lattice tells."""
+
+    def more(mesh, room):
+        x, shapes = mesh.series.axes
+        limited = replace(x, refinement=replace(x.refinement, at_most=len(x.values) + room))
+        y = np.transpose([curves.FUNCTIONS[shape](np.array(x.values), -0.7) for shape in shapes.values])
+        mean = Mean.of(y[..., None], np.ones((*y.shape, 1), dtype=bool), None)
+        return refined(replace(mesh, series=replace(mesh.series, axes=(limited, shapes))), {"y": mean})[0]
+
+    stage, widths = Stage.first(study("shape: [jump, smooth], shift: -0.7")), set()
+    while stage:
+        (mesh,) = stage.meshes
+        known = mesh.shares[0].size
+        wanted = {share: Fraction(share).denominator for share in more(mesh, 60).shares[0][known:].tolist()}
+        for room in range(len(wanted)):
+            found = more(mesh, room).shares[0][known:].tolist()
+            assert [wanted[share] for share in sorted(found, key=wanted.get)] == sorted(wanted.values())[:room]
+        widths.add(len(set(wanted.values())))
+        stage = stage.after((more(mesh, 60),))
+    assert max(widths) > 1
 
 
 def test_scatter_is_not_chased(study, url):

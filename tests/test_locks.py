@@ -9,7 +9,9 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from test_execute import digests, run
 
@@ -242,3 +244,21 @@ def test_the_next_runner_waits_for_a_task_in_the_middle_of_writing(url, monkeypa
 def test_an_owner_gives_several_signs_of_life_before_it_counts_as_gone():
     assert 4 * locks.BEAT < locks.SILENCE
     assert 10 * runners.KNOCK < runners.GLANCE < runners.SILENT
+
+
+@pytest.mark.parametrize("patience", [runners.GLANCE, 10.0])
+def test_whoever_waits_at_the_entrance_says_so_once_and_only_so_long(patience, monkeypatch, caplog):
+    times = [50.0]
+    clock = SimpleNamespace(monotonic=lambda: times[-1], sleep=lambda seconds: times.append(times[-1] + seconds))
+
+    def occupied(*_):
+        raise StoreBusyError("process 7 is running; wait")
+
+    monkeypatch.setattr(runners, "time", clock)
+    monkeypatch.setattr(runners, "lock", occupied)
+    with pytest.raises(StoreBusyError, match="process 7"), runners.entrance("study.zarr", patience):
+        pass
+    assert np.allclose(np.diff(times), runners.KNOCK)
+    assert times[-1] - 50.0 == pytest.approx(patience, abs=runners.KNOCK)
+    waiting = "process 7 is running; waiting until it has looked at what is there"
+    assert [each.message for each in caplog.records] == [waiting] * (patience > runners.SILENT)

@@ -22,7 +22,7 @@ AXIS = "{adaptive: [1 mm, 1 km], until: {y: {relative: 1 %, absolute: 0.002}}, a
 CAMPAIGNS = {
     "curves of three places": f"{{x: {AXIS}, shift: [-1.5, 0.3, 1.7]}}",
     "a jump beside a curve": f"{{x: {AXIS}, shape: [jump, smooth], shift: -0.7}}",
-    "tops": f"{{x: {AXIS}, shape: bump, shift: [-2.2, 0.4]}}".replace("relative: 1 %", "relative: 30 %"),
+    "tops": f"{{x: {AXIS}, shape: bump, shift: [-2.2, -0.4]}}".replace("relative: 1 %", "relative: 5 %"),
     "whole numbers": "{x: 3 m, shift: [0.1, 0.9], count: {adaptive: [1, 19], until: 0.2 %, at_most: 40}}",
     "two axes": f"{{shift: {{adaptive: [-0.8, 2.1], until: 3 %, at_most: 12}}, x: {AXIS}}}",
 }

@@ -14,6 +14,8 @@ from mdr_dask.replication import growth_needed, mean_and_error, next_round
         (10, 500, 40, [1.0, 0.2], 40),  # nobody needs more
         (10, 500, 40, [1.01, 0.2], 50),  # a quarter more at least
         (10, 500, 40, [3.0, 2.0, 1.5, 0.5], 80),  # enough for half of those that need more
+        (10, 500, 40, [1.5] * 25 + [3.0] * 24, 60),  # and for no more than half
+        (10, 500, 40, [1.5] * 24 + [3.0] * 25, 120),
         (10, 500, 40, [2.01, 2.01], 81),  # no more than needed
         (10, 500, 7, [12 / 7], 12),  # and not one more for rounding
         (10, 500, 40, [np.inf, 9.0], 160),  # four times at most: what few results say of themselves is uncertain

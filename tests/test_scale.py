@@ -64,6 +64,18 @@ def test_a_ledger_that_lacks_chunks_is_that_of_zarr(url):
     assert np.array_equal(store.ledger(url, "", (13, 5)), plain(url))
 
 
+def test_a_part_of_a_ledger_holds_what_the_whole_holds_there_and_nothing_else():
+    whole = ledgers.Ledger((None, b"done", b"cut", b"failed"), np.array([[1, 3, 0], [1, 2, 1]]))
+    for bits in range(2**6):
+        mask = np.array([bits >> place & 1 for place in range(6)], dtype=bool).reshape(2, 3)
+        part = whole.only(mask)
+        expected = [
+            whole.different[which] if asked else None for which, asked in zip(whole.which.flat, mask.flat, strict=True)
+        ]
+        assert [part.different[which] for which in part.which.flat] == expected
+        assert len(part.different) == len({None, *expected})
+
+
 def test_status_names_a_chunk_of_the_ledger_that_belongs_elsewhere(url, capsys):
     shutil.copy(Path(url, "status/c/6/0"), Path(url, "status/c/2/1"))
     store.ledger(url, "", (13, 5))

@@ -1,9 +1,9 @@
 """Do the tests see a change of the code? ``python -m benchmarks stress mutations [NUMBER] [SEED] [FILE]``.
 
 A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
-place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. Each mutant stands in a copy of
-the checkout and meets the files of tests that lie nearest to its module by imports. What is found is appended to FILE,
-a line of JSON each; a run that is broken off goes on where it was.
+place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. The suite
+runs once under coverage in a copy of the checkout. Then each mutant stands there and meets the tests that execute its
+line. What is found is appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
 """
 
 from __future__ import annotations
@@ -21,20 +21,27 @@ import subprocess
 import sys
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
+from coverage import CoverageData
+
 ROOT = Path(__file__).parents[2]
-#: Files of tests that a mutant meets, and the processor time that they have.
-FILES, SECONDS = 10, 60
-USAGE = 4  # exit code of pytest
+#: Seconds that the tests take which a mutant meets, and processor time that they have.
+SECONDS, LIMIT = 60.0, 200
+PYTEST = [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+#: Decorators of functions that are compiled; a test that runs one in Python says little of it.
+KERNELS = {"kernel", "compiled", "spliced", "nested", "inlined", "fused"}
+PHASE = re.compile(r"\|(setup|run|teardown)$")
 #: Tests that read files of the project, or that start clusters: they say nothing about one line of code.
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
 
 Change = tuple[str, int, int, str]
+Done = subprocess.CompletedProcess[str]
 
 ARITHMETIC = {ast.Add: "+-", ast.Sub: "-+", ast.Mult: "*/", ast.Div: "/*"}
 COMPARISONS = {
@@ -89,6 +96,26 @@ class Source:
             for kind, start, end, new in self._changes(node)
         ]
         return [mutant for mutant in found if mutant.new != mutant.old]
+
+    def lines(self, mutant: Mutant) -> range:
+        """Return the lines of a changed statement, without its body; in kernels and beyond functions none."""
+        functions = [node for node in ast.walk(self.tree) if isinstance(node, ast.FunctionDef) and not _is_kernel(node)]
+        inner = [
+            node
+            for function in functions
+            for part in function.body
+            for node in ast.walk(part)
+            if isinstance(node, ast.stmt) and self._holds(node, mutant)
+        ]
+        if not inner:
+            return range(0)
+        least = max(inner, key=lambda node: self.place(node)[0])
+        body = getattr(least, "body", None)
+        return range(least.lineno, max(least.lineno, body[0].lineno - 1 if body else least.end_lineno) + 1)
+
+    def _holds(self, node: ast.AST, mutant: Mutant) -> bool:
+        start, end = self.place(node)
+        return start <= mutant.start and mutant.end <= end
 
     def compiles(self, mutant: Mutant) -> bool:
         try:
@@ -151,6 +178,10 @@ class Source:
                 yield "statement", start, end, "pass"
 
 
+def _is_kernel(function: ast.FunctionDef) -> bool:
+    return any(isinstance(each, ast.Name) and each.id in KERNELS for each in function.decorator_list)
+
+
 def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
     """Yield all below a node that no test of numbers can see."""
     match node:
@@ -159,8 +190,8 @@ def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
             parts = [*(each.annotation for each in arguments), node.returns, *node.decorator_list]
         case ast.AnnAssign():
             parts = [node.annotation]
-        case ast.ClassDef() if node.name.endswith("Settings"):
-            parts = [node]
+        case ast.ClassDef():  # that data is frozen has a test of its own
+            parts = [node] if node.name.endswith("Settings") else node.decorator_list
         case ast.Raise() | ast.JoinedStr() | ast.Assert():
             parts = [node]
         case ast.If(ast.Name("TYPE_CHECKING")):
@@ -172,69 +203,22 @@ def _parts_left_out(node: ast.AST) -> Iterator[ast.AST]:
 
 
 class Checkout:
-    """Modules and tests of a checkout, and how far they lie apart."""
+    """Modules of a checkout, and the kernels that are compiled from them."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
         self.modules = {_name(path, root): path for path in sorted((root / "mdr_dask").rglob("*.py"))}
-        self.tests = [path for path in sorted((root / "tests").rglob("test_*.py")) if not APART.search(path.name)]
-
-    @cached_property
-    def leaves(self) -> dict[str, set[str]]:
-        """Modules by the last part of their name: models, figures and fits are loaded by it."""
-        found = defaultdict(set)
-        for module in self.modules:
-            found[module.rpartition(".")[2]].add(module)
-        return found
-
-    def named(self, path: Path) -> set[str]:
-        """Return the modules that a file imports, or names in a text."""
-        found: set[str] = set()
-        for node in ast.walk(ast.parse(path.read_text())):
-            match node:
-                case ast.Import(names):
-                    found |= {each.name for each in names}
-                case ast.ImportFrom(module=str(module)):
-                    found |= {module} | {f"{module}.{each.name}" for each in node.names}
-                    if (path.parent / f"{module}.py").exists() or (self.root / f"tests/{module}.py").exists():
-                        found |= self.named_by_helper(module)
-                case ast.Constant(str(text)):
-                    for word in set(re.findall(r"[\w.]+", text)):
-                        found |= {word} if "." in word else self._loaded(word, path)
-        return found & set(self.modules)
-
-    def named_by_helper(self, name: str) -> set[str]:
-        path = self.root / f"tests/{name}.py"
-        return self.named(path) if path.exists() else set()
-
-    def _loaded(self, word: str, path: Path) -> set[str]:
-        beside = _name(path.parent / "__init__.py", self.root)
-        near = {f"{beside}.{word}", f"mdr_dask.models.{word}", f"mdr_dask.cli.{word}"}
-        return self.leaves.get(word, set()) & near
 
     @cached_property
     def users(self) -> dict[str, set[str]]:
-        """Modules that name a module."""
+        """Modules that import a module."""
         found = defaultdict(set)
         for module, path in self.modules.items():
-            for other in self.named(path) - {module}:
-                found[other].add(module)
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.ImportFrom):
+                    for name in {node.module, *(f"{node.module}.{each.name}" for each in node.names)} - {module}:
+                        found[name].add(module)
         return found
-
-    @cached_property
-    def named_by(self) -> dict[Path, set[str]]:
-        return {path: self.named(path) for path in self.tests}
-
-    def nearest(self, module: str) -> list[str]:
-        """Return the tests by their distance from a module: those that name it, that name one that names it, ..."""
-        parts = {part.rstrip("s") for part in module.split(".")[1:]}
-        reached, edge, found = {module}, {module}, {}
-        while edge:
-            here = [path for path, names in self.named_by.items() if names & edge]
-            found |= dict.fromkeys(sorted(here, key=lambda path: -sum(part in str(path) for part in parts)))
-            edge = {user for each in edge for user in self.users[each]} - reached
-            reached |= edge
-        return [str(path.relative_to(self.root)) for path in found]
 
     def kernels(self, module: str) -> list[Path]:
         """Return the files of kernels that may hold code of a module: its own, and those of all that use it."""
@@ -265,6 +249,75 @@ class Checkout:
                 kernel.write_bytes(compiled)
 
 
+class Suite:
+    """What each test executes, as coverage saw it in one run of the suite, and how long the test takes."""
+
+    def __init__(self, checkout: Checkout, kept: Path) -> None:
+        self.users, times = checkout.users, kept.with_suffix(".seconds")
+        if not times.exists():
+            times.write_text(json.dumps(_measured(checkout, kept)))
+        self.seconds: dict[str, float] = json.loads(times.read_text())
+        self.data = CoverageData(str(kept))
+        self.data.read()
+        inside = {file.rpartition("/mdr_dask/")[2]: file for file in self.data.measured_files()}
+        self.files = {_name(Path("mdr_dask", path), Path()): file for path, file in inside.items()}
+
+    def by_line(self, module: str) -> dict[int, set[str]]:
+        """Return the tests that execute each line of a module; of what is compiled there are none."""
+        found = self.data.contexts_by_lineno(self.files[module]) if module in self.files else {}
+        return {line: {PHASE.sub("", test) for test in tests} & self.seconds.keys() for line, tests in found.items()}
+
+    def chosen(self, module: str, lines: range) -> list[str]:
+        """Return tests that execute one of the lines, near and fast ones first, and then others of their files.
+
+        Where none does, as beyond functions and in kernels, they are those of the module and of its users.
+        """
+        here = self.by_line(module)
+        tests = _union(here.get(line, ()) for line in lines)
+        tests = tests or _union(seen for each in (module, *self.users[module]) for seen in self.by_line(each).values())
+        files = {_file(test) for test in tests}
+        beside = [test for test in self.seconds if _file(test) in files]  # the first test of a file makes its fixtures
+        parts = {part.rstrip("s") for part in module.split(".")[1:]}
+        near = {file: sum(part in file for part in parts) for file in files}
+        beside.sort(key=lambda test: (test not in tests, -near[_file(test)], self.seconds[test]))
+        before = accumulate((self.seconds[test] for test in beside), initial=0.0)
+        return [test for test, seconds in zip(beside, before, strict=False) if seconds < SECONDS]
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
+
+
+def _union(sets: Iterable[Iterable[str]]) -> set[str]:
+    return set().union(*sets)
+
+
+def _measured(checkout: Checkout, kept: Path) -> dict[str, float]:
+    """Run the suite under coverage; return the seconds of every test that passed."""
+    command = [*PYTEST, "--numprocesses=auto", "-m", "not slow", "--durations=0", "--durations-min=0", "--tb=no"]
+    command += ["--cov=mdr_dask", "--cov-context=test", "--cov-report=", "tests"]
+    command += [f"--ignore={path}" for path in checkout.root.rglob("test_*.py") if APART.search(path.name)]
+    told = _run(checkout, command, COVERAGE_FILE=str(kept)).stdout
+    seconds: dict[str, float] = defaultdict(float)
+    for taken, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(\S.*)$", told, flags=re.M):
+        seconds[test] += float(taken)
+    failed = re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", told, flags=re.M)
+    return {test: taken for test, taken in seconds.items() if test not in failed}
+
+
+def _run(checkout: Checkout, command: list[str], limit: int = resource.RLIM_INFINITY, **more: str) -> Done:
+    environment = {**os.environ, "PYTHONPATH": str(checkout.root), **more}
+    return subprocess.run(
+        command,
+        cwd=checkout.root,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
+    )
+
+
 def _name(path: Path, root: Path) -> str:
     return ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__")
 
@@ -292,22 +345,14 @@ def drawn(checkout: Checkout, number: int, seed: int) -> list[Mutant]:
 
 def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, str]:
     """Run tests on a mutant in place; return the verdict, and the first that failed."""
-    command = [sys.executable, "-P", "-m", "pytest", "-x", "-q", "-n0", "-p", "no:cacheprovider", "--tb=line", *tests]
+    if not tests:
+        return "lives", ""
+    command = [*PYTEST, "-x", "-n0", "--tb=line", *tests]
     with checkout.changed(mutant):
-        done = subprocess.run(
-            command,
-            cwd=checkout.root,
-            env={**os.environ, "PYTHONPATH": str(checkout.root)},
-            capture_output=True,
-            text=True,
-            check=False,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
-        )
+        done = _run(checkout, command, LIMIT)
     failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.M)
     if done.returncode in (0, -signal.SIGXCPU, -signal.SIGKILL):
         return "lives" if done.returncode == 0 else "time is up", ""
-    if done.returncode == USAGE:
-        raise RuntimeError(done.stderr)
     return "killed", failed[1] if failed else done.stdout[-200:]
 
 
@@ -319,8 +364,10 @@ def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> 
             copy = shutil.copytree if (ROOT / part).is_dir() else shutil.copy2
             copy(ROOT / part, Path(folder, part))
         checkout = Checkout(Path(folder))
+        suite = Suite(checkout, log.with_suffix(".coverage"))
         for mutant in drawn(checkout, int(number), int(seed))[there:]:
-            verdict, test = judged(checkout, mutant, checkout.nearest(mutant.module)[:FILES])
+            source = Source(mutant.module, checkout.modules[mutant.module])
+            verdict, test = judged(checkout, mutant, suite.chosen(mutant.module, source.lines(mutant)))
             with log.open("a") as lines:
                 lines.write(json.dumps({**mutant._asdict(), "verdict": verdict, "test": test}) + "\n")
             print(

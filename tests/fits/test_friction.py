@@ -59,6 +59,35 @@ def test_plateau_lies_near_root_two(forces):
     assert high["plateau"].sel(hurst=0.7).values == pytest.approx(np.sqrt(2), rel=0.15)
 
 
+CURVES = {
+    "rises": lambda x: np.exp(0.3 * x),
+    "falls": lambda x: np.exp(-0.3 * x),
+    "levels off": lambda x: 1.0 + np.tanh(0.8 * x),
+    "has a top": lambda x: np.exp(-0.5 * (x - 0.7) ** 2),
+    "has a top at its end": lambda x: np.exp(-0.02 * (x - 3.9) ** 2),
+    "has its top beyond": lambda x: np.exp(-0.05 * (x - 5.5) ** 2),
+}
+
+
+BEYOND = {"rises": np.inf, "falls": -np.inf, "levels off": np.inf, "has its top beyond": np.inf}
+
+
+@pytest.mark.parametrize("lines", [1, 9])
+@pytest.mark.parametrize("curve", CURVES)
+def test_the_top_of_a_mirrored_curve_is_the_mirrored_top(curve, lines):
+    """At which end friction is largest is known, too: there, and not at the other, its velocity is told."""
+    chance = np.random.default_rng(5)
+    x = np.linspace(-4.0, 4.0, 15) + chance.uniform(-0.1, 0.1, 15)
+    stack = bootstrap.means(CURVES[curve](x) * (1 + 0.03 * chance.standard_normal((lines, 15))))
+    rows = slice(1 if lines == 1 else 1 + bootstrap.RESAMPLES)  # one line has no others, and errors have no mirror
+    here, there = top.highest(x, stack, lines), top.highest(-x[::-1], stack[:, ::-1], lines)
+    for one, other, sign in zip(here, there, (1, -1, -1), strict=True):
+        np.testing.assert_allclose(other[rows], sign * one[rows], rtol=1e-6, atol=1e-9)
+    place, mirrored = top.place(x, stack)[rows], top.place(-x[::-1], stack[:, ::-1])[rows]
+    np.testing.assert_allclose(mirrored, -place, rtol=1e-6, atol=1e-9)
+    assert place[0] == BEYOND.get(curve, place[0])
+
+
 def test_a_lost_line_of_three_leaves_a_plateau():
     """Some resamples draw nothing but the lost line."""
     x = np.linspace(-1, 1, 5)

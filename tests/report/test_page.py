@@ -92,6 +92,12 @@ def test_cases_hold_the_means_and_both_errors_of_the_store(url):
     np.testing.assert_allclose(series["at"]["velocity"], np.tile(data["velocity"], 3), rtol=DIGITS)
 
 
+def test_not_even_two_values_of_an_axis_stay_where_they_are_too_many(url, monkeypatch):
+    monkeypatch.setattr(cases, "MOST_CASES", 2)
+    (series,) = cases.cases_of(store.datasets(url))
+    assert len(series["states"]) == 2
+
+
 def test_large_studies_are_reduced_and_say_so(url, monkeypatch):
     monkeypatch.setattr(cases, "MOST_CASES", 6)
     monkeypatch.setattr(figures, "MOST_POINTS", 9)

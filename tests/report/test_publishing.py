@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 import zarr
+from report_stores import friction
 
 from mdr_dask.cli import main
 from mdr_dask.store import datasets
@@ -93,6 +94,15 @@ def test_it_holds_all_that_belongs_to_it(folder):
         assert known["published/road.csv"]["description"] == "a file that the campaign names"
         for part in (known[name] for name in linked if known[name]["@type"] == "File"):
             assert part["sha256"] == hashlib.sha256(packed.read(part["@id"])).hexdigest()
+
+
+def test_a_campaign_that_names_no_file_is_all_that_its_run_was_given(tmp_path):
+    friction(str(tmp_path / "small.zarr"))
+    assert main(["publish", str(tmp_path / "small.zarr"), "-o", str(tmp_path / "small.zip")]) == 0
+    with zipfile.ZipFile(tmp_path / "small.zip") as packed:
+        crate = json.loads(packed.read("ro-crate-metadata.json"))
+    (run,) = (each for each in crate["@graph"] if each["@id"] == "#run")
+    assert run["object"] == {"@id": "published/small.yaml"}
 
 
 def test_the_checksums_are_those_of_sha256sum(folder):

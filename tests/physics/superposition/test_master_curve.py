@@ -194,6 +194,11 @@ def test_the_band_does_not_depend_on_the_way_to_the_reference(vertical):
     assert np.median(one.curve_error[own]) < np.median(one.curve_error[~own])
 
 
+def pieces_of_a_line(*places):
+    x = np.linspace(0.0, 1.0, 20)
+    return [(x, x + place) for place in places]
+
+
 @pytest.mark.parametrize(
     ("groups", "curves", "message"),
     [
@@ -201,6 +206,8 @@ def test_the_band_does_not_depend_on_the_way_to_the_reference(vertical):
         ([1.0, 1.0], [([0, 1], [0, 1])] * 2, "one distinct group"),
         ([1.0, 2.0], [([0, 1], [0, 1]), ([0], [1])], "the curve at 2 needs two or more distinct points"),
         ([1.0, 2.0], [([0, 1], [0, 1]), ([0, 1], [1, np.nan])], "the curve at 2 needs"),
+        ([10.0, 20.0, 30.0], pieces_of_a_line(0.0, 0.5, 3.0), "the curve at 30 does not overlap the others after"),
+        ([10.0, 20.0, 30.0], pieces_of_a_line(0.0, 3.0, 3.5), "the curve at 20 does not overlap the others after"),
     ],
 )
 def test_tables_that_cannot_be_superposed_are_refused(groups, curves, message):
