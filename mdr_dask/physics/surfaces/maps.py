@@ -18,7 +18,7 @@ Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # along each axis
 MOST_MISSING = 0.05  # share of the points that may be filled
-FAR = 19.0  # robust standard deviations, of the distance from the neighbours, that no roughness reaches
+FAR = 19.0  # robust standard deviations that no roughness reaches: ``python -m benchmarks surfaces outliers``
 BAND = 128  # rows that stay in the cache
 TELLING = 1e-3  # of the largest ring
 MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
