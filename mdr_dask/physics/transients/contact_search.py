@@ -249,6 +249,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
             leaves = contact and weak and may_have_left(track, motion, deborah, cell)
             if leaves:
                 known = _remember_cell(float(cell), barrier, work, known)
+                earlier = min(earlier, known - 1)
             x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:

@@ -258,10 +258,12 @@ def meeting(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
-        if abs(step) < MET or high - low < 1e-9:
+        if abs(step) < MET:
             bend = (steep - slope) / max(end - x, MET)
             step -= 0.5 * bend * step * step / slope
             return min(max(x + step, low), high), slope + bend * step, gain, opening
+        if high - low < 1e-9:
+            return min(max(x + step, low), high), slope, gain, opening
         x += step
     return x, slope, gain, opening
 
