@@ -1,9 +1,9 @@
 """Do the tests see a change of the code? ``python -m benchmarks stress mutations [NUMBER] [SEED] [FILE]``.
 
 A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
-place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. The suite
-runs once under coverage in a copy of the checkout. Then each mutant stands there and meets the tests that execute its
-line. What is found is appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
+place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. The suite runs once under coverage
+in a copy of the checkout. Then each mutant stands there and meets the tests that execute its line. What is found is
+appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.waves import Waves
-from mdr_dask.physics.transients.contact_search import touch
+from mdr_dask.physics.transients.contact_search import Workspace, touch
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.march import Finish, Marching, Trajectory, march_depth
@@ -64,23 +64,35 @@ def load_by_largest(marching: Marching, found: Trajectory, now: int, line: Sampl
     return float((force * touches).sum() / SAMPLES), float(doubt)
 
 
-def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
-    """March a case of `velocity_jump`, and return how far loads of its search are from those, over the load.
-
-    What sampling leaves open counts as met; NaN where nothing could be judged.
-    """
+def marched(relaxation) -> tuple[Marching, Trajectory, Workspace, int]:
+    """March a case of `velocity_jump` to its very end; return how many moments that took, too."""
     for limits in relaxation.limits(relaxation.depth):
         marching, found, work = relaxation.begun(limits, 3000)
         aim = Finish(relaxation.depth[1], relaxation.after, 1e-9, 1e-9)
         count, outcome = march_depth(marching, relaxation.pace, aim, found, work)
         if outcome >= 0:
             break
+    return marching, found, work, count
+
+
+def searched_afresh(marching: Marching, found: Trajectory, now: int, work: Workspace) -> int:
+    """Search the contact at a moment of a march, with nothing known of any cell; return the number of patches."""
+    time = found.time[now]
+    history = History(found.time, found.depth, found.rate, now + 1, 0.0)
+    work.clearance.until.fill(-np.inf)
+    instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
+    return touch(instant, marching.reachable, work)
+
+
+def worst_moment(relaxation, moments: int, generator: np.random.Generator) -> float:
+    """March a case of `velocity_jump`, and return how far loads of its search are from those, over the load.
+
+    What sampling leaves open counts as met; NaN where nothing could be judged.
+    """
+    marching, found, work, count = marched(relaxation)
     line, worst = sampled(marching), np.nan
     for now in generator.permutation(np.arange(1, count))[:moments]:
-        time = found.time[now]
-        history = History(found.time, found.depth, found.rate, now + 1, 0.0)
-        instant = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
-        travel, patches = marching.deborah * time, touch(instant, marching.reachable, work)
+        travel, patches = marching.deborah * found.time[now], searched_afresh(marching, found, now, work)
         if patches < 0 or travel > 1.2 * marching.track.cells:
             continue
         whole = slice(1, patches - 1)  # the first and the last are one

@@ -35,31 +35,13 @@ class Blocks(NamedTuple):
     stretch: FloatArray
 
 
-@nested
-def _sum_of_block(column: FloatArray, first: int) -> float:
-    """Return the sum of a block by pairs, which rounds least."""
-    total = 0.0
-    for quarter in (0, 4):
-        half = 0.0
-        for pair in (quarter, quarter + 2):
-            i = first + pair
-            half += (column[i] + column[i + 8]) + (column[i + 1] + column[i + 9])
-        total += half
-    return total
-
-
-@kernel
 def blocks_of(cells: Cells) -> Blocks:
     """Return the blocks of a line; the cells that do not fill the last one are in none."""
     blocks = (cells.mean.size - 1) // BLOCK
-    peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
-    for k in range(blocks):
-        first = k * BLOCK
-        peak[k], mean[k], stretch[k] = cells.peak[first], _sum_of_block(cells.mean, first), 0.0
-        stretch[k] = _sum_of_block(cells.stretch, first)
-        for i in range(first + 1, first + BLOCK):
-            peak[k] = max(peak[k], cells.peak[i])
-    return Blocks(peak, mean, stretch)
+    peak, mean, stretch = (
+        column[: blocks * BLOCK].reshape(blocks, BLOCK) for column in (cells.peak, cells.mean, cells.stretch)
+    )
+    return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
 
 
 class Barriers(NamedTuple):

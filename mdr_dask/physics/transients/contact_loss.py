@@ -105,11 +105,8 @@ def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
         depth = now.history.depth[now.history.count - 1]
         w, pressed = depth + height_at(now.track, x)[0], depth + height_at(now.track, held)[0]
         push = wakes.recent.push[over(x - wakes.earliest[0]) if wakes.count > 0 else 0]
-        surely = w >= max(pressed, push)
-        if not surely:
-            fade = np.exp((held - x) / max(now.deborah, now.first.deborah))
-            surely = w >= pressed * fade + push * (1 - fade)
-        if surely:
+        slowest = max(now.deborah, now.first.deborah)
+        if w >= max(pressed, push) or w >= push + (pressed - push) * np.exp((held - x) / slowest):
             return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
     return wake_at(now, wakes, x)[0]
 
@@ -134,4 +131,4 @@ def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
         wakes.earliest[k] -= now.track.cells
         wakes.places[k] -= now.track.cells
         wakes.farthest[k] -= now.track.cells
-    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest, 0)
+    return worth_keeping(now, wakes, now.track.origin, now.history.depth[now.history.count - 1], motion.deepest)

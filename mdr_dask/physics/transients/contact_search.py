@@ -26,7 +26,6 @@ from mdr_dask.physics.transients.free_flight import (
     foreseen,
     gap_at,
     meeting,
-    surpassed,
     wake_at,
     worth_keeping,
 )
@@ -208,7 +207,6 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     fade, pull = np.exp(-1 / min(deborah, now.first.deborah)), recent.pull[WINDOWS - 1]
     oldest = earliest[0] if known > 0 else begin
     lowest = 0.0  # what a free element has at least at the end of a cell
-    met, earlier = 0.0, 0  # displacement where the line met a wake last, and how many places were known there
     sums[:] = 0.0
     if not contact:  # it may have been left there
         known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
@@ -249,7 +247,6 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
             leaves = contact and weak and may_have_left(track, motion, deborah, cell)
             if leaves:
                 known = _remember_cell(float(cell), barrier, work, known)
-                earlier = min(earlier, known - 1)
             x, pulled = max(float(cell), begin if contact else free_from), False
             for _ in range(VISITS):
                 if contact:
@@ -277,8 +274,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     start[found], end[found] = begin, until
                     found += 1
                     w = depth + height_at(track, until)[0]
-                    gone = surpassed(now, wakes, met, until, w, earlier)
-                    known = worth_keeping(now, wakes, until, w, deepest, gone)
+                    known = worth_keeping(now, wakes, until, w, deepest)
                     lowest, oldest = (w - pull) * fade + pull, earliest[0] if known > 0 else until
                     contact, free_from, x, pulled = False, off, off, True
                     if not pulls:
@@ -307,20 +303,18 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                 gap, rise = depth + h - u, slope - u_slope
                 if gap <= 0 and gap > rise * (probe - cell - low):
                     top, above = crest(now, wakes, cell + low, probe)
-                    probe, gap, rise = (top, above, 0.0) if above > 0 else (probe, gap, rise)
+                    probe, gap = (top, above) if above > 0 else (probe, gap)
                 if weak and may_have_left(track, motion, deborah, cell):
                     known = _remember_cell(float(cell), barrier, work, known)
                 if gap > 0:
                     guess = cell + foreseen((c0, c1, c2, c3), depth, (u, u_slope), low, probe - cell)
-                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, rise, guess)
+                    begin, rise, gain, opening = meeting(now, wakes, cell + low, probe, guess)
                     _add_edge(now, lift, begin, (rise, gain, opening), sums)
                     contact, x, held, firm_until = True, begin, begin, 0.0
-                    met, earlier = depth + height_at(track, begin)[0], known
                     continue
                 if not pulls:
                     break
-                if known > 1:
-                    known = worth_keeping(now, wakes, probe, depth + h, deepest, 0)
+                known = worth_keeping(now, wakes, probe, depth + h, deepest)
                 known = _remember(probe, _farthest(now, probe, highest, barriers), work, known)
                 free_from, x, pulled = probe, probe, True
         if contact and run + 1 < runs.shape[0]:

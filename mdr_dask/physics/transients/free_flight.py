@@ -23,11 +23,11 @@ from mdr_dask.physics.transients.recent import Recent, over
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
-MET = 3e-4  # of a cell: a last Newton step that is not checked: with the bend of the gap, its cube is what is left
+MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
 FARTHEST = 200  # cells back in which contact may have been left are looked at
 KEPT = 64.0  # cells more than twice the way, over which the depth may change what is kept
 CREST = 1e-3  # of a cell: where a line that comes near to a wake inside of a cell is nearest
-FORESEEN, FORESEEN_STEPS = 1e-2, 5  # of a cell: the last step to a place that is only foreseen
+FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
 
 
 class Instant(NamedTuple):
@@ -215,9 +215,8 @@ def foreseen(
     u, falls = wake[0], -wake[1]
     rate, y = falls / u if u > 0 else 0.0, high
     for _ in range(FORESEEN_STEPS):
-        ahead = rate * (high - y)
-        free = u * (1 + ahead * (1 + 0.5 * ahead))
-        rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * u * (1 + ahead)
+        free = u * np.exp(rate * (high - y))
+        rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
         if rise <= 0:
             break
         step = (free - depth - c0 - y * (c1 + y * (c2 + y * c3))) / rise
@@ -241,14 +240,9 @@ def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[fl
 
 
 @inlined
-def meeting(
-    now: Instant, wakes: Wakes, low: float, high: float, steep: float, x: float
-) -> tuple[float, float, float, float]:
-    """Return where the line rises through the wake, the slopes of their gap by place and depth, and its rate there.
-
-    It rises between `low` and `high`, where the gap has the slope `steep`; `x` is a guess.
-    """
-    slope, gain, opening, end = 1.0, 1.0, 0.0, high
+def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float, float]:
+    """Return where the line rises through the wake, the slopes of their gap by place and depth, and its rate there."""
+    slope, gain, opening = 1.0, 1.0, 0.0
     for _ in range(ROOT_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
@@ -258,11 +252,7 @@ def meeting(
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
-        if abs(step) < MET:
-            bend = (steep - slope) / max(end - x, MET)
-            step -= 0.5 * bend * step * step / slope
-            return min(max(x + step, low), high), slope + bend * step, gain, opening
-        if high - low < 1e-9:
+        if abs(step) < MET or high - low < 1e-9:
             return min(max(x + step, low), high), slope, gain, opening
         x += step
     return x, slope, gain, opening
@@ -285,13 +275,10 @@ def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, f
 
 
 @inlined
-def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest: float, surpassed: int) -> int:
-    """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them.
-
-    The first `surpassed` of them are known not to.
-    """
+def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest: float) -> int:
+    """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0
-    for k in range(surpassed, wakes.count):
+    for k in range(wakes.count):
         place, farthest = wakes.places[k], wakes.farthest[k]
         u = left(now, wakes, k, x)[0]
         if u < 0 and x - now.deborah * now.time < farthest:  # none at x left there; farther ones may have
@@ -303,17 +290,3 @@ def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest:
             wakes.barrier[kept] = wakes.barrier[k]
             kept += 1
     return kept
-
-
-@inlined
-def surpassed(now: Instant, wakes: Wakes, met: float, x: float, pressed: float, count: int) -> int:
-    """Return how many of the first places cannot come out above an element pressed to `pressed` at x: all, or none.
-
-    They are those known where the line met the wake, at a displacement `met`. What comes from them now was no more
-    there, but for what the depth has changed meanwhile.
-    """
-    if count == 0:
-        return 0
-    farthest, earliest = wakes.farthest[count - 1], wakes.earliest[0]
-    changed = wakes.recent.spread[over(2 * (x - earliest) + KEPT)]
-    return count if x - now.deborah * now.time >= farthest and met + 3 * changed < pressed else 0

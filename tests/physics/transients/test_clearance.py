@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
+from references.largest_displacement import marched, searched_afresh
 
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import SUMS
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import velocity_jump
-from mdr_dask.physics.transients.clearance import APPROACH, LARGEST, TIME, approached, clearance_from, rests
-from mdr_dask.physics.transients.contact_search import touch
+from mdr_dask.physics.transients.clearance import APPROACH, LARGEST, TIME, Clearance, approached, clearance_from, rests
 from mdr_dask.physics.transients.ends import PreparedLine, ends_on
 from mdr_dask.physics.transients.free_flight import Instant
-from mdr_dask.physics.transients.march import Finish, march_depth
 from mdr_dask.physics.transients.patches import LOAD, History
 from mdr_dask.physics.transients.recent import WINDOWS, Recent
 from mdr_dask.physics.transients.velocity_jump import Transient, velocity_jumps
@@ -28,8 +27,8 @@ def rough(hurst: float, oversampling: int = 4) -> PreparedLine:
     return PreparedLine.of(periodic_line(*(roughness.line(amplitude, phase, nodes, order) for order in (0, 1))))
 
 
-def never_resting(_: np.ndarray):
-    clearance = clearance_from(np.full(_.size, -np.inf))
+def never_resting(until: np.ndarray) -> Clearance:
+    clearance = clearance_from(np.full(until.size, -np.inf))
     clearance.state[LARGEST] = np.inf
     return clearance
 
@@ -57,19 +56,9 @@ def test_every_moment_carries_the_load(ratio: float) -> None:
     numbers, missing = np.column_stack([before, ratio * before]), []
     ends, asked = ends_on(line, loads, numbers), Transient(TIMES, np.pi * POINTS, 6)
     for k in range(loads.size):
-        case = velocity_jump._Relaxation.of(line, loads[k], numbers[k], ends, k, asked)
-        for limits in case.limits(case.depth):
-            marching, found, work = case.begun(limits, 3000)
-            aim = Finish(case.depth[1], case.after, 1e-9, 1e-9)
-            count, outcome = march_depth(marching, case.pace, aim, found, work)
-            if outcome >= 0:
-                break
+        marching, found, work, count = marched(velocity_jump._Relaxation.of(line, loads[k], numbers[k], ends, k, asked))
         for now in range(1, count):
-            time = found.time[now]
-            history = History(found.time, found.depth, found.rate, now + 1, 0.0)
-            work.clearance.until.fill(-np.inf)
-            now_there = Instant(marching.track, marching.first, history, time, marching.deborah, np.exp(-time))
-            touch(now_there, marching.reachable, work)
+            searched_afresh(marching, found, now, work)
             missing.append(abs(work.sums[LOAD] / marching.load - 1))
     assert len(missing) > 100
     assert np.mean(np.array(missing) > 1e-3) < 0.01  # the load leaps where a patch comes or goes
