@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, kernel, nested
+from mdr_dask.physics.compiling import compiled, greater, inlined, kernel, nested
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
@@ -35,13 +35,29 @@ class Blocks(NamedTuple):
     stretch: FloatArray
 
 
+@inlined
+def _four(column: FloatArray, i: int) -> float:
+    """Return the sum of two cells and of those half a block after them."""
+    half = BLOCK // 2
+    return (column[np.uintp(i)] + column[np.uintp(i + half)]) + (
+        column[np.uintp(i + 1)] + column[np.uintp(i + 1 + half)]
+    )
+
+
+@kernel
 def blocks_of(cells: Cells) -> Blocks:
     """Return the blocks of a line; the cells that do not fill the last one are in none."""
     blocks = (cells.mean.size - 1) // BLOCK
-    peak, mean, stretch = (
-        column[: blocks * BLOCK].reshape(blocks, BLOCK) for column in (cells.peak, cells.mean, cells.stretch)
-    )
-    return Blocks(peak.max(axis=1), mean.sum(axis=1), stretch.sum(axis=1))
+    peak, mean, stretch = np.empty(blocks), np.empty(blocks), np.empty(blocks)
+    for block in range(blocks):
+        i = block * BLOCK
+        highest = cells.peak[i]
+        for k in range(i, i + BLOCK):
+            highest = greater(highest, cells.peak[np.uintp(k)])
+        peak[block] = highest
+        for column, whole in ((cells.mean, mean), (cells.stretch, stretch)):
+            whole[block] = (_four(column, i) + _four(column, i + 2)) + (_four(column, i + 4) + _four(column, i + 6))
+    return Blocks(peak, mean, stretch)
 
 
 class Barriers(NamedTuple):

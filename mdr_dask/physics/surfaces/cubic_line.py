@@ -54,8 +54,9 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
     if slope is None:
         rise = np.diff(height)
         return CubicLine(height, rise, rise, True, False)
-    rise = slope / slope.size
-    return CubicLine(height, rise, np.roll(rise, -1), True, True)
+    rise = np.append(slope, slope[0])
+    rise /= slope.size
+    return CubicLine(height, rise[:-1], rise[1:], True, True)
 
 
 def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Shape) -> CubicLine:
@@ -137,32 +138,41 @@ def summit(a: float, b: float, c: float) -> float:
     return place if 0 < place < 1 else NONE
 
 
-@kernel
-def _peaks(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[FloatArray, int, float]:
-    """Return the highest point of every cell, and the cell and place of the highest of all."""
-    peaks = np.empty(enter.size)
-    best, place = 0, 0.0
+@inlined
+def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float]:
+    """Return the highest point of a cell, and where in the cell it is."""
+    here, after = np.uintp(i), np.uintp(i + 1)
+    first, last, begin, end = enter[here], leave[here], height[here], height[after]
+    rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, greater(begin, end)
+    between = 3 * rise - first - last  # a control point of the slope: where all three agree in sign, none is inside
+    if not (lesser(lesser(first, between), last) >= 0 or greater(greater(first, between), last) <= 0):
+        b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
+        inside = summit(first, b, c)
+        top = begin + inside * (first + inside * (b + inside * c))
+        if inside < 1 and top > peak:
+            place, peak = inside, top
+    return peak, place
+
+
+@compiled
+def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
+    """Return the first cell that reaches the highest point of a line, the place in it, and the height."""
+    node, best, place, highest = -np.inf, 0, 0.0, -np.inf
+    for i in range(height.size):
+        node = greater(node, height[i])
     for i in range(enter.size):
-        first, last, rise = enter[i], leave[i], height[i + 1] - height[i]
-        x = 0.0 if height[i] >= height[i + 1] else 1.0
-        peaks[i] = max(height[i], height[i + 1])
-        between = 3 * rise - first - last  # a control point of the slope: where all three agree in sign, none is inside
-        if not (min(first, between, last) >= 0 or max(first, between, last) <= 0):
-            b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
-            inside = summit(first, b, c)
-            top = height[i] + inside * (first + inside * (b + inside * c))
-            if inside < 1 and top > peaks[i]:
-                x, peaks[i] = inside, top
-        if i == 0 or peaks[i] > peaks[best]:
-            best, place = i, x
-    return peaks, best, place
+        rise = STEEPEST_RISE * (greater(enter[i], 0.0) + greater(-leave[i], 0.0))
+        if not greater(height[i], height[i + 1]) + rise * (1 + 1e-9) < node:
+            peak, x = _peak(height, enter, leave, i)
+            if i == 0 or peak > highest:
+                best, place, highest = i, x, peak
+    return best, place, highest
 
 
 def cut(line: CubicLine) -> Cells:
     """Cut a line into its cells, a periodic one at its highest point."""
-    peaks, best, place = _peaks(line.height, line.enter, line.leave)
-    top, first = float(peaks[best]), best if line.periodic else 0
-    columns = _turned(line, peaks, top, first)
+    best, place, top = _highest(line.height, line.enter, line.leave)
+    columns = _turned(line, top, best if line.periodic else 0)
     if line.smooth:
         _resum(columns[1], columns[5])
     return Cells(*columns, place if line.periodic else 0.0, top, line.periodic)
@@ -181,10 +191,10 @@ def running(integrals: FloatArray) -> FloatArray:
 
 @kernel
 def _turned(
-    line: CubicLine, peaks: FloatArray, top: float, first: int
+    line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the arrays of the cells from a cell on, with that cell once more at the end, heights from the top."""
-    nodes, n = line.height, line.enter.size
+    nodes, entered, left, n = line.height, line.enter, line.leave, line.enter.size
     height, enter, leave, peak, mean, stretch = (
         np.empty(n + 2),
         np.empty(n + 1),
@@ -193,12 +203,15 @@ def _turned(
         np.empty(n + 1),
         np.empty(n + 1),
     )
-    for k in range(n + 1):
-        i = first + k if first + k < n else first + k - n
-        e, f, rise = line.enter[i], line.leave[i], nodes[i + 1] - nodes[i]
-        height[k], enter[k], leave[k], peak[k] = nodes[i] - top, e, f, peaks[i] - top
-        mean[k] = 0.5 * (nodes[i + 1] + nodes[i]) + (e - f) / 12 - top
-        stretch[k] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
+    for begin, end, shift in ((first, n, -first), (0, first + 1, n - first)):
+        for i in range(begin, end):
+            k, here, after = np.uintp(i + shift), np.uintp(i), np.uintp(i + 1)
+            e, f, rise = entered[here], left[here], nodes[after] - nodes[here]
+            height[k], enter[k], leave[k] = nodes[here] - top, e, f
+            mean[k] = 0.5 * (nodes[after] + nodes[here]) + (e - f) / 12 - top
+            stretch[k] = (36 * rise * rise - 6 * rise * (e + f) + 4 * (e * e + f * f) - 2 * e * f) / 30
+        for i in range(begin, end):
+            peak[np.uintp(i + shift)] = _peak(nodes, entered, left, i)[0] - top
     height[n + 1] = height[1]
     if not line.periodic:
         height[n] = height[n + 1] = nodes[n] - top
