@@ -39,9 +39,8 @@ class Blocks(NamedTuple):
 def _four(column: FloatArray, i: int) -> float:
     """Return the sum of two cells and of those half a block after them."""
     half = BLOCK // 2
-    return (column[np.uintp(i)] + column[np.uintp(i + half)]) + (
-        column[np.uintp(i + 1)] + column[np.uintp(i + 1 + half)]
-    )
+    here, after = column[np.uintp(i)] + column[np.uintp(i + half)], column[np.uintp(i + 1)]
+    return float(here + (after + column[np.uintp(i + 1 + half)]))
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
+from mdr_dask.physics.compiling import compiled, copy_into, kernel, lesser, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
@@ -39,6 +39,7 @@ PATIENCE = 20  # sweeps before the bracket is halved
 OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the depth, and the change that is the last
 OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
+TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -59,15 +60,19 @@ def _next(depth: float) -> float:
 @compiled
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
     """Begin a `trail` where nothing but a depth for a load is known."""
-    trail[0], trail[1], trail[2], trail[3] = math.log(depth), math.log(load), 0.7, 0.0
+    trail[0], trail[1], trail[2], trail[3], trail[4] = math.log(depth), math.log(load), 0.7, 0.0, 0.0
 
 
 @compiled
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
-    """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press."""
-    fade = np.exp(-BLOCK / deborah)
-    memory, depth, slope = -deborah * math.expm1(-BLOCK / deborah), math.exp(start), 1.0
+    """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press.
+
+    Were it pressed everywhere, it would be deepest; tangents of the load are above the depth, too.
+    """
+    fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
+    depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
     for _ in range(OUTLINES):
+        depth = min(depth, most)
         free, gain, carried, stiffness = 0.0, 0.0, 0.0, 0.0
         for i in range(peak.size):
             if depth + peak[i] > free:
@@ -78,6 +83,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
         if not carried > 0:  # the highest point is in no whole block
             depth *= 2
             continue
+        most = min(most, depth + (load / memory - carried) / stiffness)
         slope = carried / (stiffness * depth)
         ahead = slope * (math.log(load) - math.log(memory * carried))
         depth *= math.exp(ahead)
@@ -87,13 +93,16 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
 
 
 @compiled
-def _follow(sums: FloatArray, depth: float, trail: FloatArray) -> None:
-    """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before."""
+def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
+    """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before.
+
+    At another Deborah number the slope was another one, but its change is nearly the same.
+    """
     carried = sums[DISPLACEMENT]
     load, slope = np.log(carried), carried / (sums[STIFFNESS] * depth)
     change = load - trail[1]
-    bend = (slope - trail[2]) / change if abs(change) > 1e-12 and trail[2] > 0 else 0.0
-    trail[0], trail[1], trail[2], trail[3] = np.log(depth), load, slope, bend
+    bend = (slope - trail[2]) / change if deborah == trail[4] and abs(change) > 1e-12 else trail[3]
+    trail[0], trail[1], trail[2], trail[3], trail[4] = np.log(depth), load, slope, bend, deborah
 
 
 @nested
@@ -105,18 +114,27 @@ def _guess(trail: FloatArray, load: float) -> float:
     return math.exp(trail[0] + ahead * (trail[2] + min(max(bend, -limit), limit)))
 
 
+class _Swept(NamedTuple):
+    """A line as sweeps at one Deborah number take it, and its mean height, from the highest point."""
+
+    cells: Cells
+    blocks: Blocks
+    barriers: Barriers
+    mean: float
+
+
 @kernel
-def _solve(
-    cells: Cells, blocks: Blocks, barriers: Barriers, deborah: float, load: float, trail: FloatArray, sums: FloatArray
-) -> tuple[float, bool]:
+def _solve(line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray) -> tuple[float, bool]:
     """Find the last lattice depth that carries less than the load, and leave its sums.
 
-    The load is a convex, increasing function of the depth, so that its tangent bounds the root from above: a lattice
-    depth below the root whose tangent reaches the load before the next lattice depth is the one wanted. It is unique,
-    and so the answer does not depend on the `trail` that the search follows.
+    The load is a convex, increasing function of the depth, so that its tangents bound the root from above, as full
+    contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
+    wanted. It is unique, and so the answer does not depend on the `trail` that the search follows.
     """
+    cells, blocks, barriers, mean = line
     low, high, unwritten = 0.0, np.inf, places_for(0)
-    depth = _floor(_guess(trail, load))
+    most = load / (cells.mean.size - 1) - mean
+    depth = _floor(lesser(_guess(trail, load), most))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
         sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
@@ -124,7 +142,9 @@ def _solve(
         if not (carried > 0 and sums[STIFFNESS] > 0):
             return depth, False
         tangent = depth + (load - carried) / sums[STIFFNESS]
-        _follow(sums, depth, trail)
+        if tangent > low:  # sums that overflow have none
+            most = lesser(most, tangent)
+        _follow(sums, depth, deborah, trail)
         if carried <= load:
             low = depth
             copy_into(best, sums)
@@ -135,7 +155,7 @@ def _solve(
         if low > 0 and _next(low) >= high:
             copy_into(sums, best)
             return low, True
-        proposal = min(_guess(trail, load), tangent) if carried <= load else _guess(trail, load)
+        proposal = lesser(_guess(trail, load), most)
         if iteration > PATIENCE and high < np.inf:
             proposal = 0.5 * (low + high)
         depth = _floor(proposal)
@@ -145,14 +165,6 @@ def _solve(
             depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
             depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
     return depth, False
-
-
-class _Swept(NamedTuple):
-    """A line as sweeps at one Deborah number take it."""
-
-    cells: Cells
-    blocks: Blocks
-    barriers: Barriers
 
 
 @kernel
@@ -171,9 +183,9 @@ def _states(
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
-    (cells, blocks, barriers), (deborahs, loads) = line, cases
+    (cells, blocks, barriers, _), (deborahs, loads) = line, cases
     n = cells.mean.size - 1
-    unwritten, sums, trail, starts = places_for(0), np.empty(SUMS), np.empty(4), True
+    unwritten, sums, trail, starts = places_for(0), np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
     for k in range(loads.size):
         deborah, depth, converged = deborahs[k], guesses[k], False
@@ -183,7 +195,7 @@ def _states(
                 sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
                 converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
         if not converged:
-            depth, converged = _solve(cells, blocks, barriers, deborah, loads[k], trail, sums)
+            depth, converged = _solve(line, deborah, loads[k], trail, sums)
         if not converged:
             status[k] = Outcome.DEPTH_NOT_FOUND
             copy_into(trail, first)
@@ -317,8 +329,14 @@ def _swept(
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
     order = np.lexsort((cases.loads, cases.deborah))
     ordered, ordered_status = np.full((order.size, 4), np.nan), np.zeros(order.size, np.int8)
-    deborah, loads, starts, first = cases.deborah[order], cases.loads[order], guesses[order] + cells.top, np.zeros(4)
-    _begin(first, loads[0] / (cells.mean.size - 1), loads[0])
+    deborah, loads, starts, first = (
+        cases.deborah[order],
+        cases.loads[order],
+        guesses[order] + cells.top,
+        np.zeros(TRAIL),
+    )
+    n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
+    _begin(first, loads[0] / n - mean, loads[0])
     outlined, beyond = first[0], 0.0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
@@ -327,8 +345,10 @@ def _swept(
         outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
-            first[:] = outlined + beyond, np.log(load), slope, 0.0
-        _states(_Swept(cells, blocks, near), alike, starts[some], close, first, ordered[some], ordered_status[some])
+            first[:3] = outlined + beyond, np.log(load), slope
+        _states(
+            _Swept(cells, blocks, near, mean), alike, starts[some], close, first, ordered[some], ordered_status[some]
+        )
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
