@@ -191,6 +191,13 @@ def test_sweeps_of_a_solution(sweeps):
     assert len(sweeps) - alone < 12
 
 
+@pytest.mark.parametrize("speed", [0.005, 1.0])
+def test_sweeps_of_a_state_next_to_full_contact(sweeps, speed):
+    """A search from below would leap far beyond full contact and back: it begins there, and the next speed is near."""
+    steady.steady_sliding(line(2000, 4, hurst=0.0), speed * np.array([1, 1.2]), np.full(2, 0.3))
+    assert len(sweeps) < 9
+
+
 class Visited(np.ndarray):
     """An array that counts which of its entries are looked at."""
 

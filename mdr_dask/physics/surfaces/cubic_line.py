@@ -157,12 +157,10 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 @compiled
 def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
     """Return the first cell that reaches the highest point of a line, the place in it, and the height."""
-    node, best, place, highest = -np.inf, 0, 0.0, -np.inf
-    for i in range(height.size):
-        node = greater(node, height[i])
+    best, place, highest = 0, 0.0, -np.inf
     for i in range(enter.size):
         rise = STEEPEST_RISE * (greater(enter[i], 0.0) + greater(-leave[i], 0.0))
-        if not greater(height[i], height[i + 1]) + rise * (1 + 1e-9) < node:
+        if not greater(height[i], height[i + 1]) + rise * (1 + 1e-9) <= highest:
             peak, x = _peak(height, enter, leave, i)
             if i == 0 or peak > highest:
                 best, place, highest = i, x, peak

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import kernel
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
@@ -333,7 +333,9 @@ class _Relaxation(NamedTuple):
         found = Trajectory(*np.empty((6, moments)))
         for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at, np.nan), strict=True):
             column[0] = value
-        reachable = _reachable(self.line.track, self.slower, limits)
+        begin, end = int(np.ceil(self.slower.end[0])), int(self.slower.start[-1])
+        second = float(np.max(self.line.track.peak[begin:end], initial=-np.inf))
+        reachable = Reachable(*_reachable(self.line.track, self.slower, limits), second)
         onset = self.pace.first / (self.pace.growth - 1)
         marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
         barriers, clearance = self.line.barriers(self.deborah[1]), clearance_from(reachable.from_depth - self.depth[0])
@@ -355,7 +357,7 @@ class _Relaxation(NamedTuple):
 
 
 @kernel
-def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Reachable:
+def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[IntArray, FloatArray]:
     """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
 
     The steady state at the lower velocity bounds them: where the depth is less by some length, displacements are less
@@ -379,10 +381,7 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
             else:
                 runs[count, 0], runs[count, 1] = begin, end
                 count += 1
-    second = -np.inf
-    for i in range(int(np.ceil(slower.end[0])), int(slower.start[slower.count - 1])):
-        second = max(second, track.peak[i])
-    return Reachable(runs[:count].copy(), from_depth, second)
+    return runs[:count], from_depth
 
 
 def _at_times(

@@ -3,7 +3,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from mdr_dask.physics.surfaces import roughness
-from mdr_dask.physics.surfaces.cubic_line import cut, indented_line, periodic_line, running
+from mdr_dask.physics.surfaces.cubic_line import CubicLine, cut, indented_line, periodic_line, running
 from mdr_dask.physics.surfaces.shapes import PowerLaw
 
 
@@ -41,6 +41,21 @@ def test_cells_begin_at_the_highest_point_with_the_integrals_of_their_cubics(nam
     if line.periodic:
         assert turned[0](cells.start) == pytest.approx(cells.top, abs=1e-13)
     assert running(cells.mean)[n] == pytest.approx(np.sum(cells.mean[:n]))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_highest_point_is_found_wherever_slopes_are_steep(seed):
+    """Far above the nodes, inside of cells that rise and fall, or at a node: as a look at every cell finds it."""
+    draw = np.random.default_rng(seed)
+    height, enter, leave = draw.normal(size=31), *(10 ** draw.uniform(-2, 2) * draw.normal(size=(2, 30)))
+    line = CubicLine(height, enter, leave, False, False)
+    tops = [p(np.append(p.deriv().roots().real.clip(0, 1), [0, 1])).max() for p in cubics(line)]
+    cells = cut(line)
+    assert cells.top == pytest.approx(max(tops), rel=1e-12)
+    np.testing.assert_allclose(cells.peak[:30] + cells.top, tops, atol=1e-9)
+    closed = cut(line._replace(periodic=True))
+    np.testing.assert_array_equal(closed.peak[:30], np.roll(cells.peak[:30], -int(np.argmax(tops))))
+    assert closed.peak[0] == 0
 
 
 def test_the_slope_squared_of_a_resolved_line_is_exact():
