@@ -171,8 +171,8 @@ def sweeps(monkeypatch):
     return counted
 
 
-def line(points, oversampling, hurst=0.7):
-    amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(0, 0, points // 2)
+def line(points, oversampling, hurst=0.7, seed=0):
+    amplitude, phase = roughness.amplitudes(points // 2, hurst), roughness.phases(seed, 0, points // 2)
     return periodic_line(*(roughness.line(amplitude, phase, points * oversampling, order) for order in (0, 1)))
 
 
@@ -191,11 +191,12 @@ def test_sweeps_of_a_solution(sweeps):
     assert len(sweeps) - alone < 12
 
 
-@pytest.mark.parametrize("speed", [0.005, 1.0])
-def test_sweeps_of_a_state_next_to_full_contact(sweeps, speed):
-    """A search from below would leap far beyond full contact and back: it begins there, and the next speed is near."""
-    steady.steady_sliding(line(2000, 4, hurst=0.0), speed * np.array([1, 1.2]), np.full(2, 0.3))
-    assert len(sweeps) < 9
+@pytest.mark.parametrize(("seed", "speed", "most"), [(0, 0.005, 8), (2, 0.02, 5)])
+def test_sweeps_of_states_near_full_contact(seed, speed, most, sweeps):
+    """Guesses from below would leap far beyond full contact and back; the next speed is near."""
+    found = steady.steady_sliding(line(2000, 4, 0.0, seed), speed * np.array([1, 1.2]), np.full(2, 0.3))
+    assert np.all(found.status == 0)
+    assert len(sweeps) <= most
 
 
 class Visited(np.ndarray):
