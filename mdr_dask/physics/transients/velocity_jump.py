@@ -333,9 +333,7 @@ class _Relaxation(NamedTuple):
         found = Trajectory(*np.empty((6, moments)))
         for column, value in zip(found, (0.0, 0.0, self.depth[0], self.rate, self.at, np.nan), strict=True):
             column[0] = value
-        begin, end = int(np.ceil(self.slower.end[0])), int(self.slower.start[-1])
-        second = float(np.max(self.line.track.peak[begin:end], initial=-np.inf))
-        reachable = Reachable(*_reachable(self.line.track, self.slower, limits), second)
+        reachable = _reachable(self.line.track, self.slower, limits)
         onset = self.pace.first / (self.pace.growth - 1)
         marching = Marching(self.line.track, self.first, reachable, self.deborah[1], self.load, *limits, onset)
         barriers, clearance = self.line.barriers(self.deborah[1]), clearance_from(reachable.from_depth - self.depth[0])
@@ -356,8 +354,14 @@ class _Relaxation(NamedTuple):
         return found
 
 
+def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Reachable:
+    """Return where elements can be in contact between two depths."""
+    begin, end = int(np.ceil(slower.end[0])), int(slower.start[-1])
+    return Reachable(*_runs(track, slower, limits), float(np.max(track.peak[begin:end], initial=-np.inf)))
+
+
 @kernel
-def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[IntArray, FloatArray]:
+def _runs(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[IntArray, FloatArray]:
     """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
 
     The steady state at the lower velocity bounds them: where the depth is less by some length, displacements are less
