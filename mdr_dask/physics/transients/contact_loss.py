@@ -27,14 +27,15 @@ class Motion(NamedTuple):
     ----------
     rise, fall : float
         Most by which the lift has risen until now, and by which it has fallen, by time.
-    deepest, highest : float
-        Largest depth and lift so far.
+    shallowest, deepest, highest : float
+        Least depth, largest depth and largest lift so far.
     overflown : bool
         Whether elements from before the patch of the highest point may have come over it.
     """
 
     rise: float
     fall: float
+    shallowest: float
     deepest: float
     highest: float
     overflown: bool
@@ -46,12 +47,12 @@ def motion_at(now: Instant, second: float) -> Motion:
     history, deborah, last = now.history, now.deborah, now.history.count - 1
     depth, rate = history.depth[last], history.rate[last]
     lift, rise, fall, overflown = depth + rate, 0.0, 0.0, False
-    deepest, highest = depth, lift
+    shallowest, deepest, highest = depth, depth, lift
     carried, before, lift_before = -np.inf, 0.0, history.depth[0] + history.rate[0]
     for moment in range(last + 1):
         time, then = history.time[moment], history.depth[moment]
         here = then + history.rate[moment]
-        deepest, highest = max(deepest, then), max(highest, here)
+        shallowest, deepest, highest = min(shallowest, then), max(deepest, then), max(highest, here)
         if moment < last:
             rise = max(rise, (lift - here) / (now.time - time))
         if moment > 0:
@@ -63,7 +64,7 @@ def motion_at(now: Instant, second: float) -> Motion:
         step = history.time[last] - history.time[last - 1]
         fallen = (history.depth[last - 1] - depth) / step
         rise = max(rise, rate + (6 * fallen + 2 * history.rate[last - 1] + 4 * rate) / step)
-    return Motion(rise, fall, deepest, highest, overflown)
+    return Motion(rise, fall, shallowest, deepest, highest, overflown)
 
 
 @inlined
@@ -107,7 +108,7 @@ def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
         push = wakes.recent.push[over(x - wakes.earliest[0]) if wakes.count > 0 else 0]
         slowest = max(now.deborah, now.first.deborah)
         if w >= max(pressed, push) or w >= push + (pressed - push) * np.exp((held - x) / slowest):
-            return left_before(now, x)[0] if x - now.deborah * now.time > held else 0.0
+            return left_before(now, x, w)[0] if x - now.deborah * now.time > held else 0.0
     return wake_at(now, wakes, x)[0]
 
 

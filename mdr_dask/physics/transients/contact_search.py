@@ -205,18 +205,21 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
     firm, firm_until = 0.0, 0.0
     contact = depth >= wake_at(now, Wakes(earliest, places, farthest, least_lift, recent, known), begin)[0]
     fade, pull = np.exp(-1 / min(deborah, now.first.deborah)), recent.pull[WINDOWS - 1]
+    slow, gone, risen = np.exp(-1 / deborah), deborah * now.time, depth - motion.shallowest
     oldest = earliest[0] if known > 0 else begin
     lowest = 0.0  # what a free element has at least at the end of a cell
+    least, passed = 0.0, begin  # and one that passed the end of the last patch after the jump: those up to `passed` did
     sums[:] = 0.0
     if not contact:  # it may have been left there
         known = _remember(begin, _farthest(now, begin, highest, barriers), work, known)
     for run in range(runs.shape[0]):
         i, stop = runs[run, 0], runs[run, 1]
         if not contact:
-            lowest = 0.0  # nothing is known of what is left between the stretches
+            lowest = least = 0.0  # nothing is known of what is left between the stretches
         while i < stop:
             if not contact:
-                lowest = (lowest - pull) * fade + pull
+                least = least * slow if i < passed else 0.0
+                lowest = max((lowest - pull) * fade + pull, least)
                 if approach < until_approach[np.uintp(i)] or deepest <= from_depth[np.uintp(i)]:
                     i += 1
                     continue
@@ -266,7 +269,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                         break
                     if lost:
                         until = loss(now, wakes, x, off)
-                        rise, gain, opening = gap_at(now, until, wake_at(now, wakes, until))[1:]
+                        _, rise, _, gain, opening = gap_at(now, until, wake_at(now, wakes, until))
                         _add_edge(now, lift, until, (-rise, gain, opening), sums)
                     if found + 1 >= start.size:
                         return -1, 0
@@ -275,7 +278,9 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     found += 1
                     w = depth + height_at(track, until)[0]
                     known = worth_keeping(now, wakes, until, w, deepest)
-                    lowest, oldest = (w - pull) * fade + pull, earliest[0] if known > 0 else until
+                    passed = until + gone - 1
+                    least = max(w - risen, 0.0) * slow if cell < passed else 0.0
+                    lowest, oldest = max((w - pull) * fade + pull, least), earliest[0] if known > 0 else until
                     contact, free_from, x, pulled = False, off, off, True
                     if not pulls:
                         break
@@ -295,7 +300,7 @@ def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, k
                     break
                 wakes = Wakes(earliest, places, farthest, least_lift, recent, known)
                 u, u_slope, _ = wake_at(now, wakes, probe)
-                lowest = (u - pull) * fade + pull if pulls else u
+                lowest = max((u - pull) * fade + pull if pulls else u, least)
                 clear = lowest - depth - peak[np.uintp(cell)]
                 if clear > 0 and clear > recent.apart[over(2 * (i - oldest) + NEARBY)]:
                     rests(clearance, cell, clear)

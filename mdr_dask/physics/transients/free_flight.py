@@ -23,11 +23,11 @@ from mdr_dask.physics.transients.recent import Recent, over
 ROOT_STEPS = 60
 NEAR = 0.02  # of a cell: a last Newton step whose gain is added, for its cube is what is left
 STRIDE = 2.0  # cells: the longest step on the way to a place of leaving
-MET = 1e-4  # of a cell: a last Newton step that is not checked, for its square is far below what wakes are known to
+MET = 1e-3  # of a cell: a last step by slope and curvature, for its cube is far below what wakes are known to
 FARTHEST = 200  # cells back in which contact may have been left are looked at
 KEPT = 64.0  # cells more than twice the way, over which the depth may change what is kept
 CREST = 1e-3  # of a cell: where a line that comes near to a wake inside of a cell is nearest
-FORESEEN, FORESEEN_STEPS = 1e-4, 5  # of a cell: the last step to a place that is only foreseen
+FORESEEN, FORESEEN_STEPS = 1e-2, 5  # of a cell: the last step to a place that is only foreseen
 
 
 class Instant(NamedTuple):
@@ -169,14 +169,17 @@ def left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, fl
 
 
 @inlined
-def left_before(now: Instant, x: float) -> tuple[float, float]:
-    """Return what is left at x of the state before the jump, and its slope along x."""
+def left_before(now: Instant, x: float, least: float) -> tuple[float, float]:
+    """Return what is left at x of the state before the jump, and its slope along x; 0 where that is `least` at most."""
     first, s = now.first, _in_turn(now, x - now.deborah * now.time)
     low = patch_before(first, s)
     if s <= first.end[low]:
         h, slope, _ = height_at(now.track, s)
         return (first.depth + h) * now.left, slope * now.left
-    u = first.pressed[low] * np.exp(-(s - first.end[low]) / first.deborah) * now.left
+    u = first.pressed[low] * now.left
+    if u <= least:
+        return 0.0, 0.0
+    u *= np.exp(-(s - first.end[low]) / first.deborah)
     return u, -u / first.deborah
 
 
@@ -189,7 +192,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
         if value > u:
             u, slope, gain = value, value_slope, value_gain
     if now.first.depth * now.left > u:  # heights count from the highest point
-        value, value_slope = left_before(now, x)
+        value, value_slope = left_before(now, x, u)
         if value > u:
             u, slope, gain = value, value_slope, 0.0
     return u, slope, gain
@@ -212,11 +215,11 @@ def foreseen(
         Places in the cell.
     """
     c0, c1, c2, c3 = line
-    u, falls = wake[0], -wake[1]
-    rate, y = falls / u if u > 0 else 0.0, high
+    u, slope = wake
+    bend, y = slope * slope / u if u > 0 else 0.0, high
     for _ in range(FORESEEN_STEPS):
-        free = u * np.exp(rate * (high - y))
-        rise = c1 + y * (2 * c2 + y * 3 * c3) + rate * free
+        free = u + (y - high) * (slope + (y - high) * 0.5 * bend)
+        rise = c1 + y * (2 * c2 + y * 3 * c3) - slope - (y - high) * bend
         if rise <= 0:
             break
         step = (free - depth - c0 - y * (c1 + y * (c2 + y * c3))) / rise
@@ -227,16 +230,17 @@ def foreseen(
 
 
 @inlined
-def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[float, float, float, float]:
-    """Return how far the line is above a wake at x, the slope of that, its derivative by the depth, and its rate.
+def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[float, float, float, float, float]:
+    """Return how far the line is above a wake at x, its slope and curvature, its derivative by the depth, and its rate.
 
-    What is in flight fades and moves on: its rate is -u - deborah u'.
+    What is in flight fades and moves on: its rate is -u - deborah u'. It bends as what fades does.
     """
     u, u_slope, gain = wake
     last = now.history.count - 1
-    h, h_slope, _ = height_at(now.track, x)
+    h, h_slope, h_bend = height_at(now.track, x)
+    bend = h_bend - (u_slope * u_slope / u if u > 0 else 0.0)
     opening = now.history.rate[last] + u + now.deborah * u_slope
-    return now.history.depth[last] + h - u, h_slope - u_slope, 1 - gain, opening
+    return now.history.depth[last] + h - u, h_slope - u_slope, bend, 1 - gain, opening
 
 
 @inlined
@@ -246,13 +250,16 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
     for _ in range(ROOT_STEPS):
         if not low < x < high:
             x = 0.5 * (low + high)
-        gap, slope, gain, opening = gap_at(now, x, wake_at(now, wakes, x))
+        gap, slope, bend, gain, opening = gap_at(now, x, wake_at(now, wakes, x))
         if gap > 0:
             high = x
         else:
             low = x
         step = -gap / slope if slope > 0 else 2.0
         if abs(step) < MET or high - low < 1e-9:
+            if 2 * abs(bend * step) < slope:
+                step /= 1 + 0.5 * bend * step / slope
+                slope += bend * step
             return min(max(x + step, low), high), slope, gain, opening
         x += step
     return x, slope, gain, opening

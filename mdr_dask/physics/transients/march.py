@@ -28,8 +28,7 @@ from mdr_dask.physics.transients.patches import (
 TRIALS = 80
 ORDER = 3  # of the backward differentiation
 EXACT, TRUSTED = 1e-11, 0.03  # of the load
-MANY, CAREFUL = 100, 0.1  # with fewer patches than many the load bends more with the depth: smaller steps are trusted
-SETTLED = 2.5  # times the time since when a march has been near its end: where it ends
+SETTLED = 1.5  # times the time since when a march has been near its end: where it ends
 LEFT_LIMITS = -1  # outcome of a march whose depth leaves the limits it was prepared for
 
 
@@ -134,8 +133,7 @@ def _balance(
             low = guess
         else:
             high = guess
-        trusted = abs(step) <= (close if found >= MANY else CAREFUL * close) and abs(off) <= TRUSTED * load
-        if trusted or abs(off) <= EXACT * load:
+        if (abs(step) <= close and abs(off) <= TRUSTED * load) or abs(off) <= EXACT * load:
             guess += step
             history.depth[now], history.rate[now] = guess, a * guess + b
             drag = sums[DRAG] + step * sums[DRAG_STIFFNESS]

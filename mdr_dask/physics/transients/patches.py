@@ -16,7 +16,7 @@ from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barr
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
 ROOT_STEPS = 60
-CLOSE = 1e-4  # of a cell: a step of Newton after which the next one is 1e-8, and the force there that times its slope
+CLOSE = 1e-2  # of a cell: a last step, whose cube is left; the load depends on the square of that
 NEARBY = 8  # patches to look at one by one before halving
 LOAD, DRAG, LENGTH, TILT, STIFFNESS, DRAG_STIFFNESS, GROWTH, DRAG_GROWTH = range(8)
 SUMS = 8
@@ -172,10 +172,11 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
         else:
             high = x
         falls = q + x * (2 * r + x * 3 * c)
-        step = x - value / falls if falls < 0 else 2.0
-        if abs(step - x) < CLOSE:
-            return min(max(step, y), 1.0)
-        x = step if low < step < high else 0.5 * (low + high)
+        step = -value / falls if falls < 0 else NONE
+        if abs(step) < CLOSE:
+            bend = (r + 3 * c * x) / falls  # Halley's step
+            return min(max(x + step / (1 + bend * step) if abs(bend * step) < 0.5 else x + step, y), 1.0)
+        x = x + step if low < x + step < high else 0.5 * (low + high)
     return x
 
 

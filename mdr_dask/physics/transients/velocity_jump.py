@@ -28,12 +28,15 @@ class Settings(NamedTuple):
     ----------
     first_step : float
         Of the time in which 1 / q_max is passed, and of tau, at 24 steps per decade.
+    few : float
+        Steps per decade below which the first one, of the time in which 1 / q_max is passed, grows as their cube: early
+        steps cost most, and what they tell then is less than what the others leave out.
     miss : float
         Of the change of depth: what a step may differ from a parabola through the ones before, at 24 steps per decade.
     negligible : float
         Of the mean displacement: changes of depth that need no finer steps.
     newton : float
-        Of the change of depth: the step of Newton whose square is left out, at 8 steps per decade or fewer.
+        Of the change of depth: the step of Newton whose square is left out, at 24 steps per decade.
     equilibrium : float
         Of depth and drag, where the march ends, at 24 steps per decade.
     share : float
@@ -50,10 +53,11 @@ class Settings(NamedTuple):
     """
 
     first_step: float = 0.02
+    few: float = 8.0
     miss: float = 0.01
     negligible: float = 1e-5
-    newton: float = 0.03
-    equilibrium: float = 5e-5
+    newton: float = 3e-3
+    equilibrium: float = 2.5e-5
     share: float = 0.1
     long: float = 15.0
     stray: float = 0.02
@@ -138,9 +142,10 @@ def pace_after(asked: Transient, deborah: FloatArray, change: float, load: float
     """
     finer = FINE_STEPS / asked.per_decade
     fastest = max(deborah[1], deborah[0] - deborah[1])
-    first = SETTINGS.first_step * finer * min(1.0, 1 / (asked.wavenumber * float(fastest)))
+    passed = max(1.0, SETTINGS.few / asked.per_decade) ** 2 / (asked.wavenumber * float(fastest))
+    first = SETTINGS.first_step * finer * min(1.0, passed)
     scale = max(abs(change), SETTINGS.negligible * load)
-    close = SETTINGS.newton * min(1.0, (8 / asked.per_decade) ** 2)
+    close = SETTINGS.newton * finer**2
     last = float(asked.times[-1])
     return Stepping(first, 10 ** (1 / asked.per_decade), SETTINGS.miss * finer**3 * scale, close * scale, last)
 
