@@ -85,7 +85,10 @@ class Central:
     def ncores(self):
         raise AssertionError("asked by way of sync")
 
-    def submit(self, _, works, **__):
+    def submit(self, _, works, pure=True):
+        same = [each for each in self.tasks if pure and each.works == works]
+        if same:  # as of a pure function, whose answer is known
+            return same[0]
         future = futures.Future()
         future.key, future.release, future.works = f"task-{len(self.tasks)}", (lambda: None), works
         self.tasks.append(future)
@@ -116,6 +119,15 @@ def test_blocks_go_out_together_that_would_drown_the_scheduler_one_by_one(monkey
 
     assert workers.take(refill)[0] == ("first block",)
     assert (rooms, workers.together) == ([2 * threads + 1], together)
+
+
+def test_a_block_that_goes_out_again_is_computed_again():
+    """A suspect goes out as it was; what a scheduler still knows of the first time is no answer."""
+    central = Central()
+    workers = crew.Crew(central, lambda _: None, 9.0, 0, lambda: None, str)
+    for _ in range(2):
+        workers.give(("a block",))
+    assert [task_.works for task_ in central.tasks] == [("a block",)] * 2
 
 
 SILENT = {
