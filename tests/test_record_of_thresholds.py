@@ -1,11 +1,11 @@
-"""On record: the numbers by which fits, questions, figures and adaptive axes decide what is enough, equal or far."""
+"""On record: the numbers by which models, fits, questions, figures and adaptive axes decide what is enough or far."""
 
 import importlib
 import pkgutil
 
 import record
 
-from mdr_dask import aggregation, fits, plots, questions, refinement, tables, units
+from mdr_dask import aggregation, fits, models, plots, questions, refinement, tables, units
 
 
 def modules_of(package):
@@ -19,7 +19,7 @@ def test_thresholds_are_on_record(dataframe_regression):
         refinement,
         tables,
         units,
-        *(each for room in (fits, questions, plots) for each in modules_of(room)),
+        *(each for room in (fits, questions, plots, models) for each in modules_of(room)),
     ]
     found = {
         f"{room.__name__}.{name}": value

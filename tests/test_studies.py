@@ -286,3 +286,14 @@ for name in mdr_dask.__all__:
     assert name == "__version__" or callable(getattr(mdr_dask, name)), name
 """
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_temporary_folder_goes_at_the_end_and_may_be_gone_before(monkeypatch):
+    at_the_end = []
+    monkeypatch.setattr(studies.atexit, "register", lambda *call, **how: at_the_end.append((call, how)))
+    folder = studies._temporary_folder.__wrapped__()
+    (folder / "a study").mkdir()
+    (((clear, *where), how),) = at_the_end
+    for _ in range(2):
+        clear(*where, **how)
+        assert not folder.exists()

@@ -190,9 +190,9 @@ def table(tmp_path, rows):
     return named(path)
 
 
-def table_case(shape, **changes):
+def table_case(shape, realisations=(0,), **changes):
     settings = {k: v for k, v in STEEL.items() if k not in {"indenter", "normal_force"}}
-    return run(FrettingWear(indenter=shape, **{**settings, "depth": 4.7e-6, **changes}))
+    return run(FrettingWear(indenter=shape, **{**settings, "depth": 4.7e-6, **changes}), realisations=realisations)
 
 
 def test_table_of_a_ball(tmp_path):
@@ -221,9 +221,9 @@ def test_a_table_of_a_profile_may_have_its_columns_in_any_order_and_unit(tmp_pat
 
 
 def test_contact_beyond_the_table(tmp_path):
-    result = table_case(table(tmp_path, [(0.0, 0.0), (1e-6, 1e-10), (2e-6, 4e-10), (3e-6, 9e-10)]))
-    assert result.status[0, 0] == Status.FAILED
-    assert "beyond the table" in result.messages[0, 0]
+    result = table_case(table(tmp_path, [(0.0, 0.0), (1e-6, 1e-10), (2e-6, 4e-10), (3e-6, 9e-10)]), (0, 1))
+    assert result.status.tolist() == [[Status.FAILED] * 2]
+    assert all("beyond the table" in result.messages[0, position] for position in (0, 1))
 
 
 @pytest.mark.parametrize(
@@ -294,13 +294,14 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
     parameters = FrettingWear(stick_radius=0.455, accuracy=1e-1)
     for accuracy in (1e-2, 1e-8):
         columns = {"cycles": np.array([0.5, 2.0])}
-        result = MODEL.compute(Block(parameters, columns, 2, (0,), 1, names, accuracy))
+        result = MODEL.compute(Block(parameters, columns, 2, (0, 1), 1, names, accuracy))
         share = result.values["wear_volume_error"] / result.values["wear_volume"]
         assert np.all(result.status == Status.DONE)
         if accuracy == 1e-2:
             assert np.all(share <= accuracy)
             assert result.messages == {}
         else:
+            assert set(result.messages) == {(case, position) for case in (0, 1) for position in (0, 1)}
             assert all("wear_volume " in text and "worn_profile " in text for text in result.messages.values())
             assert all("an accuracy of 1e-08 is missed: " in text for text in result.messages.values())
         alone = MODEL.compute(Block(parameters, {"cycles": columns["cycles"][1:]}, 1, (0,), 1, names, accuracy))

@@ -15,7 +15,7 @@ from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.mixed_lubrication.operation import operation_of
-from mdr_dask.models.mixed_lubrication.turn import rolling
+from mdr_dask.models.mixed_lubrication.turn import Turn, creeping, rolling
 from mdr_dask.physics.lubrication import breakthrough, oil
 from mdr_dask.physics.lubrication.line_contact import line_contact, solve_film
 from mdr_dask.units import to_si
@@ -304,6 +304,28 @@ def test_where_lines_overlap_and_nothing_breaks_the_error_is_that_of_a_cluster(c
     assert found["breakthrough_probability"] == apart["breakthrough_probability"] == 0.0
     assert apart["breakthrough_probability_error"] == apart["contact_length_error"] == 0.0
     assert found["breakthrough_probability_error"] == pytest.approx(18 / 645**1.5 * 53 / 20_000, rel=0.1)
+
+
+@pytest.mark.parametrize("per_wave", [2.5, 7.9, 645.0])
+def test_a_contact_that_no_line_has_would_be_as_long_as_a_wave_or_eight_points(per_wave):
+    none = Turn(np.zeros(20_000, np.int32), 3e-7, per_wave, 53, 16, overlaps=True)
+    of_probability, off = none.errors(none)
+    assert of_probability == pytest.approx(18 / per_wave**1.5 * 53 / 20_000)
+    assert off == pytest.approx(of_probability * 3e-7 * min(per_wave, 8), rel=1e-9, abs=0)
+
+
+@pytest.mark.parametrize(("force", "apart"), [(5.0, 1), (100.0, 5), (200.0, 8), (400.0, 11)])
+def test_windows_with_creep_lie_an_eighth_of_their_width_apart(force, apart):
+    """They are 10.6, 47.3, 66.9 and 94.6 points wide; what lies between tells the same."""
+    operation = operation_of(block(slide_roll_ratio=0.1, normal_force=force).parameters)
+    lines, points = operation.source.lines(2013, 0), operation.source.points
+    width = operation.width / operation.spacing
+    every = breakthrough.creep_positions(np.arange(points), points, 0.1)
+    judged = breakthrough.judge_windows(operation.pair(lines), width, every, operation.case.edge_rule)
+    found = creeping(operation, lines)
+    np.testing.assert_array_equal(found.contact, judged[::apart])
+    assert found.apart == np.ceil(width / apart)
+    assert found.probability == pytest.approx(np.mean(judged > 0), abs=4 * np.sqrt(found.parts) / points * apart)
 
 
 def test_pieces_shorter_than_the_spacing_are_judged_right():

@@ -142,6 +142,22 @@ def test_bad_line_is_a_status() -> None:
     assert np.all(np.isnan(result.values["friction_coefficient"]))
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("velocity_change", 0.0, "expected a velocity_change above rounding"),
+        ("velocity_change", 1e-17, "expected a velocity_change above rounding"),
+        ("normal_force", -1.0, "the load must be positive and finite, got -1"),
+        ("normal_force", 1e300, "look at the units"),
+    ],
+)
+def test_what_is_no_jump_is_a_failed_case_with_its_reason_in_every_realisation(name, value, message) -> None:
+    result = compute(block({name: np.array([BASE.get(name, 0.2), value])}))
+    assert result.status.tolist() == [[Status.DONE] * 2, [Status.FAILED] * 2]
+    assert [message in result.messages.get((1, r), "") for r in (0, 1)] == [True] * 2
+    assert {case for case, _ in result.messages} == {1}
+
+
 def test_only_what_is_asked_for() -> None:
     plain = Block(parameters(), {}, 1, (0,), 5, ("rms_slope",))
     result = compute(plain)

@@ -22,8 +22,8 @@ from mdr_dask.physics.surfaces.rough_line import RoughLine
 
 ACCURACY = 0.01  # where the campaign does not say
 NODE_LINE, NODE_SWEPT = 2.5e-8, 1.3e-8  # seconds for every node of a line and of a solution
-FIXED = {"backward_euler": 1.0, "piecewise_linear": 2.0, "hermite": 3.5}  # how many times as many
-AUTO = {"backward_euler": (512, 1.0), "piecewise_linear": (4, 25.0), "hermite": (4, 3.5)}  # on which grid, and so on
+AUTO = {"backward_euler": 512, "piecewise_linear": 4, "hermite": 4}  # the grid that estimates count with
+TIMES = {"piecewise_linear": (2.0, 25.0), "hermite": (3.5, 3.5)}  # how many times as many, on a given grid and on that
 STEPPED, STEPPED_LINE, NODE_STEPPED = 2.5e-4, 4e-8, 7e-10  # of the papers' steps: to begin with, a line, a solution
 POINT_LINE, POINT_SAMPLED = 2e-7, 8e-9  # and for every Nyquist point gone along from node to node
 NODE_ARM, NODE_GENERAL, GENERAL = 4e-9, 4.5e-8, 3e-4  # for every node and arm of a general solid, and to begin with
@@ -180,11 +180,11 @@ def _seconds_of_line(
     from_node_to_node = float(points * (POINT_LINE + solves * POINT_SAMPLED) * harder)
     if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):
         return from_node_to_node
-    grid, times = AUTO[scheme] if auto else (int(oversampling), FIXED[scheme])
+    grid = AUTO[scheme] if auto else int(oversampling)
     if scheme == "backward_euler":
         own = STEPPED + points * grid * (STEPPED_LINE + solves * NODE_STEPPED)
     else:
-        own = times * points * (NODE_LINE * grid + solves * NODE_SWEPT * grid**0.25)
+        own = TIMES[scheme][auto] * points * (NODE_LINE * grid + solves * NODE_SWEPT * grid**0.25)
     has_errors = not auto and any(f"{output}_error" in block.outputs for output in COLUMNS)
     return own + has_errors * from_node_to_node
 

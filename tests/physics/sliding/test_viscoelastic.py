@@ -314,6 +314,23 @@ def test_eight_cells_are_a_line():
     assert (found.status, found.values[FRACTION]) == (Outcome.CONVERGED, pytest.approx(1.0))
 
 
+@pytest.mark.parametrize("deborah", [0.02, 0.05, 0.1])
+def test_a_wave_closes_at_the_load_at_which_it_pushes_everywhere(deborah):
+    """A Kelvin solid that follows cos(x) pushes by d + cos(x) + 2 pi De sin(x): nowhere less than 0 from
+    d = sqrt(1 + (2 pi De)^2) on, its load over modulus and length. Short of that the grids say less than 1, and what
+    they are extrapolated to stays a part of the line.
+    """
+    phase = 2 * np.pi * np.arange(64) / 64
+    wave = periodic_line(np.cos(phase), -2 * np.pi * np.sin(phase))
+    closed = np.sqrt(1 + (2 * np.pi * deborah) ** 2)
+    loads = closed * np.linspace(0.9, 1.1, 61)
+    found = [steady_viscoelastic_sliding(wave, kelvin(0.5, deborah), load) for load in loads]
+    fractions = np.array([state.values[FRACTION] for state in found])
+    assert np.all((fractions > 0.7) & (fractions <= 1.0))
+    assert np.all(fractions[loads < 0.97 * closed] < 1.0)
+    assert np.all(fractions[loads > 1.03 * closed] == 1.0)
+
+
 @settings(max_examples=150, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

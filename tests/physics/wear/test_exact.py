@@ -147,6 +147,27 @@ def test_table_of_a_parabola():
     np.testing.assert_allclose(measured.height(RADII), [0.157822, 0.381394, 0.525578, 0.579692, 0.626711], atol=5e-5)
 
 
+@pytest.mark.parametrize(
+    "wears",
+    [
+        lambda body: wear.limit(body, 0.4),
+        lambda body: wear.fast(body, 0.4, 1.0),
+        lambda body: exact(body, 0.4, [1.0])[0],
+        lambda body: exact(body, 0.0, [0.3])[0],
+    ],
+    ids=["limit", "fast", "exact", "gross slip"],
+)
+def test_nothing_is_told_of_a_measured_body_beyond_its_table(wears):
+    r = np.linspace(0, 2, 101)
+    table = from_table(r, r**2, 1.0)
+    worn = wears(table)
+    touched, beyond = worn.contact_radius * np.linspace(0, 0.99, 9), table.largest_radius * np.linspace(1.001, 2.5, 9)
+    for name in ("worn_profile", "worn_image"):
+        assert np.all(np.isfinite(worn.value(name, touched)))
+        assert np.all(np.isnan(worn.value(name, beyond)))
+    assert np.all(np.isfinite(worn.value("worn_profile", table.largest_radius * np.linspace(0.5, 1, 9))))
+
+
 def test_zero_cycles_and_order_of_request():
     worn = exact(PARABOLA, 0.5, [2.0, 0.0, 1.0], accuracy=1e-3)
     assert [w.wear_volume == 0.0 for w in worn] == [False, True, False]

@@ -1,0 +1,37 @@
+"""Whether residuals follow a trend: what chance does alone, and what it does not."""
+
+import numpy as np
+import pytest
+
+from mdr_dask.fits.misfit import trend
+
+DRAWS, POINTS = 600, 30
+
+
+def noise(seed: int) -> np.ndarray:
+    """Residuals of fits with a constant of their own: their mean is gone."""
+    drawn = np.random.default_rng(seed).standard_normal((DRAWS, POINTS))
+    return drawn - drawn.mean(axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_of_noise_a_trend_is_doubted_no_more_often_than_its_probability_says(count):
+    """Of one condition just as often; of several, the worst of which is told, no more often: and never above 1."""
+    random = np.random.default_rng(2)
+    conditions = {f"condition {k}": random.permutation(POINTS).astype(float) for k in range(count)}
+    found = np.array([trend(residuals, conditions)[0] for residuals in noise(1)])
+    assert np.all((found > 0) & (found <= 1))
+    for level in (0.05, 0.2, 0.5):
+        below, spread = np.mean(found < level), 4 * np.sqrt(level * (1 - level) / DRAWS)
+        assert below < level + spread
+        assert below > (level if count == 1 else 0.6 * level) - spread  # all of three apart: 1 - (1 - level / 3)^3
+    assert np.mean(found == 1) == pytest.approx(0.0 if count == 1 else (2 / 3) ** 3, abs=4 * np.sqrt(0.21 / DRAWS))
+
+
+def test_the_condition_that_residuals_follow_is_named():
+    random, residuals = np.random.default_rng(3), noise(4)[0]
+    conditions = {name: random.permutation(POINTS) ** 3.0 for name in ("velocity", "force")}
+    rank = np.argsort(np.argsort(conditions["force"])) / POINTS
+    probability, along = trend(residuals + 6 * (rank - 0.5), conditions)
+    assert (probability < 1e-3, along) == (True, "force")
+    assert trend(residuals, {"few": np.arange(POINTS) % 3}) == (1.0, "")
