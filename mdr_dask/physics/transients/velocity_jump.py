@@ -56,8 +56,8 @@ class Settings(NamedTuple):
     few: float = 8.0
     miss: float = 0.01
     negligible: float = 1e-5
-    newton: float = 3e-3
-    equilibrium: float = 2.5e-5
+    newton: float = 1.5e-3
+    equilibrium: float = 5e-5
     share: float = 0.1
     long: float = 15.0
     stray: float = 0.02
