@@ -34,8 +34,8 @@ from mdr_dask.physics.transients.elements.loading_history import Trace, trace
 from mdr_dask.physics.transients.velocity_jump import Transient
 
 ACCURACY = 0.01  # of the ends, where the campaign does not say
-SECONDS_NODE, SECONDS_MOMENT = 5e-8, 2.7e-9  # for every node of a line, and of a moment
-MOMENTS = 60
+SECONDS_NODE, SECONDS_MOMENT = 6.2e-8, 3.3e-9  # for every node of a line, and of a moment
+MOMENTS = 4  # of a march, for every step in a decade
 SECONDS_STEPPED = 3.5e-8  # for every node in square: a history of some turns of the line
 FLAT = 1e-12  # of the largest height
 
@@ -276,7 +276,7 @@ def seconds(block: Block[VelocityJump]) -> float:
         nodes = group.setting.roughness.points * group.oversampling
         if isinstance(group, _Marched):
             errors = any(f"{name}_error" in block.outputs for name in TRANSIENT)
-            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS) * (1.7 if errors else 1.0)
+            per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS * group.steps) * (1.7 if errors else 1.0)
             total += group._different()[0].size * per_case * len(block.realisations)
         else:
             total += nodes**2 * SECONDS_STEPPED * len(block.realisations)
