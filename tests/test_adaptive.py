@@ -24,7 +24,7 @@ from mdr_dask.models.base import Status
 from mdr_dask.plots.outputs import View, of_output
 from mdr_dask.plots.style import DATA
 from mdr_dask.questions.table import Question, table
-from mdr_dask.refinement import Mean, Stage, refined
+from mdr_dask.refinement import Mean, Stage, departure, refined
 
 AXIS = "{adaptive: [1 mm, 1 km], until: 1 %, at_most: 60}"
 
@@ -380,3 +380,10 @@ def test_an_axis_is_refined_by_means_with_the_errors_of_their_grids(errors, url,
     assert (error is not None) == errors
     if errors:
         np.testing.assert_array_equal(np.sort(np.ravel(error)), np.sort(np.ravel(data["friction_coefficient_error"])))
+
+
+@pytest.mark.parametrize("values", [(0.0, 3.0, 4.0, 4.0), (4.0, 4.0, 3.0, 0.0)])
+def test_both_interpolations_are_compared_at_the_quarters_of_a_space(values):
+    """A quarter into the middle space the natural spline is at 1099/320, the monotone cubic at 431/128."""
+    found = departure(np.arange(4.0), np.array(values)[None, None], np.zeros((1, 4)))
+    assert found[0, 1] == pytest.approx(43 / 640, rel=1e-12)

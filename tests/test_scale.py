@@ -145,6 +145,20 @@ def test_a_chunk_that_is_not_what_was_written_has_no_stamp_in_the_seal(url):
     assert np.array_equal(seal.stamps["status"], stamps["status"])
 
 
+def test_the_seal_of_a_ledger_of_which_nothing_is_as_it_was_written_is_a_seal(url):
+    """It knows what the values are, and is not taken for damaged itself."""
+    Path(url, "status/seal.json").unlink()
+    chunks = [path for path in Path(url, "status/c").rglob("*") if path.is_file()]
+    for chunk in chunks:
+        chunk.write_bytes(chunk.read_bytes()[::-1])
+    store.seal(url, "")
+    seal = read_seal(url, "")
+    assert (seal.different, np.any(seal.which), np.any(seal.stamps["status"])) == ((None,), False, False)
+    assert np.array_equal(seal.stamps["height"], store.look(url, "").stamps["height"])
+    damaged = {finding.name for finding in store.verify(url).findings}
+    assert damaged == {chunk.relative_to(url).as_posix() for chunk in chunks}
+
+
 def test_a_seal_that_is_damaged_or_of_another_study_is_no_seal(url):
     seal = Path(url, "status/seal.json")
     content = seal.read_bytes()
