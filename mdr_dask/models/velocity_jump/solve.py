@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -138,7 +139,8 @@ class _Group:
 
     def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
         """Yield why a case failed, or which outputs miss the accuracy and by how much."""
-        shares = {name: self._shares(found, name) for name in self.outputs}
+        known = [name for name in self.outputs if not np.isnan(found.errors[name]).all()]
+        shares = {name: self._shares(found, name) for name in known}
         accuracy = self.block.accuracy or ACCURACY
         for k, outcome in enumerate(found.outcome):
             if outcome != Outcome.CONVERGED:
@@ -173,7 +175,7 @@ class _Marched(_Group):
 
     def found(self, waves: Waves) -> tuple[_Found, int]:
         """Solve the different cases together."""
-        loads, deborah, which = self._different()
+        loads, deborah, which = self.different
         is_wanted = any(name in self.outputs for name in TRANSIENT)
         times, wavenumber = np.array(self.block.parameters.relaxation_times), np.pi * waves.points
         transient = Transient(times, wavenumber, self.steps, self.block.accuracy or 0.0) if is_wanted else None
@@ -188,8 +190,9 @@ class _Marched(_Group):
         jumps = solve_jumps(JumpProblem(RoughLine(waves), loads, deborah), aim)
         return self._of(jumps, loads, which), loads.size
 
-    def _different(self) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return loads and Deborah numbers of the different cases, and the entry of every member.
+    @cached_property
+    def different(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Loads and Deborah numbers of the different cases, and the entry of every member.
 
         Those of a speed come one after the other: what a line does at a Deborah number is worked out once for them.
         """
@@ -265,7 +268,7 @@ def distinct(block: Block[VelocityJump]) -> int:
     """Return how many different cases a block holds, over all realisations."""
     different = 0
     for group in _groups(block, sliding_problems(block)):
-        different += group._different()[0].size if isinstance(group, _Marched) else 1
+        different += group.different[0].size if isinstance(group, _Marched) else 1
     return different * len(block.realisations)
 
 
@@ -277,7 +280,7 @@ def seconds(block: Block[VelocityJump]) -> float:
         if isinstance(group, _Marched):
             errors = any(f"{name}_error" in block.outputs for name in TRANSIENT)
             per_case = nodes * (SECONDS_NODE + SECONDS_MOMENT * MOMENTS * group.steps) * (1.7 if errors else 1.0)
-            total += group._different()[0].size * per_case * len(block.realisations)
+            total += group.different[0].size * per_case * len(block.realisations)
         else:
             total += nodes**2 * SECONDS_STEPPED * len(block.realisations)
     return total

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.compiling import compiled, copy_into, kernel, lesser, nested
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
@@ -27,6 +27,7 @@ from mdr_dask.physics.sliding.kelvin import (
     SUMS,
     Barriers,
     Blocks,
+    Places,
     barriers_for,
     blocks_of,
     places_for,
@@ -40,6 +41,7 @@ OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the 
 OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
+UNKNOWN = -1  # number of patches whose places are not at hand
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -123,24 +125,49 @@ class _Swept(NamedTuple):
     mean: float
 
 
+class Touching(NamedTuple):
+    """Where the patches of cases begin and end at the depths that were swept last, one case after the other.
+
+    Parameters
+    ----------
+    places : Places
+        Filled as far as they reach.
+    first, patches : int array, shape (cases,)
+        First patch of every case, and their number; `UNKNOWN` where they are not there.
+    """
+
+    places: Places
+    first: IntArray
+    patches: IntArray
+
+
+def touching_for(cases: int, patches: int) -> Touching:
+    """Return room for the patches of some cases, so many for all of them."""
+    return Touching(places_for(patches), np.zeros(cases, np.int64), np.full(cases, UNKNOWN))
+
+
 @kernel
-def _solve(line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray) -> tuple[float, bool]:
-    """Find the last lattice depth that carries less than the load, and leave its sums.
+def _solve(
+    line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
+) -> tuple[float, int]:
+    """Find the last lattice depth that carries less than the load, and leave its sums; count its patches.
+
+    They are 0 where no depth is found, and `UNKNOWN` where the places are those of another depth.
 
     The load is a convex, increasing function of the depth, so that its tangents bound the root from above, as full
     contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
     wanted. It is unique, and so the answer does not depend on the `trail` that the search follows.
     """
     cells, blocks, barriers, mean = line
-    low, high, unwritten = 0.0, np.inf, places_for(0)
+    low, high = 0.0, np.inf
     most = load / (cells.mean.size - 1) - mean
     depth = _floor(lesser(_guess(trail, load), most))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
-        sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
+        patches = sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
         carried = sums[DISPLACEMENT]
         if not (carried > 0 and sums[STIFFNESS] > 0):
-            return depth, False
+            return depth, 0
         tangent = depth + (load - carried) / sums[STIFFNESS]
         if tangent > low:  # sums that overflow have none
             most = lesser(most, tangent)
@@ -149,12 +176,12 @@ def _solve(line: _Swept, deborah: float, load: float, trail: FloatArray, sums: F
             low = depth
             copy_into(best, sums)
             if tangent < _next(depth):
-                return depth, True
+                return depth, patches
         else:
             high = depth
         if low > 0 and _next(low) >= high:
             copy_into(sums, best)
-            return low, True
+            return low, UNKNOWN
         proposal = lesser(_guess(trail, load), most)
         if iteration > PATIENCE and high < np.inf:
             proposal = 0.5 * (low + high)
@@ -164,7 +191,7 @@ def _solve(line: _Swept, deborah: float, load: float, trail: FloatArray, sums: F
         elif depth >= high:
             depth = _floor(0.5 * (low + high)) if high - low > 2 * (_next(low) - low) else low
             depth = max(depth, _next(low)) if low > 0 else _floor(0.5 * high)
-    return depth, False
+    return depth, 0
 
 
 @kernel
@@ -176,30 +203,39 @@ def _states(
     first: FloatArray,
     results: FloatArray,
     status: NDArray[np.int8],
-) -> None:
+    touching: Touching,
+    rows: IntArray,
+    used: int,
+) -> int:
     """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
+
+    Their patches are written to the rows of `touching`, of whose places so many are used; return how many then are.
 
     The search for a depth follows that of the case before, that of the first one the trail given, which is then its
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
     (cells, blocks, barriers, _), (deborahs, loads) = line, cases
-    n = cells.mean.size - 1
-    unwritten, sums, trail, starts = places_for(0), np.empty(SUMS), np.empty(TRAIL), True
+    n, (touches, leaves) = cells.mean.size - 1, touching.places
+    sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
     for k in range(loads.size):
-        deborah, depth, converged = deborahs[k], guesses[k], False
+        deborah, depth, patches, places = deborahs[k], guesses[k], 0, Places(touches[used:], leaves[used:])
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
-                sweep_cells(cells, blocks, barriers, deborah, depth, sums, unwritten)
-                converged = abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]
-        if not converged:
-            depth, converged = _solve(line, deborah, loads[k], trail, sums)
-        if not converged:
+                patches = sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
+                if not abs(loads[k] - sums[DISPLACEMENT]) < close * depth * sums[STIFFNESS]:
+                    patches = 0
+        if patches == 0:
+            depth, patches = _solve(line, deborah, loads[k], trail, sums, places)
+        if patches == 0:
             status[k] = Outcome.DEPTH_NOT_FOUND
             copy_into(trail, first)
             continue
+        if 0 < patches <= places.leaves.size:
+            touching.first[rows[k]], touching.patches[rows[k]] = used, patches
+            used += patches
         if starts:
             copy_into(first, trail)
             starts = False
@@ -212,6 +248,7 @@ def _states(
         # drag is force times slope
         if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
             status[k] = Outcome.DEPTH_NOT_FOUND
+    return used
 
 
 def steady_sliding(
@@ -265,14 +302,21 @@ def steady_on_cells(
     guesses: FloatArray | None = None,
     close: float = 0.0,
     barriers_at: Callable[[float], Barriers] | None = None,
+    touching: Touching | None = None,
 ) -> Steady:
     """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already.
 
-    Where others have use for the barriers of a Deborah number in cells, they are taken from where they are kept.
+    Where others have use for the barriers of a Deborah number in cells, they are taken from where they are kept, and
+    what touches is written down.
     """
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    at = barriers_at or _unknown_barriers(cells.mean.size - 1)
-    return _solved(cells, deborah, loads, lambda good, cases: _swept(cells, blocks, at, cases, start[good], close))
+    at, kept = barriers_at or _unknown_barriers(cells.mean.size - 1), touching or touching_for(loads.size, 0)
+    return _solved(
+        cells,
+        deborah,
+        loads,
+        lambda good, cases: _swept(cells, blocks, at, cases, start[good], close, kept, np.flatnonzero(good)),
+    )
 
 
 def _unknown_barriers(cells: int) -> Callable[[float], Barriers]:
@@ -325,6 +369,8 @@ def _swept(
     cases: Cases,
     guesses: FloatArray,
     close: float,
+    touching: Touching,
+    rows: IntArray,
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
     order = np.lexsort((cases.loads, cases.deborah))
@@ -337,7 +383,7 @@ def _swept(
     )
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
     _begin(first, loads[0] / n - mean, loads[0])
-    outlined, beyond = first[0], 0.0
+    outlined, beyond, used = first[0], 0.0, 0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
@@ -346,8 +392,18 @@ def _swept(
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
             first[:3] = outlined + beyond, np.log(load), slope
-        _states(
-            _Swept(cells, blocks, near, mean), alike, starts[some], close, first, ordered[some], ordered_status[some]
+        line = _Swept(cells, blocks, near, mean)
+        used = _states(
+            line,
+            alike,
+            starts[some],
+            close,
+            first,
+            ordered[some],
+            ordered_status[some],
+            touching,
+            rows[order[some]],
+            used,
         )
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed

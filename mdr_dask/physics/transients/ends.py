@@ -13,7 +13,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Barriers, Blocks, barriers_for, blocks_of, patches_at
-from mdr_dask.physics.sliding.steady import steady_on_cells
+from mdr_dask.physics.sliding.steady import Touching, steady_on_cells, touching_for
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -28,6 +28,10 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
+KEPT = 2**20  # places of patches that a search for depths keeps, 16 bytes each
+MOVED = (
+    1e-3  # of a cell: a step of an edge from the depth of the last sweep to the depth itself, whose square is left out
+)
 KNOWN, FEWEST = 2**21, 4  # cells whose barriers are kept, 16 bytes each, at least those of some Deborah numbers
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # of the load: what the last step of Newton may still find missing, whose square is left out
@@ -59,7 +63,19 @@ class PreparedLine(NamedTuple):
         """Return what touches in steady sliding at a depth of the highest point; write the sums of the sweep."""
         barriers = self.barriers(deborah)
         start, end = patches_at(self.cells, self.blocks, barriers, deborah, depth, sums)
-        return Patches(start, end, _pressed(self.track, end, depth), start.size, depth, deborah, np.zeros(1, np.int64))
+        pressed = _pressed(self.track, end, depth)
+        return Patches(start, end, pressed, start.size, depth, deborah, np.zeros(1, np.int64))
+
+    def patches_near(self, touching: Touching, row: int, depth: float, deborah: float) -> Patches | None:
+        """Return what touches in steady sliding, from what touched close to the depth; None if that is not enough."""
+        first, count = touching.first[row], touching.patches[row]
+        if count < 0:
+            return None
+        start, end = (places[first : first + count].copy() for places in touching.places)
+        pressed = np.empty(count)
+        if not _moved(self.track, deborah, depth, start, end, pressed):
+            return None
+        return Patches(start, end, pressed, int(count), depth, deborah, np.zeros(1, np.int64))
 
 
 class Ends(NamedTuple):
@@ -126,24 +142,31 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
         On another grid, where the searches for the depth begin; the answer does not depend on it.
     """
     guesses = None if near is None else near.depth.ravel()
-    steady = steady_on_cells(line.cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses, 0.0, line.barriers)
+    cells, numbers = line.cells, deborah.ravel()
+    touching = touching_for(numbers.size, min(numbers.size * (int(line.track.cells) // 8 + 2), KEPT))
+    steady = steady_on_cells(cells, line.blocks, numbers, np.repeat(loads, 2), guesses, 0.0, line.barriers, touching)
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
-    touching, slower = np.full((2, loads.size), None, dtype=object)
+    first, slower = np.full((2, loads.size), None, dtype=object)
     good = np.flatnonzero(outcome == Outcome.CONVERGED)
     if good.size:
         n, sums = line.track.cells, np.empty(SWEEP_SUMS)
         for k in good:
-            before, after = deborah[k] * n
-            # at the depth itself: the search for it ends nearby, where other cells may be in contact as a whole
-            first = touching[k] = line.patches(depth[k, 0] + line.cells.top, before, sums)
-            drag[k, 0] = sums[SWEEP_DRAG]
-            last = line.patches(depth[k, 1] + line.cells.top, after, sums)
-            drag[k, 1], slower[k] = sums[SWEEP_DRAG], first if before <= after else last
-            found = _release(line.track, first, line.barriers(after), after, loads[k] * n)
-            at[k], rate[k], tilt[k], outcome[k] = found
-    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, touching, slower, outcome)
+            speeds, both = deborah[k] * n, []
+            for end, speed in enumerate(speeds):
+                # at the depth itself: the search for it ends nearby, where other cells may be in contact as a whole
+                sinking = float(depth[k, end] + cells.top)
+                patches = line.patches_near(touching, 2 * int(k) + end, sinking, speed)
+                if patches is None:
+                    patches = line.patches(sinking, speed, sums)
+                    drag[k, end] = sums[SWEEP_DRAG]
+                both.append(patches)
+            first[k], slower[k] = both[0], both[int(np.argmin(speeds))]
+            at[k], rate[k], tilt[k], outcome[k] = _release(
+                line.track, first[k], line.barriers(speeds[1]), speeds[1], loads[k] * n
+            )
+    return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, first, slower, outcome)
 
 
 @kernel
@@ -153,6 +176,36 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
     for k in range(end.size):
         pressed[k] = depth + height_at(track, end[k])[0]
     return pressed
+
+
+@kernel
+def _moved(track: Track, deborah: float, depth: float, start: FloatArray, end: FloatArray, pressed: FloatArray) -> bool:
+    """Move the places of patches close to a depth to it, by a step of Newton; write with what elements leave them.
+
+    Return whether none moves far or into another cell, or meets another one: else the sums of the cells change, too.
+    """
+    last, left, free = start.size - 1, -np.inf, 0.0
+    for k in range(start.size):
+        if k > 0:
+            x = start[k]
+            h, slope, _ = height_at(track, x)
+            flying = free * np.exp((left - x) / deborah)
+            rise = slope + flying / deborah
+            step = (flying - depth - h) / rise if rise > 0 else np.inf
+            if not (abs(step) < MOVED and int(x + step) == int(x) and x + step > left):
+                return False
+            start[k] = x + step
+        if k < last:
+            x = end[k]
+            h, slope, bend = height_at(track, x)
+            falls = slope + deborah * bend
+            step = -(depth + h + deborah * slope) / falls if falls < 0 else np.inf
+            if not (abs(step) < MOVED and int(x + step) == int(x) and x + step > start[k]):
+                return False
+            end[k] = x + step
+        left = end[k]
+        free = pressed[k] = depth + height_at(track, left)[0]
+    return True
 
 
 @kernel

@@ -34,7 +34,9 @@ COARSEST = 1e-2
 #: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
 #: solution; ``python -m benchmarks accuracy measure wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: In gross slip at constant depth: the same; all of the error is that of the edge where panels are fine enough.
+#: At constant depth: panels are chosen for so many times the accuracy of the steps.
+COARSER = 1.6
+#: In gross slip at constant depth: as `WIDER`; all of the error is that of the edge where panels are fine enough.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
 #: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
 NEAR_AXIS, SHARPEST = 1e-5, 8.0
@@ -185,7 +187,7 @@ def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
     """
     order = 4 if accuracy > 2e-3 else 5 if accuracy > 5e-4 else 6
     wider = _wider(accuracy, WIDER, min((1.0 - stick_radius) / THIN, 1.0))
-    return Resolution(accuracy, wider=wider, order=order, second=SECOND)
+    return Resolution(COARSER * accuracy, wider=wider / COARSER, order=order, second=SECOND)
 
 
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
