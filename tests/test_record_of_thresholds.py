@@ -6,6 +6,7 @@ import pkgutil
 import record
 
 from mdr_dask import aggregation, fits, models, plots, questions, refinement, tables, units
+from mdr_dask.store import reading
 
 
 def modules_of(package):
@@ -16,6 +17,7 @@ def modules_of(package):
 def test_thresholds_are_on_record(dataframe_regression):
     rooms = [
         aggregation,
+        reading,
         refinement,
         tables,
         units,

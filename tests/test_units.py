@@ -132,6 +132,7 @@ def test_units_that_would_keep_the_parser_busy_are_refused_at_once(value):
         (59.4, "59 s"),
         (60.0, "1 min 0 s"),
         (599.0, "9 min 59 s"),
+        (601.0, "10 min"),
         (3599.0, "59 min"),
         (3600.0, "1 h 0 min"),
         (90000.0, "25 h 0 min"),

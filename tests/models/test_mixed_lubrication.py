@@ -486,6 +486,7 @@ def test_a_given_film_is_kept_and_too_thin_a_one_is_warned_of():
     result = MODEL.compute(block(["film", "asperity_load_share"], columns={"film_thickness": [1e-9, 4e-7]}))
     assert result.values["film"][:, 0].tolist() == [1e-9, 4e-7]
     assert result.values["asperity_load_share"][0, 0] == 1.0
+    assert np.all(result.values["asperity_load_share_error"] == 0.0)
     assert "asperities apart by the given film would carry" in result.messages[0, 0]
     assert (1, 0) not in result.messages
 

@@ -279,10 +279,11 @@ def test_a_steady_start_that_does_not_bear_the_load_is_told(monkeypatch):
             assert 1e-6 < state.displacement.mean() / 0.2 - 1 < 1e-3
 
 
+@pytest.mark.parametrize("pull", [0.1, -50.0, 50.0])
 @pytest.mark.parametrize("guess", [-1e6, -10.0, 0.0, 1e6])
-def test_the_rate_that_carries_a_load_is_found_from_a_guess_without_contact(guess):
+def test_the_rate_that_carries_a_load_is_found_from_a_guess_without_contact(guess, pull):
     place = np.arange(200) / 200
-    pulls = 0.1 + 0.3 * np.sin(23 * place)
+    pulls = pull + 0.3 * np.sin(23 * place)
     nowhere = edges.Edges(np.full(200, -1.0), np.zeros(200))
     contact = edges.Contact(
         pulls, pulls, np.cos(7 * place), np.zeros(200), np.zeros(200), np.ones(200, dtype=bool), nowhere
@@ -290,6 +291,6 @@ def test_the_rate_that_carries_a_load_is_found_from_a_guess_without_contact(gues
     deborah, load, viscosity = 0.4, 0.2, 0.7
     rate, _, fraction = edges.carrying_rate(contact, viscosity, guess, edges.Drive(deborah, load, -1))
     fine = np.linspace(0, 1, 200001)[:-1] * (199 / 200)
-    force = 0.1 + 0.3 * np.sin(23 * fine) + viscosity * (rate + deborah * np.cos(7 * fine))
+    force = pull + 0.3 * np.sin(23 * fine) + viscosity * (rate + deborah * np.cos(7 * fine))
     assert np.maximum(force, 0).mean() == pytest.approx(load, rel=0.01)  # of the cell that closes the line
     assert (force > 0).mean() == pytest.approx(fraction, abs=0.01)
