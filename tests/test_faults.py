@@ -170,3 +170,21 @@ def test_files_and_folders_are_flushed_and_what_is_missing_is_told(tmp_path, mon
         assert flushed[-1] == path.stat().st_ino
     with pytest.raises(FileNotFoundError):
         FLUSH(tmp_path / "nothing")
+
+
+@pytest.mark.parametrize("act", ["put", "give_name"])
+def test_a_write_that_fails_leaves_no_unnamed_file(act, tmp_path, monkeypatch):
+    given, calls = getattr(files, act), []
+
+    def refused(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise OSError("no space left")
+        return given(*arguments)
+
+    monkeypatch.setattr(files, act, refused)
+    with pytest.raises(StoreError, match="no space left"):
+        files.write_stages(str(tmp_path), [{"a/0": b"1", "a/1": b"2", "b": b"3"}])
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == (
+        [tmp_path / "a/0"] if act == "give_name" else []
+    )

@@ -16,7 +16,7 @@ from test_faults import two_series
 
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication, Tolerance
-from mdr_dask.cli import main
+from mdr_dask.cli import main, watching
 from mdr_dask.errors import StoreBusyError
 from mdr_dask.execute import Part, Resources
 from mdr_dask.models.base import Status
@@ -210,3 +210,8 @@ def listening():
     """Return the ports at which this process listens."""
     found = psutil.Process().net_connections("inet")
     return {connection.laddr.port for connection in found if connection.status == psutil.CONN_LISTEN}
+
+
+def test_a_watched_line_tells_every_state_that_there_is():
+    row = {"series": "force", "results": 20, "missing": 5, "done": 12, "not_converged": 0, "failed": 2, "not_needed": 1}
+    assert watching._line(row) == "force: 15 of 20 results (75%): 5 missing, 12 done, 2 failed, 1 not needed"

@@ -4,9 +4,10 @@ from friction_store import store
 
 from mdr_dask import bootstrap
 from mdr_dask.errors import FitError
-from mdr_dask.fits import available, top
+from mdr_dask.fits import available, friction, top
 from mdr_dask.fits.indenter import within_indenter_law
 from mdr_dask.physics.sliding import laws
+from mdr_dask.physics.surfaces import roughness
 
 FIT = {name: fit.compute for name, fit in available("sliding_friction").items()}
 ZONE_ONE = available("sliding_friction")["zone_one"]
@@ -171,3 +172,14 @@ def test_zone_one_has_the_known_constants():
             sigma = float(here[f"{name}_high"] - here[f"{name}_low"]) / (2 * 1.96)
             # 60 realisations here, 200 there: 4 sigma of both, and what the note says the window matters
             assert abs(float(here[name]) - value) < 4 * sigma * np.sqrt(1 + 60 / 200) + 0.02
+
+
+def test_a_slope_that_is_not_stored_follows_from_every_line(forces):
+    """Of each exponent and number of points, as an axis of the study or one number of it."""
+    data = forces.drop_vars("rms_slope").assign_coords(points=("points", [200, 400]))
+    found = friction.spectral_slope(data)
+    for hurst in (0.3, 0.7):
+        for points in (200, 400):
+            unit = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
+            here = float(found.sel(hurst=hurst, points=points))
+            assert here == pytest.approx(unit * float(data["rms_roughness"] / data["length"]), rel=1e-12)

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import FitError
+from mdr_dask.fits import sensitivity
 from mdr_dask.fits.sensitivity import sobol_indices
 
 INPUTS = ("x1", "x2", "x3")
@@ -146,3 +147,18 @@ def test_the_command_prints_rows_draws_and_refuses(toy, tmp_path, monkeypatch, c
     assert "did you mean 'height'" in capsys.readouterr().err
     assert main(["sensitivity", "results/a.zarr", "trace"]) == 2
     assert "dimension" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("part", "index"), [(-0.2, -0.1), (0.5, 0.55), (1.0, 1.0), (1.2, 1.2)])
+def test_what_a_regression_misses_is_at_most_all_and_nothing_beyond_the_whole(part, index):
+    """Of a variance of one: a tenth of what is missing of it is added, and the interval reaches as far beyond."""
+
+    def variances(weights):
+        return sensitivity._Variances(
+            np.full((1, weights.size), part), np.zeros((1, 50)), np.ones(50), np.zeros(50), 0.1
+        )
+
+    found, low, high = sensitivity._with_interval(variances, 1)[:, 0]
+    assert found == pytest.approx(index)
+    assert low == pytest.approx(part)
+    assert high == pytest.approx(index + (index - part))

@@ -657,6 +657,8 @@ def test_time_estimate_grows_with_cases_points_and_creep():
     assert MODEL.seconds(block(points=200_000)) > small
     rough = block(points="auto", shortest_wavelength=1e-5)
     assert MODEL.seconds(dataclasses.replace(rough, accuracy=0.001)) > MODEL.seconds(rough) > 0
+    loose = dataclasses.replace(block(points="auto", shortest_wavelength="auto"), accuracy=0.2)
+    assert MODEL.seconds(loose) == pytest.approx(MODEL.seconds(block(points=250_000)))
     assert MODEL.seconds(block(slide_roll_ratio=0.1)) > small
     many, none = (
         MODEL.seconds(block(columns={"hurst": each})) for each in (np.linspace(0.6, 0.8, 50), np.full(50, 0.7))

@@ -393,3 +393,13 @@ def test_a_temperature_is_drawn_on_the_scale_that_was_asked_for(unit, boiling):
         shown = style.quantity("temperature", values.rename("temperature"))
     assert shown.unit == unit
     assert 373.15 * shown.factor + shown.offset == pytest.approx(boiling)
+
+
+@pytest.mark.parametrize("colours", [3, 4, 5])
+def test_studies_share_a_panel_while_there_are_colours_for_all_of_their_curves(colours, stores, monkeypatch):
+    """Two studies of two curves each."""
+    data = stores["grid"].isel(normal_force=[0])
+    monkeypatch.setattr(style, "most_colours", lambda: colours)
+    figure = drawn({"first": data, "second": data}, MU, "velocity", by="hurst")
+    apart = [axes.get_title() for axes in figure.axes[:2]] == ["first", "second"]
+    assert apart == (colours < 4)
