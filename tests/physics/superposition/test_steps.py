@@ -130,7 +130,7 @@ def normal(problem, centre, width, powers):
 def test_the_trace_of_the_roughness_is_that_of_dense_algebra(size):
     random = np.random.default_rng(size)
     lower = np.tril(np.triu(random.uniform(-0.5, 0.5, (size, size)), -3)) + np.eye(size)
-    band = np.array([[lower[i, i - k] if k <= i else 0.0 for k in range(4)] for i in range(size)])
+    band = np.array([[lower[i, i - k] if k <= i else np.nan for k in range(4)] for i in range(size)])
     bend = np.diff(np.eye(size), n=2, axis=0)
     found = steps._roughness_trace(band, np.full((size, 4), np.nan))
     assert found == pytest.approx(np.trace(bend.T @ bend @ np.linalg.inv(lower @ lower.T)), rel=1e-9)
