@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -85,6 +86,8 @@ def test_it_holds_all_that_belongs_to_it(folder):
         root = known["./"]
         assert root["license"] == {"@id": "https://spdx.org/licenses/CC-BY-4.0"}
         assert {"@id": "published/road.csv"} in known["#run"]["object"]
+        begun, ended = (datetime.fromisoformat(known["#run"][name]) for name in ("startTime", "endTime"))
+        assert begun.replace(microsecond=0) <= ended <= datetime.now(UTC)
         linked = [part["@id"] for part in (*root["hasPart"], *known["#run"]["object"], *known["#run"]["result"])]
         assert set(linked) <= known.keys()
         arrays = {name.split("/c/")[0] for name in packed.namelist() if "/c/" in name}
