@@ -104,9 +104,9 @@ class Resolution(NamedTuple):
         """The length of the first step, over the time in which a contact changes."""
         return min(0.1 * self.accuracy, SETTINGS.first) * self.wider
 
-    def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0) -> Panels:
+    def panels(self, near: int, fewest_digits: float = 2.0, sharpness: float = 1.0, coarser: float = 1.0) -> Panels:
         """Return panels, halved `near` times more at the inner border than at the edge, `sharpness` times as often."""
-        digits = max(-np.log10(self.accuracy), fewest_digits)
+        digits = max(-np.log10(coarser * self.accuracy), fewest_digits)
         levels = round(2.7 * digits - 3.3)  # fewer at the moving edge, and short steps follow the panels' noise
         order = self.order or (4 if self.accuracy > 3e-5 else 6)
         left, right = (max(halvings - self.fewer, 0) for halvings in (levels + near, levels))

@@ -18,7 +18,15 @@ SLID = 3.0 * (np.arange(2000) + 0.5) / 2000
 
 @pytest.mark.parametrize(("stick_radius", "wider"), [(0.5, 4.0), (0.9, 4.0), (0.95, 2.0), (1 - 1e-9, 1.0)])
 def test_steps_are_not_widened_where_the_annulus_of_slip_is_thin(stick_radius, wider):
-    assert fretted_resolution(stick_radius, 1e-3).step == pytest.approx(2e-4 * wider, rel=1e-6)
+    assert fretted_resolution(stick_radius, 1e-3).wider == pytest.approx(wider, rel=1e-6)
+
+
+@pytest.mark.parametrize(("accuracy", "fewer"), [(1e-2, 0), (3e-3, 2), (1e-3, 2), (3e-4, 0), (1e-4, 2)])
+def test_panels_for_a_coarser_accuracy_are_halved_less_often(accuracy, fewer):
+    """2.7 halvings to a decade, at both ends: 1.6 times the accuracy saves half of one, and none beyond 1e-2."""
+    resolution = fretted_resolution(0.5, accuracy)
+    fine, coarse = (resolution.panels(2, coarser=coarser).mesh.edges.size for coarser in (1.0, 1.6))
+    assert fine - coarse == fewer
 
 
 @pytest.fixture(scope="module")
