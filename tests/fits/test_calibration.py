@@ -2,6 +2,7 @@
 
 import json
 from time import process_time
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,8 +15,8 @@ from mdr_dask.campaign.measured import Measured
 from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import available
-from mdr_dask.fits.calibration import LEAST, calibrate, calibration, summary
-from mdr_dask.fits.determined import written
+from mdr_dask.fits.calibration import LEAST, _bound, calibrate, calibration, summary
+from mdr_dask.fits.determined import OPEN, Ends, written
 from mdr_dask.fits.posterior import Likelihood, Noise
 from mdr_dask.fits.prediction import prediction
 from mdr_dask.plots.calibration import PARTS, _of_whole_cells
@@ -295,3 +296,21 @@ def test_a_product_is_written_in_halves_and_thirds():
     """And in a decimal number where it is neither."""
     powers = np.array([1.0, 2.0, 0.5, -1 / 3, 0.25, 0.0])
     assert written("abcdef", powers) == "a x b^2 x c^(1/2) x d^(-1/3) x e^0.25"
+
+
+@pytest.mark.parametrize(
+    ("ends", "free", "bound"),
+    [
+        (Ends(low=False, high=True), [0], {"_low": 3.0, "_high": np.inf}),
+        (Ends(low=True, high=False), [0], {"_low": -np.inf, "_high": 4.0}),
+        (Ends(low=True, high=True), [0], {}),
+        (Ends(low=False, high=False), [0], {}),
+        (Ends(low=False, high=True), [0, 1], {}),
+    ],
+)
+def test_an_unknown_that_is_open_at_one_end_is_bounded_at_the_other(ends, free, bound):
+    """Places whose density is within `OPEN` of the largest are likely: here the third and the fourth."""
+    density = np.array([-9.0, -1.1 * OPEN, -0.9 * OPEN, 0.0, -1.1 * OPEN])
+    values = np.array([[1.0], [2.0], [3.0], [4.0], [5.0]])
+    found = SimpleNamespace(ends=[ends], free=free, values=values, posterior=SimpleNamespace(density=density))
+    assert _bound(found, 0) == bound
