@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mdr_dask.fits.misfit import trend
+from mdr_dask.fits.base import WITHIN
+from mdr_dask.fits.misfit import Residuals, law_holds, trend
 
 DRAWS, POINTS = 600, 30
 
@@ -35,3 +36,24 @@ def test_the_condition_that_residuals_follow_is_named():
     probability, along = trend(residuals + 6 * (rank - 0.5), conditions)
     assert (probability < 1e-3, along) == (True, "force")
     assert trend(residuals, {"few": np.arange(POINTS) % 3}) == (1.0, "")
+
+
+def test_residuals_without_errors_of_their_own_are_judged_by_their_trend_alone():
+    velocity = np.geomspace(0.01, 1, 12)
+    bent = np.log(velocity) ** 2 - 8 + 0.1 * np.random.default_rng(0).normal(size=12)
+    even = np.random.default_rng(1).normal(size=12)
+
+    def said(scaled, relative=0.1, freedom=10):
+        return law_holds(Residuals(scaled, relative, np.nan, freedom), {"velocity": velocity})
+
+    assert said(even, freedom=0) == "not tested: as many constants as points leave nothing to compare"
+    assert said(even[:5]).startswith("not tested: 5 points without errors of their own leave too little")
+    assert said(even).startswith("yes: residuals of 0.1 of the measured values, rms, follow no trend (probability ")
+    trended = said(bent)
+    assert trended.startswith(
+        "no: residuals of 0.1 of the measured values, rms, follow a trend along velocity (by chance "
+    )
+    assert float(trended.rpartition(" ")[2].rstrip(")")) == pytest.approx(
+        trend(bent, {"velocity": velocity})[0], rel=0.1
+    )
+    assert said(bent, relative=0.9 * WITHIN) == f"yes: residuals of {0.9 * WITHIN:.2g} of the measured values, rms"

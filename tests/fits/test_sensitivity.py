@@ -162,3 +162,10 @@ def test_what_a_regression_misses_is_at_most_all_and_nothing_beyond_the_whole(pa
     assert found == pytest.approx(index)
     assert low == pytest.approx(part)
     assert high == pytest.approx(index + (index - part))
+
+
+def test_an_output_without_realisations_is_one_of_each_case():
+    data = study("sobol", 128, 3)
+    found, single = sobol_indices(data, "y"), sobol_indices(data.isel(realisation=0), "y")
+    for name in found:
+        np.testing.assert_array_equal(found[name], single[name])

@@ -57,3 +57,43 @@ def test_shades_are_the_intervals_of_the_fit(dataframe_regression):
         told = [float(found[f"rms_roughness_{end}{level}"]) for end in ("low", "high")]
         np.testing.assert_allclose((x.min(), x.max()), 1e6 * np.array(told), rtol=1e-4)
     record.check(dataframe_regression, seen.of(figure))
+
+
+def test_what_is_not_determined_is_grey_over_its_whole_axis_and_its_product_follows(dataframe_regression):
+    """Friction of a product of two unknowns, at two temperatures: each has a curve of its own."""
+    velocity, height, modulus = np.geomspace(0.01, 1, 6), np.geomspace(1e-6, 1e-5, 9), np.geomspace(1e6, 1e7, 9)
+    temperature = np.array([293.15, 313.15])
+    friction = 0.3 * np.sqrt(height[:, None] / 1e-6 * modulus / 1e6)
+    friction = friction * velocity[:, None, None] ** 0.2 * (temperature / 293.15)[:, None, None, None]
+    coords = {
+        "temperature": ("temperature", temperature, {"units": "K"}),
+        "velocity": ("velocity", velocity, {"units": "m/s"}),
+        "rms_roughness": ("rms_roughness", height, {"units": "m"}),
+        "shear_modulus": ("shear_modulus", modulus, {"units": "Pa"}),
+    }
+    noise = np.random.default_rng(4).normal(size=(2, velocity.size))
+    text = "temperature [K],velocity [m/s],mu,standard_error\n" + "\n".join(
+        f"{t},{v},{0.9 * t / 293.15 * v**0.2 * (1 + 0.05 * e)},{0.03 * v**0.2}"
+        for t, row in zip(temperature, noise, strict=True)
+        for v, e in zip(velocity, row, strict=True)
+    )
+    data = xr.Dataset({"mu": (tuple(coords), friction, {"units": "1"})}, coords)
+    data = data.assign_attrs(measured={"name": "rig.csv", "text": text})
+    figure = calibration({"": data})
+    found = fitted({"": data})
+    points, _, *marginals = figure.axes
+    assert points.get_legend_handles_labels()[1] == ["temperature = 20 °C", "temperature = 40 °C"]
+    assert [axes.get_title() for axes in marginals] == ["not determined", "not determined", ""]
+    for axes, name, factor in zip(marginals, ("rms_roughness", "shear_modulus"), (1e6, 1e-6), strict=False):
+        (line,) = axes.lines
+        ends = factor * coords[name][1][[0, -1]]
+        np.testing.assert_allclose(np.log(line.get_xdata()[[0, -1]]), np.log(ends), atol=0.1)
+        assert not axes.collections
+        assert np.isnan(found[f"{name}_low"])
+    product = "rms_roughness x shear_modulus"
+    assert marginals[2].get_xlabel() == f"{product} [m Pa]"
+    ends = sorted((each.get_paths()[0].vertices[:, 0] for each in marginals[2].collections), key=np.ptp)
+    for x, level in zip(ends, ("_68", ""), strict=True):
+        told = [float(found[f"{product}_{end}{level}"]) for end in ("low", "high")]
+        np.testing.assert_allclose((x.min(), x.max()), told, rtol=1e-4)
+    record.check(dataframe_regression, seen.of(figure))

@@ -34,8 +34,8 @@ COARSEST = 1e-2
 #: At constant depth: how much wider steps are for accuracies, over which 1 - c, and the share of the second rougher
 #: solution; ``python -m benchmarks accuracy measure wear``.
 WIDER, THIN, SECOND = ((1e-4, 1.0), (3e-4, 1.5), (1e-3, 4.0), (3e-3, 5.0), (1e-2, 3.0)), 0.1, 0.25
-#: At constant depth: panels are chosen for so many times the accuracy.
-COARSER = 1.6
+#: At constant depth: panels are chosen for so many times the accuracy, where that is less than the second number.
+COARSER, COARSER_UNTIL = 1.6, 5e-3
 #: In gross slip at constant depth: as `WIDER`; all of the error is that of the edge where panels are fine enough.
 SLID_WIDER = (1e-3, 1.0), (3e-3, 3.0), (1e-2, 1.0)
 #: In gross slip: where the power of a body at its axis is told, and how many times as many halvings the sharpest takes.
@@ -193,7 +193,8 @@ def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
     """Solve fretting at constant depth once and describe every wanted time."""
     reach = limit_radius(profile, c)
-    panels = resolution.panels(round(-2.0 * np.log2(c)), coarser=COARSER)
+    coarser = float(np.clip(COARSER_UNTIL / resolution.accuracy, 1.0, COARSER))
+    panels = resolution.panels(round(-2.0 * np.log2(c)), coarser=coarser)
     problem = partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
     dense = Dense(march(problem, max(wanted), resolution.step, resolution.first * np.sqrt(problem.virgin_width)))
     energy = integral_along(dense.history, [problem.wear_rate(moment.unknowns) for moment in dense.history])
