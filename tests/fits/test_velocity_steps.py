@@ -90,3 +90,13 @@ def test_the_density_of_a_slip_length_is_that_of_all_constants_and_scatters():
         density = scatter ** (3 - rows) * np.exp(-squares / (2 * scatter**2))
         whole.append(np.log(np.sqrt(np.linalg.det(spread)) * np.trapezoid(density, np.log(scatter))))
     np.testing.assert_allclose(linear.density(rows), np.array(whole) - max(whole), atol=1e-6)
+
+
+def test_the_state_follows_a_step_from_its_first_row_on():
+    """dx/ds = -(x + ln(v / v_1)) / D_c: at a constant velocity x goes to -ln(v / v_1) within D_c."""
+    time, velocity = np.array([0.0, 1.0, 2.0, 5.0]), np.array([1e-6, 1e-5, 1e-5, 1e-6])
+    states = Trace(time, velocity, np.full(4, 0.6)).state(np.array([5e-6, 2e-5]))
+    for length, state in zip((5e-6, 2e-5), states, strict=True):
+        step, back = -np.log(10), np.exp(-3e-6 / length)
+        gone = [0.0, *(step * (1 - np.exp(-slip / length)) for slip in (1e-5, 2e-5))]
+        np.testing.assert_allclose(state, [*gone, gone[-1] * back], rtol=1e-12)

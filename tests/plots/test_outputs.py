@@ -403,3 +403,8 @@ def test_studies_share_a_panel_while_there_are_colours_for_all_of_their_curves(c
     figure = drawn({"first": data, "second": data}, MU, "velocity", by="hurst")
     apart = [axes.get_title() for axes in figure.axes[:2]] == ["first", "second"]
     assert apart == (colours < 4)
+
+
+def test_bars_reach_from_a_value_to_its_ends_and_nowhere_where_those_are_not_known():
+    value, low, high = np.array([1.0, 2.0, 3.0]), np.array([0.5, np.nan, 3.5]), np.array([np.inf, np.nan, 3.25])
+    np.testing.assert_array_equal(drawing._lengths(value, low, high), [[0.5, 0, 0], [0, 0, 0.25]])
