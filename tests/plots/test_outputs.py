@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from mdr_dask import units
 from mdr_dask.errors import DataError
+from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, drawing, page, style
 from mdr_dask.plots.outputs import View, of_output
 
@@ -408,3 +409,18 @@ def test_studies_share_a_panel_while_there_are_colours_for_all_of_their_curves(c
 def test_bars_reach_from_a_value_to_its_ends_and_nowhere_where_those_are_not_known():
     value, low, high = np.array([1.0, 2.0, 3.0]), np.array([0.5, np.nan, 3.5]), np.array([np.inf, np.nan, 3.25])
     np.testing.assert_array_equal(drawing._lengths(value, low, high), [[0.5, 0, 0], [0, 0, 0.25]])
+
+
+def test_the_law_of_a_rough_indenter_is_that_of_its_hertzian_width(tmp_path):
+    """mu / (sqrt 2 slope) = (1 + xi^-alpha)^(-1/alpha) with xi from 8 G a tau v slope^2 / F_N (eqs. 3.34, 3.40)."""
+    text = planted.SLIDING + "  indenter: {shape: parabola, radius: 10 mm}\n  normal_force: 1 N\n"
+    data = planted.make(tmp_path, text + "  velocity: {geometric: [1 mm/s, 1 m/s, 9]}\n")[""].load()
+    figure = drawn({"": data}, MU, "velocity")
+    (line,) = (each for each in figure.axes[0].lines if each.get_gid() == style.LAW)
+    slope, velocity = data["rms_slope"].mean("realisation").to_numpy(), data["velocity"].to_numpy()
+    modulus, time = float(data["shear_modulus"]), float(data["relaxation_time"])
+    width = (3 * 1.0 * 0.01 / (16 * modulus)) ** (1 / 3)
+    xi = 8 * modulus * width * time * velocity * slope**2 / 1.0 / (np.sqrt(2) * slope)
+    np.testing.assert_allclose(line.get_xdata(), velocity)
+    law = np.sqrt(2) * slope * (1 + xi**-laws.INDENTER_EXPONENT) ** (-1 / laws.INDENTER_EXPONENT)
+    np.testing.assert_allclose(line.get_ydata(), law, rtol=1e-6)
