@@ -17,7 +17,7 @@ from test_execute import digests, run
 
 from mdr_dask import execute, store
 from mdr_dask.campaign import Replication
-from mdr_dask.errors import StoreBusyError, StoreError
+from mdr_dask.errors import ClusterError, StoreBusyError, StoreError
 from mdr_dask.execute import Resources
 from mdr_dask.store import Hold, Part, files, locks, runners
 from mdr_dask.task import run_block
@@ -262,3 +262,10 @@ def test_whoever_waits_at_the_entrance_says_so_once_and_only_so_long(patience, m
     assert times[-1] - 50.0 == pytest.approx(patience, abs=runners.KNOCK)
     waiting = "process 7 is running; waiting until it has looked at what is there"
     assert [each.message for each in caplog.records] == [waiting] * (patience > runners.SILENT)
+
+
+def test_resources_that_are_refused_leave_nothing_behind(toy, tmp_path):
+    campaign = toy.campaign(toy.axis("position", [1.0]))
+    with pytest.raises(ClusterError, match="dask_nowhere"):
+        run(campaign, str(tmp_path / "a.zarr"), Resources(cluster={"class": "dask_nowhere.Cluster"}))
+    assert list(tmp_path.iterdir()) == []
