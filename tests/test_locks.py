@@ -267,5 +267,7 @@ def test_whoever_waits_at_the_entrance_says_so_once_and_only_so_long(patience, m
 def test_resources_that_are_refused_leave_nothing_behind(toy, tmp_path):
     campaign = toy.campaign(toy.axis("position", [1.0]))
     with pytest.raises(ClusterError, match="dask_nowhere"):
-        run(campaign, str(tmp_path / "a.zarr"), Resources(cluster={"class": "dask_nowhere.Cluster"}))
+        execute.run(
+            campaign, str(tmp_path / "a.zarr"), Resources(cluster={"class": "dask_nowhere.Cluster"}), lambda _: None
+        )
     assert list(tmp_path.iterdir()) == []
