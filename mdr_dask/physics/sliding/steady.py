@@ -126,24 +126,29 @@ class _Swept(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Where the patches of cases begin and end at the depths that were swept last, one case after the other.
+    """Where the patches of cases begin and end at the lattice depths that were found, one case after the other.
 
     Parameters
     ----------
     places : Places
-        Filled as far as they reach.
+        With room for so many of every case.
     first, patches : int array, shape (cases,)
-        First patch of every case, and their number; `UNKNOWN` where they are not there.
+        First patch of every case, and their number; `UNKNOWN` where they are more than there is room for.
     """
 
     places: Places
     first: IntArray
     patches: IntArray
 
+    @property
+    def room(self) -> int:
+        """Most patches of a case that are kept: whether they are does not depend on the others."""
+        return int(self.places.leaves.size // max(self.first.size, 1))
+
 
 def touching_for(cases: int, patches: int) -> Touching:
-    """Return room for the patches of some cases, so many for all of them."""
-    return Touching(places_for(patches), np.zeros(cases, np.int64), np.full(cases, UNKNOWN))
+    """Return room for the patches of some cases, so many for each of them."""
+    return Touching(places_for(cases * patches), np.zeros(cases, np.int64), np.full(cases, UNKNOWN))
 
 
 @kernel
@@ -152,7 +157,7 @@ def _solve(
 ) -> tuple[float, int]:
     """Find the last lattice depth that carries less than the load, and leave its sums; count its patches.
 
-    They are 0 where no depth is found, and `UNKNOWN` where the places are those of another depth.
+    They are 0 where no depth is found. Places are written as far as they reach.
 
     The load is a convex, increasing function of the depth, so that its tangents bound the root from above, as full
     contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
@@ -180,8 +185,10 @@ def _solve(
         else:
             high = depth
         if low > 0 and _next(low) >= high:
+            if carried > load and places.leaves.size > 0:
+                patches = sweep_cells(cells, blocks, barriers, deborah, low, sums, places)
             copy_into(sums, best)
-            return low, UNKNOWN
+            return low, patches
         proposal = lesser(_guess(trail, load), most)
         if iteration > PATIENCE and high < np.inf:
             proposal = 0.5 * (low + high)
@@ -204,12 +211,14 @@ def _states(
     results: FloatArray,
     status: NDArray[np.int8],
     touching: Touching,
+    room: int,
     rows: IntArray,
     used: int,
 ) -> int:
     """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
 
-    Their patches are written to the rows of `touching`, of whose places so many are used; return how many then are.
+    Their patches, as there is room for, are written to the rows of `touching`, of whose places so many are used; return
+    how many then are.
 
     The search for a depth follows that of the case before, that of the first one the trail given, which is then its
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
@@ -220,7 +229,8 @@ def _states(
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
     for k in range(loads.size):
-        deborah, depth, patches, places = deborahs[k], guesses[k], 0, Places(touches[used:], leaves[used:])
+        deborah, depth, patches = deborahs[k], guesses[k], 0
+        places = Places(touches[used : used + room], leaves[used : used + room])
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
@@ -233,7 +243,7 @@ def _states(
             status[k] = Outcome.DEPTH_NOT_FOUND
             copy_into(trail, first)
             continue
-        if 0 < patches <= places.leaves.size:
+        if 0 < patches <= room:
             touching.first[rows[k]], touching.patches[rows[k]] = used, patches
             used += patches
         if starts:
@@ -402,6 +412,7 @@ def _swept(
             ordered[some],
             ordered_status[some],
             touching,
+            touching.room,
             rows[order[some]],
             used,
         )

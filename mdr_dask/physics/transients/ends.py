@@ -28,10 +28,8 @@ from mdr_dask.physics.transients.patches import (
     track_of,
 )
 
-KEPT = 2**20  # places of patches that a search for depths keeps, 16 bytes each
-MOVED = (
-    1e-3  # of a cell: a step of an edge from the depth of the last sweep to the depth itself, whose square is left out
-)
+KEPT, PER_CELL = 2**20, 1 / 8  # places of patches kept at once, 16 bytes each, and those that a case has room for
+MOVED = 1e-3  # of a cell: a step of an edge from the lattice depth to the depth itself, whose square is left out
 KNOWN, FEWEST = 2**21, 4  # cells whose barriers are kept, 16 bytes each, at least those of some Deborah numbers
 NEWTON_STEPS = 60
 NEARLY = 1e-6  # of the load: what the last step of Newton may still find missing, whose square is left out
@@ -141,31 +139,41 @@ def ends_on(line: PreparedLine, loads: FloatArray, deborah: FloatArray, near: En
     near : Ends, optional
         On another grid, where the searches for the depth begin; the answer does not depend on it.
     """
-    guesses = None if near is None else near.depth.ravel()
-    cells, numbers = line.cells, deborah.ravel()
-    touching = touching_for(numbers.size, min(numbers.size * (int(line.track.cells) // 8 + 2), KEPT))
-    steady = steady_on_cells(cells, line.blocks, numbers, np.repeat(loads, 2), guesses, 0.0, line.barriers, touching)
+    guesses = np.full(deborah.shape, np.nan) if near is None else near.depth
+    room = int(PER_CELL * line.track.cells) + 2
+    together = max(KEPT // (2 * room), 1)
+    parts = [
+        _ends(line, loads[some], deborah[some], guesses[some], room)
+        for some in (slice(k, k + together) for k in range(0, max(loads.size, 1), together))
+    ]
+    columns: list[Any] = [np.concatenate(column) for column in zip(*parts, strict=True)]
+    return Ends(*columns)
+
+
+def _ends(line: PreparedLine, loads: FloatArray, deborah: FloatArray, guesses: FloatArray, room: int) -> Ends:
+    """Solve the ends of a few jumps, with room for so many patches of each."""
+    cells, n, sums, touching = line.cells, line.track.cells, np.empty(SWEEP_SUMS), touching_for(deborah.size, room)
+    steady = steady_on_cells(
+        cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses.ravel(), 0.0, line.barriers, touching
+    )
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
     at, rate, tilt = np.full((3, loads.size), np.nan)
     first, slower = np.full((2, loads.size), None, dtype=object)
-    good = np.flatnonzero(outcome == Outcome.CONVERGED)
-    if good.size:
-        n, sums = line.track.cells, np.empty(SWEEP_SUMS)
-        for k in good:
-            speeds, both = deborah[k] * n, []
-            for end, speed in enumerate(speeds):
-                # at the depth itself: the search for it ends nearby, where other cells may be in contact as a whole
-                sinking = float(depth[k, end] + cells.top)
-                patches = line.patches_near(touching, 2 * int(k) + end, sinking, speed)
-                if patches is None:
-                    patches = line.patches(sinking, speed, sums)
-                    drag[k, end] = sums[SWEEP_DRAG]
-                both.append(patches)
-            first[k], slower[k] = both[0], both[int(np.argmin(speeds))]
-            at[k], rate[k], tilt[k], outcome[k] = _release(
-                line.track, first[k], line.barriers(speeds[1]), speeds[1], loads[k] * n
-            )
+    for k in np.flatnonzero(outcome == Outcome.CONVERGED):
+        speeds, both = deborah[k] * n, []
+        for end, speed in enumerate(speeds):
+            # at the depth itself: the lattice depth is near it, where other cells may be in contact as a whole
+            sinking = float(depth[k, end] + cells.top)
+            patches = line.patches_near(touching, 2 * int(k) + end, sinking, speed)
+            if patches is None:
+                patches = line.patches(sinking, speed, sums)
+                drag[k, end] = sums[SWEEP_DRAG]
+            both.append(patches)
+        first[k], slower[k] = both[0], both[int(np.argmin(speeds))]
+        at[k], rate[k], tilt[k], outcome[k] = _release(
+            line.track, first[k], line.barriers(speeds[1]), speeds[1], loads[k] * n
+        )
     return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, first, slower, outcome)
 
 

@@ -56,14 +56,27 @@ def test_patches_that_find_no_room_are_swept_anew():
     assert line.patches_near(touching, 0, state.depth[0] + line.cells.top, 0.01 * line.track.cells) is None
 
 
-def test_ends_do_not_depend_on_the_room_for_patches(monkeypatch):
-    """A search keeps patches as long as there is room: the others are found by a sweep of their own."""
-    line = rough()
-    kept = ends_on(line, LOADS, DEBORAH)
-    monkeypatch.setattr(ends, "KEPT", 60)
-    swept = ends_on(line, LOADS, DEBORAH)
-    for name in ("before", "at", "after", "rate"):
-        np.testing.assert_allclose(getattr(swept, name), getattr(kept, name), rtol=1e-9)
+def bits(found):
+    patches = [np.concatenate([each.start, each.end, each.pressed]) for each in (*found.first, *found.slower)]
+    return [*(column for column in found[:7]), *patches]
+
+
+@pytest.mark.parametrize("room", [1 / 8, 1 / 40, 0.0])
+def test_ends_of_a_case_are_the_same_bits_whatever_is_solved_beside_it_and_wherever_a_search_begins(room, monkeypatch):
+    """With room for the patches of all cases, of some, and of none."""
+    monkeypatch.setattr(ends, "PER_CELL", room)
+    monkeypatch.setattr(ends, "KEPT", 10_000)
+    line, random = rough(), np.random.default_rng(3)
+    loads, deborah = np.exp(random.uniform(-5, 1.5, 40)), np.exp(random.uniform(-9, 0, (40, 2)))
+    together = ends_on(line, loads, deborah)
+    for k in range(loads.size):
+        alone = ends_on(line, loads[k : k + 1], deborah[k : k + 1])
+        near = alone._replace(depth=alone.depth * random.uniform(0.7, 1.4, (1, 2)))
+        again = ends_on(line, loads[k : k + 1], deborah[k : k + 1], near)
+        for one, other in zip(bits(together.only(np.array([k]))), bits(alone), strict=True):
+            np.testing.assert_array_equal(one, other)
+        for one, other in zip(bits(again), bits(alone), strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def moved(line, deborah, depth, start, end):
