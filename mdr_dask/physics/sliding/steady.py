@@ -140,10 +140,21 @@ class Touching(NamedTuple):
     first: IntArray
     patches: IntArray
 
-    @property
-    def room(self) -> int:
-        """Most patches of a case that are kept: whether they are does not depend on the others."""
-        return int(self.places.leaves.size // max(self.first.size, 1))
+
+class Kept(NamedTuple):
+    """What others keep of a line: the barriers of a Deborah number in cells, and what touches."""
+
+    barriers_at: Callable[[float], Barriers]
+    touching: Touching
+
+
+class _Found(NamedTuple):
+    """What is found of some cases: columns of results, status, patches, and the rows of these."""
+
+    results: FloatArray
+    status: NDArray[np.int8]
+    touching: Touching
+    rows: IntArray
 
 
 def touching_for(cases: int, patches: int) -> Touching:
@@ -208,11 +219,7 @@ def _states(
     guesses: FloatArray,
     close: float,
     first: FloatArray,
-    results: FloatArray,
-    status: NDArray[np.int8],
-    touching: Touching,
-    room: int,
-    rows: IntArray,
+    found: _Found,
     used: int,
 ) -> int:
     """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
@@ -225,7 +232,9 @@ def _states(
     ``close``, relatively, that is taken for the answer.
     """
     (cells, blocks, barriers, _), (deborahs, loads) = line, cases
+    results, status, touching, rows = found
     n, (touches, leaves) = cells.mean.size - 1, touching.places
+    room = leaves.size // max(touching.first.size, 1)  # of each case: what is kept does not depend on the others
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
     for k in range(loads.size):
@@ -311,21 +320,19 @@ def steady_on_cells(
     loads: FloatArray,
     guesses: FloatArray | None = None,
     close: float = 0.0,
-    barriers_at: Callable[[float], Barriers] | None = None,
-    touching: Touching | None = None,
+    kept: Kept | None = None,
 ) -> Steady:
     """Return what :func:`steady_sliding` does, on a line that is cut into its cells and blocks already.
 
-    Where others have use for the barriers of a Deborah number in cells, they are taken from where they are kept, and
-    what touches is written down.
+    Where others have use for the barriers, they are taken from where they are kept, and what touches is written down.
     """
     start = np.full(loads.size, np.nan) if guesses is None else guesses
-    at, kept = barriers_at or _unknown_barriers(cells.mean.size - 1), touching or touching_for(loads.size, 0)
+    keeps = kept or Kept(_unknown_barriers(cells.mean.size - 1), touching_for(loads.size, 0))
     return _solved(
         cells,
         deborah,
         loads,
-        lambda good, cases: _swept(cells, blocks, at, cases, start[good], close, kept, np.flatnonzero(good)),
+        lambda good, cases: _swept(cells, blocks, cases, start[good], close, keeps, np.flatnonzero(good)),
     )
 
 
@@ -375,11 +382,10 @@ def _solved(
 def _swept(
     cells: Cells,
     blocks: Blocks,
-    barriers_at: Callable[[float], Barriers],
     cases: Cases,
     guesses: FloatArray,
     close: float,
-    touching: Touching,
+    kept: Kept,
     rows: IntArray,
 ) -> tuple[FloatArray, NDArray[np.int8]]:
     """Solve by sweeps over cells; Deborah numbers in cells, loads over 4 G dx."""
@@ -396,26 +402,15 @@ def _swept(
     outlined, beyond, used = first[0], 0.0, 0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
-        alike, near = Cases(deborah[some], loads[some]), barriers_at(float(deborah[some.start]))
+        alike, near = Cases(deborah[some], loads[some]), kept.barriers_at(float(deborah[some.start]))
         speed, load = deborah[some.start], loads[some.start]
         outlines = blocks.peak.size > 0 and speed > OUTLINED_FROM and not starts[some.start] > 0
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
             first[:3] = outlined + beyond, np.log(load), slope
         line = _Swept(cells, blocks, near, mean)
-        used = _states(
-            line,
-            alike,
-            starts[some],
-            close,
-            first,
-            ordered[some],
-            ordered_status[some],
-            touching,
-            touching.room,
-            rows[order[some]],
-            used,
-        )
+        found = _Found(ordered[some], ordered_status[some], kept.touching, rows[order[some]])
+        used = _states(line, alike, starts[some], close, first, found, used)
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)

@@ -13,7 +13,7 @@ from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
 from mdr_dask.physics.sliding.kelvin import Barriers, Blocks, barriers_for, blocks_of, patches_at
-from mdr_dask.physics.sliding.steady import Touching, steady_on_cells, touching_for
+from mdr_dask.physics.sliding.steady import Kept, Touching, steady_on_cells, touching_for
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
 from mdr_dask.physics.transients.patches import (
     DRAG,
@@ -154,7 +154,7 @@ def _ends(line: PreparedLine, loads: FloatArray, deborah: FloatArray, guesses: F
     """Solve the ends of a few jumps, with room for so many patches of each."""
     cells, n, sums, touching = line.cells, line.track.cells, np.empty(SWEEP_SUMS), touching_for(deborah.size, room)
     steady = steady_on_cells(
-        cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses.ravel(), 0.0, line.barriers, touching
+        cells, line.blocks, deborah.ravel(), np.repeat(loads, 2), guesses.ravel(), 0.0, Kept(line.barriers, touching)
     )
     drag, depth, contact = (column.reshape(-1, 2) for column in (steady.drag, steady.depth, steady.contact_fraction))
     outcome = steady.status.reshape(-1, 2).max(axis=1)
