@@ -46,7 +46,7 @@ SILENCE = 60.0
 #: How often claims are listed again when the last one is gone before it is read.
 LISTINGS = 10
 #: What a file system without locks answers.
-NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP)
+NO_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP}
 
 log = logging.getLogger("mdr_dask.store")
 

@@ -139,8 +139,7 @@ class _Group:
 
     def _sentences(self, found: _Found) -> Iterator[tuple[int, str]]:
         """Yield why a case failed, or which outputs miss the accuracy and by how much."""
-        known = [name for name in self.outputs if not np.isnan(found.errors[name]).all()]
-        shares = {name: self._shares(found, name) for name in known}
+        shares = {name: self._shares(found, name) for name in self.outputs}
         accuracy = self.block.accuracy or ACCURACY
         for k, outcome in enumerate(found.outcome):
             if outcome != Outcome.CONVERGED:

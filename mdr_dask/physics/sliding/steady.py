@@ -30,7 +30,6 @@ from mdr_dask.physics.sliding.kelvin import (
     Places,
     barriers_for,
     blocks_of,
-    places_for,
     sweep_cells,
 )
 from mdr_dask.physics.surfaces.cubic_line import Cells, CubicLine, cut
@@ -41,7 +40,6 @@ OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the 
 OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
 SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
 TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
-UNKNOWN = -1  # number of patches whose places are not at hand
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
@@ -126,18 +124,18 @@ class _Swept(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Where the patches of cases begin and end at the lattice depths that were found, one case after the other.
+    """Where the patches of cases begin and end at the lattice depths that were found.
 
     Parameters
     ----------
-    places : Places
-        With room for so many of every case.
-    first, patches : int array, shape (cases,)
-        First patch of every case, and their number; `UNKNOWN` where they are more than there is room for.
+    start, end : array, shape (cases, room)
+        The first patches of every case, as many as there is room for: that does not depend on the other cases.
+    patches : int array, shape (cases,)
+        Number of patches of every case, of those without room too; 0 where no depth was found.
     """
 
-    places: Places
-    first: IntArray
+    start: FloatArray
+    end: FloatArray
     patches: IntArray
 
 
@@ -157,9 +155,9 @@ class _Found(NamedTuple):
     rows: IntArray
 
 
-def touching_for(cases: int, patches: int) -> Touching:
-    """Return room for the patches of some cases, so many for each of them."""
-    return Touching(places_for(cases * patches), np.zeros(cases, np.int64), np.full(cases, UNKNOWN))
+def touching_for(cases: int, room: int) -> Touching:
+    """Return room for so many patches of each of some cases."""
+    return Touching(np.empty((cases, room)), np.empty((cases, room)), np.zeros(cases, np.int64))
 
 
 @kernel
@@ -220,26 +218,20 @@ def _states(
     close: float,
     first: FloatArray,
     found: _Found,
-    used: int,
-) -> int:
+) -> None:
     """Solve cases of one line and Deborah number, ordered by load; see `Steady` for the columns of the results.
-
-    Their patches, as there is room for, are written to the rows of `touching`, of whose places so many are used; return
-    how many then are.
 
     The search for a depth follows that of the case before, that of the first one the trail given, which is then its
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
     (cells, blocks, barriers, _), (deborahs, loads) = line, cases
-    results, status, touching, rows = found
-    n, (touches, leaves) = cells.mean.size - 1, touching.places
-    room = leaves.size // max(touching.first.size, 1)  # of each case: what is kept does not depend on the others
+    n, (results, status, touching, rows) = cells.mean.size - 1, found
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
     for k in range(loads.size):
         deborah, depth, patches = deborahs[k], guesses[k], 0
-        places = Places(touches[used : used + room], leaves[used : used + room])
+        places = Places(touching.start[rows[k]], touching.end[rows[k]])
         if guesses[k] > 0:
             _begin(trail, guesses[k], loads[k])
             if close > 0:
@@ -252,9 +244,7 @@ def _states(
             status[k] = Outcome.DEPTH_NOT_FOUND
             copy_into(trail, first)
             continue
-        if 0 < patches <= room:
-            touching.first[rows[k]], touching.patches[rows[k]] = used, patches
-            used += patches
+        touching.patches[rows[k]] = patches
         if starts:
             copy_into(first, trail)
             starts = False
@@ -267,7 +257,6 @@ def _states(
         # drag is force times slope
         if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
             status[k] = Outcome.DEPTH_NOT_FOUND
-    return used
 
 
 def steady_sliding(
@@ -399,7 +388,7 @@ def _swept(
     )
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
     _begin(first, loads[0] / n - mean, loads[0])
-    outlined, beyond, used = first[0], 0.0, 0
+    outlined, beyond = first[0], 0.0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
     for some in (slice(*ends) for ends in pairwise(edges)):
         alike, near = Cases(deborah[some], loads[some]), kept.barriers_at(float(deborah[some.start]))
@@ -410,7 +399,7 @@ def _swept(
             first[:3] = outlined + beyond, np.log(load), slope
         line = _Swept(cells, blocks, near, mean)
         found = _Found(ordered[some], ordered_status[some], kept.touching, rows[order[some]])
-        used = _states(line, alike, starts[some], close, first, found, used)
+        _states(line, alike, starts[some], close, first, found)
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)

@@ -61,19 +61,17 @@ class PreparedLine(NamedTuple):
         """Return what touches in steady sliding at a depth of the highest point; write the sums of the sweep."""
         barriers = self.barriers(deborah)
         start, end = patches_at(self.cells, self.blocks, barriers, deborah, depth, sums)
-        pressed = _pressed(self.track, end, depth)
-        return Patches(start, end, pressed, start.size, depth, deborah, np.zeros(1, np.int64))
+        return Patches(start, end, _pressed(self.track, end, depth), start.size, depth, deborah, np.zeros(1, np.int64))
 
     def patches_near(self, touching: Touching, row: int, depth: float, deborah: float) -> Patches | None:
         """Return what touches in steady sliding, from what touched close to the depth; None if that is not enough."""
-        first, count = touching.first[row], touching.patches[row]
-        if count < 0:
+        count = touching.patches[row]
+        if count > touching.end.shape[1]:
             return None
-        start, end = (places[first : first + count].copy() for places in touching.places)
-        pressed = np.empty(count)
+        start, end, pressed = touching.start[row, :count].copy(), touching.end[row, :count].copy(), np.empty(count)
         if not _moved(self.track, deborah, depth, start, end, pressed):
             return None
-        return Patches(start, end, pressed, int(count), depth, deborah, np.zeros(1, np.int64))
+        return Patches(start, end, pressed, start.size, depth, deborah, np.zeros(1, np.int64))
 
 
 class Ends(NamedTuple):

@@ -260,7 +260,7 @@ class _Relaxation(NamedTuple):
             depth + line.cells.top,
             ends.first[k],
             ends.slower[k],
-            bool(min(ends.contact[k]) >= WHOLE),
+            bool(np.all(ends.contact[k] >= WHOLE)),
             asked,
             pace_after(asked, deborah, float(depth[1] - depth[0]), float(load)),
         )
@@ -322,7 +322,7 @@ class _Relaxation(NamedTuple):
         if outcome == LEFT_LIMITS:
             return None
         time, _, depth, rate, drag, drag_rate = (column[:count] for column in found)
-        near = max(SETTINGS.stray * (drag.max() - drag.min()), SETTINGS.leap * self.after)
+        near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)

@@ -193,7 +193,7 @@ def fretted_resolution(stick_radius: float, accuracy: float) -> Resolution:
 def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Resolution) -> dict[float, Worn]:
     """Solve fretting at constant depth once and describe every wanted time."""
     reach = limit_radius(profile, c)
-    coarser = float(np.clip(COARSER_UNTIL / resolution.accuracy, 1.0, COARSER))
+    coarser = min(max(COARSER_UNTIL / resolution.accuracy, 1.0), COARSER)
     panels = resolution.panels(round(-2.0 * np.log2(c)), coarser=coarser)
     problem = partial_slip(profile, c, panels, 1.05 * reach if np.isinf(profile.largest_radius) else reach)
     dense = Dense(march(problem, max(wanted), resolution.step, resolution.first * np.sqrt(problem.virgin_width)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mdr_dask.physics.sliding.kelvin import DRAG, SUMS
-from mdr_dask.physics.sliding.steady import UNKNOWN, Kept, steady_on_cells, touching_for
+from mdr_dask.physics.sliding.steady import Kept, steady_on_cells, touching_for
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
 from mdr_dask.physics.transients import ends
@@ -52,7 +52,7 @@ def test_patches_that_find_no_room_are_swept_anew():
     line, loads = rough(), np.array([0.3, 0.31])
     numbers, touching = np.full(2, 0.01), touching_for(2, 1)
     state = steady_on_cells(line.cells, line.blocks, numbers, loads, kept=Kept(line.barriers, touching))
-    assert touching.patches.tolist() == [UNKNOWN, UNKNOWN]
+    assert np.all(touching.patches > 1)
     assert line.patches_near(touching, 0, state.depth[0] + line.cells.top, 0.01 * line.track.cells) is None
 
 
