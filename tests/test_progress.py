@@ -4,6 +4,7 @@ import re
 import sys
 import time
 from contextlib import contextmanager
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 from typing import NamedTuple
 
@@ -201,6 +202,19 @@ def test_every_kind_of_result_counts_once():
     twice = once.after(outcome, 3.0)
     assert twice.warned == 12
     assert (twice.not_needed, twice.to_do, twice.finished, twice.wall_seconds) == (14, 86, 3.0, 3.0)
+
+
+def test_what_is_left_at_the_end_of_a_round_is_nothing(toy, url):
+    """What a run is to take grows by every round, by as much as its blocks then are."""
+    reported = []
+    more = toy.Replication(10, 20, {"height": toy.Tolerance(absolute=1.0)})
+    study = toy.campaign(toy.axis("position", [1.0, 100.0]), realisations=more)
+    study = replace(study, blocks={"realisation": 10})
+    progress = execute.run(study, url, execute.Resources(), reported.append)
+    rounds = list(dict.fromkeys(each.estimated for each in reported))
+    assert len(rounds) > 1
+    assert rounds == sorted(rounds)
+    assert progress.finished == pytest.approx(progress.estimated)
 
 
 def test_a_run_tells_how_long_it_took(toy, url):

@@ -81,3 +81,8 @@ def test_too_little_is_said() -> None:
         film_exponents({"": power_law(GRID[0][:1], GRID[1][:2], GRID[2][:1])})
     with pytest.raises(FitError, match="expected a series with central_film or minimum_film"):
         film_exponents({"": xr.Dataset()})
+
+
+def test_one_point_more_than_constants_is_enough() -> None:
+    fit = film_exponents({"": power_law(GRID[0][:1], GRID[1][:3], GRID[2][:1])})
+    assert float(fit["central_speed"][0]) == pytest.approx(0.692, rel=1e-9)

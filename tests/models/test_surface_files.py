@@ -47,6 +47,8 @@ def test_every_dialect_of_a_map_is_the_same_map(tmp_path):
     size = LENGTH * 1e3, LENGTH * 1e3
     topography.Topography(HEIGHT * 1e3, size, unit="mm").to_netcdf(str(tmp_path / "map.nc"))
     found.append(surface(tmp_path, map={"files": ["map.nc"], "window": "none"}))
+    topography.Topography(HEIGHT * 1e3, size).to_netcdf(str(tmp_path / "bare.nc"))
+    found.append(surface(tmp_path, map={"files": ["bare.nc"], "unit": "mm", "window": "none"}))
     for one in found:
         heights = read_map(one.map.files[0], one.map)
         np.testing.assert_allclose(heights.height, HEIGHT, atol=1e-14)

@@ -407,6 +407,23 @@ def test_bars_are_intervals_of_scatter_and_grid(stores):
     assert np.all(half > aggregation.standard_error(data["friction_coefficient"]))
 
 
+def test_bars_are_said_to_mean_what_a_series_has(stores):
+    data = next(iter(stores("velocity").values()))
+    without_errors = data.drop_vars([name for name in data.data_vars if str(name).endswith("_error")])
+    one = data.isel(realisation=0)
+    for groups, said in (
+        ([data], "bars: 95 % intervals, scatter of up to 4 realisations and error of the grid"),
+        ([one, data.isel(realisation=slice(2))], "bars: 95 % intervals, scatter of up to 2 realisations and error"),
+        ([one], "bars: 95 % intervals, error of the grid"),
+        ([without_errors], "bars: 95 % intervals, scatter of up to 4 realisations"),
+        ([without_errors.isel(realisation=0)], "one realisation: no bars"),
+        ([without_errors.isel(realisation=[0])], "one realisation: no bars"),
+    ):
+        assert curves.meaning_of_bars(*groups, outputs=["friction_coefficient"]).startswith(said)
+    assert curves.meaning_of_bars(outputs=["friction_coefficient"]) == "one realisation: no bars"
+    assert curves.meaning_of_bars(without_errors, outputs=[]).endswith("4 realisations")
+
+
 SAMPLED = [shape for shape, (text, _, _) in TABLE.items() if LHS in text and "series" not in text]
 
 

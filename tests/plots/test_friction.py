@@ -4,7 +4,7 @@ from friction_store import store
 
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.plots.friction import PLOTS
-from mdr_dask.plots.style import DATA
+from mdr_dask.plots.style import DATA, left_out
 
 DRAW = {plot.name: plot.draw for plot in PLOTS}
 PLANE = ("regions", "velocity", "force", "zone_one", "plateau")
@@ -43,6 +43,13 @@ def test_a_figure_is_labelled_and_drawn(name, forces, tmp_path):
 
 def test_the_figure_of_indenters_is_labelled_and_drawn(cone, tmp_path):
     check(DRAW["indenter"]({"cone": cone}), tmp_path)
+
+
+def test_the_figure_of_indenters_names_the_series_that_are_none(cone, forces):
+    figure = DRAW["indenter"]({"cone": cone, "plane": forces})
+    told = left_out(figure).replace("\n", " ")
+    assert "plane: expected a store with an indenter" in told
+    assert told.count("expected") == 1
 
 
 def test_curves_hold_the_mean_over_realisations(forces):

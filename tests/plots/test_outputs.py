@@ -26,6 +26,7 @@ STUDIES = {
         "  hurst: {linear: [0.2, 0.8]}\nsampling: {latin_hypercube: 32}\n",
         {"failed": True},
     ),
+    "cone": (planted.SLIDING + V + F + "  hurst: 0.7\n  indenter: {shape: cone, angle: 10 deg}\n", {}),
     "jump": (planted.JUMP + V + "  hurst: 0.6\n  velocity_change: [-0.2, 0.2]\n  normal_force: 1 N\n", {}),
     "rollers": (
         planted.ROLLERS + "  normal_force: [200 N, 800 N]\n  rotation_speed: {geometric: [10 rpm, 1000 rpm, 4]}\n"
@@ -73,8 +74,11 @@ LINES = [
     ("sampled", MU, "velocity", {"by": "hurst"}),
     ("jump", MU, "relaxation_times", {"by": "velocity"}),
     ("jump", "friction_coefficient_jump", "velocity", {}),
+    ("jump", "friction_coefficient_before", "velocity", {}),
+    ("cone", MU, "velocity", {"by": "normal_force"}),
     ("rollers", "film_ratio", "rotation_speed", {"panels": "temperature"}),
     ("film", "central_film", "speed_parameter", {}),
+    ("film", "minimum_film", "load_parameter", {"by": "speed_parameter"}),
     ("film", "pressure", "position", {"by": "speed_parameter"}),
     ("wear", "wear_volume", "cycles", {"by": planted.RULE}),
     ("wear", "wear_volume", planted.RULE, {}),

@@ -197,3 +197,13 @@ def test_an_error_beside_a_mean_of_zero_is_no_percentage(url):
     (row,) = [row for row in errors.rows if row[0] == "friction_coefficient"]
     assert row[1] == row[2] == row[4] == "over 100 %"
     assert "Over 100 %: the mean is zero within its error" in errors.note
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [(0.5, 1.5, "1 (0.5, 1.5)"), (np.nan, 1.5, "1"), (0.5, np.nan, "1"), (0.5, None, "1"), (None, None, "1")],
+)
+def test_an_interval_stands_beside_a_constant_where_both_of_its_ends_are_known(low, high, said):
+    ends = {"rate": 1.0, "rate_low": low, "rate_high": high}
+    columns = {name: xr.DataArray([value, value]) for name, value in ends.items() if value is not None}
+    assert study_room._interval(columns, "rate", {"dim_0": 1}) == said
