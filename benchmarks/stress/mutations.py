@@ -2,13 +2,15 @@
 
 A mutant is one random change: an operator, a comparison, a condition, a constant, a sign, two arguments in each other's
 place, a statement left out. Rooms are drawn by their lines, kinds of changes evenly. The suite runs once under coverage
-in a copy of the checkout. Then each mutant stands there and meets the tests that execute its line. What is found is
-appended to FILE, a line of JSON each; a run that is broken off goes on where it was.
+in a copy of the checkout. Then each mutant stands there and meets the tests that execute its line, in a fork of this
+process that has the libraries already. What is found is appended to FILE, a line of JSON each; a run that is broken off
+goes on where it was.
 """
 
 from __future__ import annotations
 
 import ast
+import importlib
 import json
 import math
 import os
@@ -22,18 +24,21 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
 from coverage import CoverageData
 
 ROOT = Path(__file__).parents[2]
-#: Seconds that the tests take which a mutant meets, and processor time that they have.
-SECONDS, LIMIT = 60.0, 200
-PYTEST = [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+#: Seconds that the tests take which a mutant meets; processor time and time that they have.
+SECONDS, LIMIT, PATIENCE = 60.0, 200, 400
+QUIETLY = ["-q", "-p", "no:cacheprovider"]
+#: What takes longest to import of what tests need.
+LIBRARIES = ("distributed", "hypothesis", "matplotlib.pyplot", "numba", "pydantic", "scipy.stats", "xarray", "zarr")
 #: Decorators of functions that are compiled; a test that runs one in Python says little of it.
 KERNELS = {"kernel", "compiled", "spliced", "nested", "inlined", "fused"}
 PHASE = re.compile(r"\|(setup|run|teardown)$")
@@ -41,7 +46,6 @@ PHASE = re.compile(r"\|(setup|run|teardown)$")
 APART = re.compile(r"test_(habits|docs|api|slurm|buckets|watched_clusters|thesis|notebooks|memory)\.py")
 
 Change = tuple[str, int, int, str]
-Done = subprocess.CompletedProcess[str]
 
 ARITHMETIC = {ast.Add: "+-", ast.Sub: "-+", ast.Mult: "*/", ast.Div: "/*"}
 COMPARISONS = {
@@ -294,10 +298,12 @@ def _union(sets: Iterable[Iterable[str]]) -> set[str]:
 
 def _measured(checkout: Checkout, kept: Path) -> dict[str, float]:
     """Run the suite under coverage; return the seconds of every test that passed."""
-    command = [*PYTEST, "--numprocesses=auto", "-m", "not slow", "--durations=0", "--durations-min=0", "--tb=no"]
-    command += ["--cov=mdr_dask", "--cov-context=test", "--cov-report=", "tests"]
+    command = [sys.executable, "-P", "-m", "pytest", *QUIETLY, "--numprocesses=auto", "-m", "not slow", "--tb=no"]
+    command += ["--durations=0", "--durations-min=0", "--cov=mdr_dask", "--cov-context=test", "--cov-report=", "tests"]
     command += [f"--ignore={path}" for path in checkout.root.rglob("test_*.py") if APART.search(path.name)]
-    told = _run(checkout, command, COVERAGE_FILE=str(kept)).stdout
+    environment = {**os.environ, "PYTHONPATH": str(checkout.root), "COVERAGE_FILE": str(kept)}
+    done = subprocess.run(command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False)
+    told = done.stdout
     seconds: dict[str, float] = defaultdict(float)
     for taken, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(\S.*)$", told, flags=re.M):
         seconds[test] += float(taken)
@@ -305,17 +311,27 @@ def _measured(checkout: Checkout, kept: Path) -> dict[str, float]:
     return {test: taken for test, taken in seconds.items() if test not in failed}
 
 
-def _run(checkout: Checkout, command: list[str], limit: int = resource.RLIM_INFINITY, **more: str) -> Done:
-    environment = {**os.environ, "PYTHONPATH": str(checkout.root), **more}
-    return subprocess.run(
-        command,
-        cwd=checkout.root,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
-    )
+def _forked(checkout: Checkout, tests: list[str]) -> tuple[int, str]:
+    """Run tests until the first fails, in a fork of this process; return how it ended, and what it said."""
+    with tempfile.TemporaryFile() as said:
+        child = os.fork()
+        if child == 0:
+            os.setsid()
+            os.dup2(said.fileno(), 1)
+            os.dup2(said.fileno(), 2)
+            os.chdir(checkout.root)
+            for name in [name for name in sys.modules if name.partition(".")[0] in ("benchmarks", "mdr_dask")]:
+                del sys.modules[name]
+            os.environ["PYTHONPATH"] = sys.path[0] = str(checkout.root)
+            resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
+            signal.alarm(PATIENCE)
+            late = "ignore::pytest.PytestAssertRewriteWarning"  # libraries with parts for tests are here already
+            os._exit(pytest.main([*QUIETLY, "-x", "-n0", "--tb=line", "-W", late, *tests]))
+        _, status = os.waitpid(child, 0)
+        with suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)
+        said.seek(0)
+        return os.waitstatus_to_exitcode(status), said.read().decode(errors="replace")
 
 
 def _name(path: Path, root: Path) -> str:
@@ -347,13 +363,12 @@ def judged(checkout: Checkout, mutant: Mutant, tests: list[str]) -> tuple[str, s
     """Run tests on a mutant in place; return the verdict, and the first that failed."""
     if not tests:
         return "lives", ""
-    command = [*PYTEST, "-x", "-n0", "--tb=line", *tests]
     with checkout.changed(mutant):
-        done = _run(checkout, command, LIMIT)
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", done.stdout, flags=re.M)
-    if done.returncode in (0, -signal.SIGXCPU, -signal.SIGKILL):
-        return "lives" if done.returncode == 0 else "time is up", ""
-    return "killed", failed[1] if failed else done.stdout[-200:]
+        ended, said = _forked(checkout, tests)
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", said, flags=re.M)
+    if ended <= 0:
+        return "time is up" if ended else "lives", ""
+    return "killed", failed[1] if failed else said[-200:]
 
 
 def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> None:
@@ -365,6 +380,8 @@ def main(number: str = "20", seed: str = "1", file: str = "mutations.jsonl") -> 
             copy(ROOT / part, Path(folder, part))
         checkout = Checkout(Path(folder))
         suite = Suite(checkout, log.with_suffix(".coverage"))
+        for library in LIBRARIES:
+            importlib.import_module(library)
         for mutant in drawn(checkout, int(number), int(seed))[there:]:
             source = Source(mutant.module, checkout.modules[mutant.module])
             verdict, test = judged(checkout, mutant, suite.chosen(mutant.module, source.lines(mutant)))

@@ -89,15 +89,16 @@ def _panel(axes: Axes) -> Json:
 
 
 def _axis(axis: Axis, limits: tuple[float, float]) -> Json:
-    from matplotlib.ticker import FixedFormatter, FixedLocator
+    from matplotlib.ticker import FixedLocator
 
     label = axis.get_label_text().replace("\n", " ")
     found: Json = {"label": markup(label), "spoken": plain(label), "log": axis.get_scale() == "log"}
     if limits[0] > limits[1]:
         found["reversed"] = True
-    form, places = axis.get_major_formatter(), axis.get_major_locator()
-    if isinstance(form, FixedFormatter) and isinstance(places, FixedLocator):
-        found["ticks"] = [[float(at), markup(text)] for at, text in zip(places(), form.seq, strict=False)]
+    if isinstance(axis.get_major_locator(), FixedLocator) and axis.get_scale() == "linear":
+        places = axis.get_majorticklocs().tolist()
+        texts = axis.get_major_formatter().format_ticks(places)
+        found["ticks"] = [[place, markup(text)] for place, text in zip(places, texts, strict=True)]
     return found
 
 

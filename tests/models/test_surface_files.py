@@ -71,6 +71,24 @@ def test_scans_of_a_surface_give_its_spectrum_and_not_their_own(tmp_path):
     assert own < 0.8 * np.mean(gradients)
 
 
+def test_what_is_told_to_be_noise_begins_where_roughness_ends(tmp_path):
+    """Roughness of a map ends at a 64th of its length, that of a scan at a 128th; white noise goes on."""
+    generator = np.random.default_rng(1)
+    np.save(tmp_path / "map.npy", HEIGHT + 1e-7 * generator.standard_normal(HEIGHT.shape))
+    wide = self_affine(0.7, LENGTH / 8, LENGTH / 128, 1e-6)
+    line = areal_surface(wide, (16, 4096), (LENGTH / 16, LENGTH), 1, 0)[0] + 5e-8 * generator.standard_normal(4096)
+    place = np.arange(4096) * LENGTH / 4096
+    rows = "\n".join(f"{x * 1e3:.9g},{1e6 * z:.9g}" for x, z in zip(place, line, strict=True))
+    (tmp_path / "line.csv").write_text("x [mm],z [um]\n" + rows)
+    of_map = surface(tmp_path, map={"files": ["map.npy"], "spacing": LENGTH / POINTS, "unit": "m"})
+    of_scan = surface(tmp_path, scan={"files": ["line.csv"]})
+    for one, (found,), ends in ((of_map, of_map.map.found(), 64), (of_scan, of_scan.scan.found(), 128)):
+        (spectrum,) = spectra_of(one)
+        assert spectrum.wavenumber[-1] * found.resolution == pytest.approx(2 * np.pi)
+        assert 0.8 < LENGTH / found.resolution / ends < 1.2
+        assert one.notes()[-1].endswith(f"waves shorter than {1e6 * found.resolution:.4g} um are noise, left out")
+
+
 def test_noise_outliers_and_missing_points_are_told(tmp_path):
     generator = np.random.default_rng(1)
     noisy = HEIGHT + 1e-7 * generator.standard_normal(HEIGHT.shape)

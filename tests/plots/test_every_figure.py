@@ -101,6 +101,13 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         {},
         JUMPS,
     ),
+    "jumps: series, one of them an example": (
+        planted.JUMP + "  normal_force: 1 N\n"
+        "series:\n  many: {velocity: {geometric: [0.01 mm/s, 1 m/s, 9]}, hurst: [0.3, 0.7]}\n"
+        "  example: {velocity: 0.01 m/s, velocity_change: [-0.3, -0.2, 0.1, 0.2, 0.4]}\n",
+        {},
+        JUMPS,
+    ),
     "jumps: one case": (
         planted.JUMP + "  velocity: 0.05 m/s\n  normal_force: 1 N\n",
         {},
@@ -199,6 +206,18 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
         planted.FRETTING + RULES + FRETTING + "  amplitude: [0.5 um, 1 um]\n",
         {},
         SHAPES,
+    ),
+    "wear: gross slip": (
+        planted.FRETTING + "  wear_rule: exact\n  path: {linear: [0, 40, 5]}\n  hold: [depth, force]\n",
+        {},
+        {"wear_growth", "wear_profiles"},
+    ),
+    "wear: gross slip in units": (
+        planted.FRETTING + "  wear_rule: exact\n  path: {geometric: [1 m, 100 m, 3]}\n"
+        "  indenter: {shape: parabola, radius: 10 mm}\n  contact_modulus: 115 GPa\n  normal_force: 50 N\n"
+        "  hardness: 2 GPa\n  wear_coefficient: 1e-4\n",
+        {},
+        {"wear_growth", "wear_profiles"},
     ),
     "wear: latin hypercube": (
         planted.FRETTING + "  stick_radius: {linear: [0.1, 0.9]}\n  cycles: {geometric: [0.1, 10]}\n" + LHS,
@@ -388,6 +407,15 @@ def test_named_figures_take_units(shape, name, quantity, unit, column, factor, s
     moved = np.isclose(changed, factor, rtol=1e-9) | (usual[column] == 0)
     assert moved[usual["panel"] == 1].any()
     assert np.all(moved | np.isclose(changed, 1.0) | usual[column].isna())
+
+
+def test_worn_volumes_that_grow_by_a_factor_stand_on_a_logarithmic_axis(stores):
+    draw = available("fretting_wear")["wear_growth"].figure
+    for shape, scale in (("wear: units", "log"), ("wear: rules", "linear")):
+        groups = {
+            name: data.assign(wear_volume=data["wear_volume"] * data["cycles"]) for name, data in stores(shape).items()
+        }
+        assert {axes.get_yscale() for axes in draw(groups).axes} == {scale}
 
 
 def test_parameters_have_the_units_in_which_they_are_written(tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 from report_stores import HOSTILE, friction, hostile
 
 from mdr_dask import aggregation, fits, plots, store
@@ -197,6 +198,30 @@ def test_an_error_beside_a_mean_of_zero_is_no_percentage(url):
     (row,) = [row for row in errors.rows if row[0] == "friction_coefficient"]
     assert row[1] == row[2] == row[4] == "over 100 %"
     assert "Over 100 %: the mean is zero within its error" in errors.note
+
+
+def test_an_axis_of_a_page_is_turned_round_and_named_as_that_of_the_picture():
+    axes = Figure().subplots()
+    axes.set_ylim(2, -1)
+    axes.set_yticks([0.0, 1.0], ["$H$", "load & speed"])
+    axes.set(xscale="log", xlabel="time\n[s]")
+    assert figures._axis(axes.yaxis, axes.get_ylim()) == {
+        "label": "",
+        "spoken": "",
+        "log": False,
+        "reversed": True,
+        "ticks": [[0.0, "H"], [1.0, "load &amp; speed"]],
+    }
+    assert figures._axis(axes.xaxis, axes.get_xlim()) == {"label": "time [s]", "spoken": "time [s]", "log": True}
+
+
+def test_what_has_no_realisations_is_a_value_without_an_interval(url):
+    (data,) = store.datasets(url).values()
+    data = data.assign(volume=data["velocity"] * xr.ones_like(data["normal_force"]))
+    data["volume"].attrs = {"units": "m^3"}
+    assert list(cases._measured(data, "volume", data["volume"])) == ["value"]
+    value = cases._measured(data, "volume", data["volume"])["value"]
+    np.testing.assert_allclose(value, data["volume"].to_numpy().ravel(), rtol=DIGITS)
 
 
 @pytest.mark.parametrize(
