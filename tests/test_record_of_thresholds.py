@@ -17,14 +17,16 @@ def rooms():
 
 def test_thresholds_are_on_record(dataframe_regression):
     found = {
-        f"{room.__name__}.{name}": value
+        f"{room.__name__}.{name}": numbers
         for room in rooms()
         for name, value in vars(room).items()
-        if name.isupper() and _is_number(value)
+        if name.isupper() and (numbers := _numbers(value))
     }
     record.check(dataframe_regression, found)
 
 
-def _is_number(value):
-    parts = value if isinstance(value, tuple) else (value,)
-    return all(isinstance(part, int | float) and not isinstance(part, bool) for part in parts)
+def _numbers(value):
+    """Numbers alone, in their order, of a number or of several; none of anything else."""
+    several = value.values() if isinstance(value, dict) else value
+    parts = [*several] if isinstance(value, tuple | list | range | dict) else [value]
+    return parts if all(isinstance(part, int | float) and not isinstance(part, bool) for part in parts) else []

@@ -6,7 +6,7 @@ from pydantic import ValidationError
 
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.data_file import DataFile
-from mdr_dask.models.fretting_wear import MODEL
+from mdr_dask.models.fretting_wear import MODEL, solve
 from mdr_dask.models.fretting_wear.declaration import Cone, FrettingWear, LoadStep, Parabola, Power, Table
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.wear import rules as wear
@@ -218,6 +218,34 @@ def test_a_table_of_a_profile_may_have_its_columns_in_any_order_and_unit(tmp_pat
         found.append(table_case(named(path)).values["wear_volume"][0, 0])
     assert found[0] > 0
     assert found[1] == pytest.approx(found[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("problem", "status"), [(ValueError("no body"), Status.FAILED), (ArithmeticError("no end"), Status.NOT_CONVERGED)]
+)
+def test_a_contact_that_cannot_be_solved_says_why_and_leaves_the_others(problem, status, monkeypatch):
+    solved = solve._contacts
+
+    def contacts(task, *given):
+        if task.level > 0.3:  # the square of the radius of stick
+            raise problem
+        return solved(task, *given)
+
+    monkeypatch.setattr(solve, "_contacts", contacts)
+    columns = {"stick_radius": np.array([0.3, 0.6, 0.6]), "cycles": np.array([0.7, 0.7, 3.0])}
+    found = run(FrettingWear(stick_radius=0.3, wear_rule="exact"), columns)
+    assert found.status[:, 0].tolist() == [Status.DONE, status, status]
+    assert found.messages == {(1, 0): str(problem), (2, 0): str(problem)}
+    assert np.isfinite(found.values["wear_volume"][:, 0]).tolist() == [True, False, False]
+
+
+def test_a_block_of_gross_slip_alone_has_messages_and_no_solution():
+    columns = {"friction": np.full(3, 1e-3)}
+    for rule in ("fast", "limit", "exact"):
+        found = run(FrettingWear(**STEEL, wear_rule=rule), columns, ("wear_volume", "contact_radius"))
+        assert found.status[:, 0].tolist() == [Status.FAILED] * 3
+        assert len(found.messages) == 3
+        assert np.all(np.isnan(found.values["wear_volume"]))
 
 
 def test_contact_beyond_the_table(tmp_path):
