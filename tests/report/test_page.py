@@ -225,6 +225,19 @@ def test_what_has_no_realisations_is_a_value_without_an_interval(url):
 
 
 @pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (np.arange(1.0, 7.0), "1 m, 2 m, 3 m, 4 m, 5 m, 6 m"),
+        (np.arange(7.0, 0.0, -1.0), "1 m to 7 m"),
+        (list("abcdef"), "a, b, c, d, e, f"),
+        (list("abcdefg"), "a, b, c, d, e, f, ..."),
+    ],
+)
+def test_six_values_of_an_axis_are_listed_and_of_more_both_ends(values, said):
+    assert study_room._range(xr.DataArray(values, attrs={"units": "m"})) == said
+
+
+@pytest.mark.parametrize(
     ("low", "high", "said"),
     [(0.5, 1.5, "1 (0.5, 1.5)"), (np.nan, 1.5, "1"), (0.5, np.nan, "1"), (0.5, None, "1"), (None, None, "1")],
 )

@@ -325,3 +325,21 @@ def count_steps(monkeypatch):
 
     monkeypatch.setattr(evolution, "_try_step", counted)
     return tried
+
+
+@pytest.mark.parametrize(
+    ("exponent", "stick_radius", "cycles"),
+    [(6.0, 0.1, 30.0), (2.0, 0.1, 30.0), (1.0, 0.1, 30.0), (6.0, 0.5, 30.0), (6.0, 0.1, 0.3), (2.0, 0.455, 2.0)],
+)
+def test_the_volume_of_the_fast_rule_is_that_of_its_image_to_its_error(exponent, stick_radius, cycles):
+    """V = 4 int_c^a (g - g0) sqrt(a^2 - x^2) dx, on pieces that crowd at the borders."""
+    profile = PowerProfile(exponent)
+    contact = fast_forced(profile, stick_radius, cycles)
+    border, edge, crowd = contact.stick_border, contact.contact_radius, 0.5 ** np.arange(40)
+    ends = [(stick_radius, border), (border, stick_radius), (border, edge), (edge, border)]
+    cuts = np.unique(np.concatenate([begin + (end - begin) * crowd for begin, end in ends]))
+    abscissa, weight = gauss(40)
+    x = cuts[:-1, None] + np.diff(cuts)[:, None] * abscissa
+    worn_away = 4 * (contact.image(x.ravel()) - profile.image(x.ravel())) * np.sqrt((edge - x) * (edge + x)).ravel()
+    volume = worn_away @ (np.diff(cuts)[:, None] * weight).ravel()
+    assert contact.wear_volume == pytest.approx(volume, rel=contact.relative_error)
