@@ -270,3 +270,23 @@ measured: {table: rig.csv}
             loads(text.replace("calibration.slope", "calibration.position"), "rig.yaml", str(tmp_path)),
             str(tmp_path / "b"),
         )
+
+
+def _power(series):
+    """Return the power of the velocity that friction follows, whatever the force."""
+    data = series[""]
+    values = np.log(data.friction.transpose("realisation", "force", "velocity").to_numpy())
+    stack = bootstrap.means(values).mean(axis=-2) @ [-0.5, -0.5, 0.5, 0.5]
+    low, high = bootstrap.interval(stack, data.sizes["realisation"])
+    return xr.Dataset({"power": stack[0], "power_low": low, "power_high": high})
+
+
+def test_a_constant_that_compares_cases_follows_from_all_of_them():
+    """All velocities of a force moved by the same share leave a power as it was: some are moved up and some down."""
+    noise = np.random.default_rng(1).standard_normal(12)
+    friction = np.exp(np.add.outer(0.3 * np.arange(4.0), 0.02 * noise)) * np.ones((3, 1, 1))
+    dims = ("force", "velocity", "realisation")
+    data = xr.Dataset({"friction": (dims, friction), "status": (dims, np.ones(friction.shape, np.int8))})
+    law = Fit("law", (), "power of the velocity", _power, constants=("power",))
+    assert answers.cases_behind(law, "power", {"": data}, "", xr.DataArray(True)).all()
+    assert not answers.cases_behind(law, "power", {"": data}, "", xr.DataArray(False)).any()

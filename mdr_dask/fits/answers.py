@@ -199,13 +199,16 @@ def _over(dims: list[str], flags: xr.DataArray) -> xr.DataArray:
 
 
 def _steps(data: xr.Dataset, inner: list[str]) -> dict[str, xr.DataArray]:
-    """Return by how much the results of every case are moved, all of its realisations alike: some up, some down."""
+    """Return by how much the results of every case are moved, all of its realisations alike: some up, some down.
+
+    No two by the same: in sums and differences of cases moves of one size would cancel.
+    """
     generator, shape = np.random.Generator(np.random.Philox(0)), [data.sizes[dim] for dim in inner]
     found = {}
     for key in _results(data):
-        signs = generator.choice([-1.0, 1.0], shape)
+        size = generator.choice([-1.0, 1.0], shape) * generator.uniform(0.5, 1.5, shape)
         error = data[key].std("realisation", ddof=1) / data[key].notnull().sum("realisation") ** 0.5
-        found[key] = (STEP * xr.DataArray(signs, dims=inner) * error).drop_vars(error.coords).fillna(0.0)
+        found[key] = (STEP * xr.DataArray(size, dims=inner) * error).drop_vars(error.coords).fillna(0.0)
     return found
 
 
