@@ -297,3 +297,9 @@ def test_a_temporary_folder_goes_at_the_end_and_may_be_gone_before(monkeypatch):
     for _ in range(2):
         clear(*where, **how)
         assert not folder.exists()
+
+
+def test_rows_of_a_long_table_are_numbered_from_one_end_to_the_other(study, monkeypatch):
+    monkeypatch.setattr("mdr_dask.questions.table.ROWS", 3)
+    for limit, rows in ((0, 8), (5, 5)):
+        assert mdr_dask.table(study, limit=limit).index.tolist() == list(range(rows))
