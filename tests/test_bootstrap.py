@@ -127,3 +127,14 @@ def test_scatter_and_errors_that_reach_zero_leave_no_least_value_of_what_is_posi
     low, high = bootstrap.interval(np.concatenate([stack, [[1.0, 3.0], [1.0, -1.0]]]), 9, positive=True)
     assert (low[1], high[1]) == pytest.approx((0.0, 3.0))
     assert np.all(np.isnan(bootstrap.interval(-stack[:, 1:], 9, positive=True)))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_errors_that_reach_further_to_one_side_reach_so_far_together(sign: float) -> None:
+    """Two cases that err apart, up by 0.1 and down by 0.3 or the other way round, and by 0.2 and nothing."""
+    middle = np.array([1.0, 5.0])
+    shifts = sign * np.array([[0.1, 0.0], [-0.3, 0.0], [0.0, 0.2], [0.0, 0.0]])
+    stack = np.concatenate([np.tile(middle, (1 + bootstrap.RESAMPLES, 1)), middle + shifts])
+    together = bootstrap.regrouped(stack)
+    np.testing.assert_allclose(np.ptp(together, axis=0), [0.6, 0.4])
+    np.testing.assert_allclose(together, np.concatenate([stack[:-4], bootstrap.moved(middle, np.array([0.3, 0.2]))]))
