@@ -13,7 +13,7 @@ import xarray as xr
 from scipy.interpolate import PchipInterpolator
 from test_execute import digests, run
 
-from mdr_dask import bootstrap, execute, store
+from mdr_dask import bootstrap, execute, refinement, store
 from mdr_dask.campaign import loads
 from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError
@@ -387,3 +387,11 @@ def test_both_interpolations_are_compared_at_the_quarters_of_a_space(values):
     """A quarter into the middle space the natural spline is at 1099/320, the monotone cubic at 431/128."""
     found = departure(np.arange(4.0), np.array(values)[None, None], np.zeros((1, 4)))
     assert found[0, 1] == pytest.approx(43 / 640, rel=1e-12)
+
+
+def test_spaces_beside_the_largest_mean_are_halved_and_not_beside_that_of_a_part():
+    shares = np.array([0.0, 0.4, 0.5, 0.6, 0.7, 1.0])
+    whole, part = [0.0, 5.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0, 5.0, 0.0]
+    means = np.array([[whole], [part], [part]])
+    assert np.flatnonzero(refinement._beside_tops(shares, Mean(means, np.zeros((1, 6))))).tolist() == [0]
+    assert np.flatnonzero(refinement._beside_tops(shares, Mean(means[1:], np.zeros((1, 6))))).tolist() == [4]

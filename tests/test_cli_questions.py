@@ -67,6 +67,19 @@ def test_every_form_holds_the_same_rows(study, expected, tmp_path, capsys):
     assert pyarrow.parquet.read_schema(tmp_path / "rows.parquet").field("velocity").metadata[b"units"] == b"m/s"
 
 
+def test_a_single_row_is_written_in_every_form(study, tmp_path, capsys):
+    asked = (
+        "friction_coefficient",
+        "--where",
+        "velocity > 0.5 m/s and normal_force > 5 N",
+        "--select",
+        "normal_force=10N",
+    )
+    (row,) = json.loads(told(capsys, "show", study, *asked, "--json").out)["rows"]
+    assert json.loads(told(capsys, "show", study, *asked, "--jsonl").out) == row
+    assert row["normal_force"] == 10
+
+
 def test_a_table_for_a_reader_is_cut_and_says_by_how_much(study, expected, capsys):
     streams = told(capsys, "show", study, *ASKED, "--limit", "3")
     lines = streams.out.splitlines()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mdr_dask import replication
 from mdr_dask.campaign import Replication, Tolerance
 from mdr_dask.models.base import Status
 from mdr_dask.replication import growth_needed, mean_and_error, next_round
@@ -135,3 +136,10 @@ def test_the_scatter_within_realisations_is_of_the_mean():
     for asked, more in ((0.0151, [False, False]), (0.0149, [True, False])):
         scatter = {"y": np.array([[0.03] * 4, [0.029] * 4])}
         assert needs_more(values, status, {"y": Tolerance(relative=asked)}, scatter).tolist() == more
+
+
+def test_the_error_of_a_mean_of_turns_that_know_their_own_is_of_those_that_are_done():
+    scatter = np.array([[0.3, 0.4, 7.0, np.nan], [0.3, 0.4, 1.2, 0.0]])
+    done = np.array([[True, True, False, False], [True, True, True, True]])
+    np.testing.assert_allclose(replication._error_from_within(scatter, done), [0.25, 0.325])
+    assert replication._error_from_within(scatter, 0 * done > 0).tolist() == [0.0, 0.0]

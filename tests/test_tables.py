@@ -40,6 +40,14 @@ def test_dialects_of_one_table_are_the_same_numbers_to_the_bit(dialect):
     }
 
 
+@pytest.mark.parametrize("one", ["1", "-", "[1]"])
+def test_a_row_of_units_has_a_sign_for_what_has_none(one):
+    """A tan delta of 1 in the first row of numbers is none."""
+    read = read_table(f"f,E',tan delta\nrad/s,MPa,{one}\n1,2,0.3\n4,5,1\n", "a.csv", COLUMNS)
+    assert read["storage modulus"].tolist() == [2e6, 5e6]
+    assert read["tan delta"].tolist() == [0.3, 1.0]
+
+
 @pytest.mark.parametrize(
     ("heading", "value", "expected"),
     [

@@ -112,6 +112,18 @@ def test_the_command(toy, tmp_path, monkeypatch, capsys):
     assert main(["law", "results/a.zarr", "height", "-o", "height.csv"]) == 2
 
 
+def test_the_error_that_is_told_is_that_of_values_other_than_zero(tmp_path, capsys, monkeypatch):
+    """Of an output that vanishes somewhere the share of the error there is nothing to tell."""
+    monkeypatch.chdir(tmp_path)
+    place = [0.0, 1.0, 2.0]
+    found = xr.Dataset({"mu": ("x", [0.0, 2.0, 4.0]), "mu_error": ("x", [0.1, 0.5, 0.2])}, {"x": place})
+    monkeypatch.setattr("mdr_dask.fits.interpolant.law", lambda *_: found)
+    monkeypatch.setattr("mdr_dask.store.datasets", lambda *_: {"": found.assign(status=("x", [1, 1, 1]))})
+    monkeypatch.setattr("mdr_dask.questions.selection.outputs", lambda data, _: data)
+    assert main(["law", "a.zarr", "mu", "-o", "mu.nc"]) == 0
+    assert "error of mu 15.0% in the median, 25.0% at most" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize("shape", ["changing sign", "friction"])  # over the values, and over their logarithms
 def test_cases_that_adaptive_axes_left_out_have_the_error_of_what_lies_between(shape):
     data = study(shape)

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from mdr_dask.campaign import json_schema, load
-from mdr_dask.errors import CampaignError
+from mdr_dask.errors import CampaignError, DataError
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.parts.surface import Surface, lines_of, spectra_of
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
@@ -145,6 +145,19 @@ def test_the_schema_for_editors_takes_bare_names(surface):
     jsonschema.validate(study | {"parameters": {"surface": surface}}, json_schema())
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(study | {"parameters": {"surface": dict.fromkeys(surface, 3)}}, json_schema())
+
+
+def test_a_band_ends_at_any_waves_of_the_spectrum_up_to_its_ends(tmp_path):
+    name = table(tmp_path / "road.csv")
+    for least in (SHORTEST, 1.3 * SHORTEST, 0.7 * LONGEST):
+        (spectrum,) = spectra_of(Surface.model_validate({"spectrum": name, "shortest_wavelength": least}))
+        assert spectrum.wavelengths == pytest.approx((LONGEST, least))
+    for most in (LONGEST, 0.7 * LONGEST, 1.3 * SHORTEST):
+        (spectrum,) = spectra_of(Surface.model_validate({"spectrum": name, "longest_wavelength": most}))
+        assert spectrum.wavelengths == pytest.approx((most, SHORTEST))
+    for wrong in ({"shortest_wavelength": 0.99 * SHORTEST}, {"longest_wavelength": 1.01 * LONGEST}):
+        with pytest.raises((DataError, ValueError), match="extrapolate"):
+            spectra_of(Surface.model_validate({"spectrum": name} | wrong))
 
 
 def test_no_hurst_exponent_is_written_beside_a_surface(tmp_path):

@@ -103,7 +103,7 @@ TABLE: dict[str, tuple[str, dict[str, object], set[str]]] = {
     ),
     "jumps: series, one of them an example": (
         planted.JUMP + "  normal_force: 1 N\n"
-        "series:\n  many: {velocity: {geometric: [0.01 mm/s, 1 m/s, 9]}, hurst: [0.3, 0.7]}\n"
+        "series:\n  many: {velocity: {geometric: [0.01 mm/s, 1 m/s, 9]}, hurst: [0.2, 0.3, 0.7]}\n"
         "  example: {velocity: 0.01 m/s, velocity_change: [-0.3, -0.2, 0.1, 0.2, 0.4]}\n",
         {},
         JUMPS,

@@ -224,6 +224,19 @@ def test_what_has_no_realisations_is_a_value_without_an_interval(url):
     np.testing.assert_allclose(value, data["volume"].to_numpy().ravel(), rtol=DIGITS)
 
 
+def test_errors_of_a_case_are_in_the_unit_of_its_value(url):
+    """A pressure in GPa, from Pa: mean, both ends of its interval and both errors."""
+    (data,) = store.datasets(url).values()
+    pressure = (1e9 * data["friction_coefficient"]).assign_attrs(units="Pa", ancillary_variables="pressure_error")
+    data = data.assign(pressure=pressure, pressure_error=0.01 * pressure)
+    shape = data["pressure"].isel(realisation=0, drop=True)
+    found = {name: np.array(values) for name, values in cases._measured(data, "pressure", shape).items()}
+    mean, lines = 1e-9 * pressure.mean("realisation"), 1e-9 * aggregation.standard_error(pressure)
+    for name, expected in (("value", mean), ("lines", lines), ("grid", 0.01 * mean)):
+        np.testing.assert_allclose(found[name], expected.to_numpy().ravel(), rtol=1e-6)
+    assert np.all((found["low"] < found["value"]) & (found["value"] < found["high"]))
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [
