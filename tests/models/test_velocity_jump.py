@@ -292,3 +292,13 @@ def test_times_that_nobody_names_reach_from_a_ten_thousandth_to_twenty_relaxatio
     )
     assert (times[0], times[-1]) == (1e-4, 20)
     np.testing.assert_allclose(np.diff(np.log(times)), np.log(20 / 1e-4) / (times.size - 1), atol=2e-3)
+
+
+def test_a_transient_that_is_small_beside_the_error_of_few_steps_comes_to_its_end() -> None:
+    """Fast on a smooth line friction changes by 7e-3 of itself, and steps of a quarter of a decade miss it by 3e-4."""
+    scene = {"length": 0.01, "points": 5000, "hurst": 1.0, "rms_roughness": 1e-5, "normal_force": 1.2}
+    few = parameters(**scene, velocity=4.5203536563602, velocity_change=0.2, oversampling=4, steps_per_decade=4)
+    found = compute(Block(few, {}, 1, (128,), 2014, ("friction_coefficient", "friction_coefficient_after")))
+    assert found.status[0, 0] == Status.DONE
+    after = found.values["friction_coefficient_after"][0, 0]
+    assert abs(found.values["friction_coefficient"][0, 0, -1] / after - 1) < 1e-3

@@ -42,8 +42,8 @@ class Settings(NamedTuple):
     share : float
         Of the accuracy: how near to its end friction is left.
     long, stray, leap : float
-        Relaxation times after which friction has come so near to its end, of all its changes, or of itself: it leaps
-        where a cell comes to touch as a whole, whose slope is summed otherwise than that of parts of cells.
+        Relaxation times after which friction has come so near to its end, of all its changes, or of itself, at 24 steps
+        per decade: it leaps where a cell comes to touch as a whole, whose slope is summed otherwise than that of parts.
     margin : float
         Of the change of depth, by which a depth may leave its ends.
     widenings : int
@@ -312,7 +312,8 @@ class _Relaxation(NamedTuple):
     def march(self, jump: Jump, limits: tuple[float, float], transient: float) -> Jump | None:
         """Return the jump with what a march between two depths finds, or None if it leaves them."""
         accuracy, asked = self.asked.accuracy, self.asked
-        equilibrium = SETTINGS.equilibrium * (FINE_STEPS / asked.per_decade) ** 3
+        coarse = (FINE_STEPS / asked.per_decade) ** 3
+        equilibrium = SETTINGS.equilibrium * coarse
         settled = max(equilibrium, SETTINGS.share * accuracy * self.after / max(transient, 1e-300))
         close = max(10 * equilibrium, settled) * abs(self.depth[1] - self.depth[0])
         marching, found, work = self.begun(limits, SETTINGS.moments)
@@ -322,7 +323,7 @@ class _Relaxation(NamedTuple):
         if outcome == LEFT_LIMITS:
             return None
         time, _, depth, rate, drag, drag_rate = (column[:count] for column in found)
-        near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * self.after)
+        near = max(SETTINGS.stray * np.ptp(drag), SETTINGS.leap * coarse * self.after)
         strayed = time[-1] >= SETTINGS.long and abs(drag[-1] - self.after) > near
         if outcome != Outcome.CONVERGED or strayed:
             return _failed(asked.times, Outcome(outcome) if outcome else Outcome.NOT_STEADY)
