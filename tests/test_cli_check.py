@@ -4,6 +4,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from mdr_dask.campaign import load
 from mdr_dask.campaign.measured import read_measured
 from mdr_dask.cli import main
-from mdr_dask.cli.understood import human_bytes, spacing
+from mdr_dask.cli.understood import LISTED, axis_range, human_bytes, spacing
 from mdr_dask.errors import DataError
 
 CAMPAIGN = """\
@@ -231,3 +232,15 @@ def test_a_file_of_a_list_that_is_not_there_is_one_problem(tmp_path, capsys):
     assert main(["check", str(path)]) == 2
     (problem,) = capsys.readouterr().err.splitlines()
     assert "parameters.surface.map.files[0]: no such file: " in problem
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_so_many_values_of_an_axis_are_listed_and_of_more_their_number(more):
+    count = LISTED + more
+    values, names = tuple(range(1, count + 1)), tuple("abcdefghij"[:count])
+    of_words = axis_range(SimpleNamespace(values=values, refinement=None, labels=names, dim="a"), "1")
+    of_numbers = axis_range(SimpleNamespace(values=values, refinement=None, labels=None, dim="a"), "N")
+    listed = ", ".join(names[:LISTED])
+    assert of_words == (f"{listed}, ... ({count} values)" if more else listed)
+    ends = f"1 N to {count} N, {count} values, linear"
+    assert of_numbers == (ends if more else ", ".join(f"{value} N" for value in values))
