@@ -218,6 +218,7 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         ),
         (RIG, {"relaxation_time": slice(3)}, "expected at least 4 values of the unknown relaxation_time, got 3"),
         (RIG, {"velocity": slice(3)}, "this study has it from"),
+        (RIG, {"relaxation_time": 0, "rms_roughness": 0}, "expected one to 4 unknowns.* got none: every axis is a"),
         (
             RIG.replace(", standard_error", "").replace(", 0.001", ""),
             {},
