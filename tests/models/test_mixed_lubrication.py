@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from benchmarks.mixed import honesty
 from mdr_dask.models import load
 from mdr_dask.models.base import Block, Status
-from mdr_dask.models.mixed_lubrication import points
+from mdr_dask.models.mixed_lubrication import points, solve
 from mdr_dask.models.mixed_lubrication.declaration import STEEL
 from mdr_dask.models.mixed_lubrication.oil_data import OilData
 from mdr_dask.models.mixed_lubrication.operation import operation_of
@@ -725,3 +725,17 @@ def test_error_within_a_turn_is_the_scatter_between_turns():
     between = result.values["breakthrough_probability"][0].std(ddof=1)
     within = np.sqrt(np.mean(result.values["turn_error"][0] ** 2))
     assert within == pytest.approx(between, rel=0.8)
+
+
+def test_what_has_no_error_misses_no_accuracy():
+    """The half width of a contact is a closed form; beside it the contact of a turn has an error, and may miss."""
+    asked = dataclasses.replace(block(["contact_half_width", "contact_length"]), accuracy=0.01)
+    found = {"contact_half_width": 1e-4, "contact_length": 1e-5, "contact_length_error": 0.5e-7}
+    assert solve._missed(asked, found) == ""
+    told = solve._missed(asked, found | {"contact_length_error": 3e-7})
+    assert "contact_length" in told
+    assert "contact_half_width" not in told
+    for name, value in (("film", 1e-7), ("contact_length", 1e-5), ("friction_coefficient", 0.03)):
+        one = dataclasses.replace(block([name]), accuracy=0.01)
+        assert solve._missed(one, {name: value, f"{name}_error": 0.009 * value}) == ""
+        assert name in solve._missed(one, {name: value, f"{name}_error": 0.011 * value})
