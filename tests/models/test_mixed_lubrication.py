@@ -738,4 +738,5 @@ def test_what_has_no_error_misses_no_accuracy():
     for name, value in (("film", 1e-7), ("contact_length", 1e-5), ("friction_coefficient", 0.03)):
         one = dataclasses.replace(block([name]), accuracy=0.01)
         assert solve._missed(one, {name: value, f"{name}_error": 0.009 * value}) == ""
-        assert name in solve._missed(one, {name: value, f"{name}_error": 0.011 * value})
+        for missing in (0.011, 2.0):
+            assert name in solve._missed(one, {name: value, f"{name}_error": missing * value})
