@@ -302,8 +302,8 @@ def _measured(checkout: Checkout, kept: Path) -> dict[str, float]:
     command += ["--durations=0", "--durations-min=0", "--cov=mdr_dask", "--cov-context=test", "--cov-report=", "tests"]
     command += [f"--ignore={path}" for path in checkout.root.rglob("test_*.py") if APART.search(path.name)]
     environment = {**os.environ, "PYTHONPATH": str(checkout.root), "COVERAGE_FILE": str(kept)}
-    done = subprocess.run(command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False)
-    told = done.stdout
+    run = subprocess.run(command, cwd=checkout.root, env=environment, capture_output=True, text=True, check=False)
+    told = run.stdout
     seconds: dict[str, float] = defaultdict(float)
     for taken, test in re.findall(r"^([\d.]+)s (?:setup|call|teardown) +(\S.*)$", told, flags=re.M):
         seconds[test] += float(taken)
@@ -326,7 +326,11 @@ def _forked(checkout: Checkout, tests: list[str]) -> tuple[int, str]:
             resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT))
             signal.alarm(PATIENCE)
             late = "ignore::pytest.PytestAssertRewriteWarning"  # libraries with parts for tests are here already
-            os._exit(pytest.main([*QUIETLY, "-x", "-n0", "--tb=line", "-W", late, *tests]))
+            ended = int(pytest.ExitCode.INTERNAL_ERROR)
+            try:
+                ended = int(pytest.main([*QUIETLY, "-x", "-n0", "--tb=line", "-W", late, *tests]))
+            finally:  # whatever was raised: what comes next is the parent's
+                os._exit(ended)
         _, status = os.waitpid(child, 0)
         with suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)

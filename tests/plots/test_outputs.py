@@ -14,6 +14,7 @@ from mdr_dask import units
 from mdr_dask.errors import DataError
 from mdr_dask.physics.sliding import laws
 from mdr_dask.plots import curves, drawing, page, style
+from mdr_dask.plots import laws as law_room
 from mdr_dask.plots.outputs import View, of_output
 
 V = "  velocity: {geometric: [0.01 mm/s, 1 m/s, 6]}\n"
@@ -318,6 +319,13 @@ def test_what_cannot_be_drawn_is_one_sentence(study, output, over, view, sentenc
     with pytest.raises(DataError, match=sentence) as refused:
         of_output(View(output, over, **view)).figure({"": stores[study]})
     assert refused.value.__cause__ is None
+
+
+@pytest.mark.parametrize(("least", "is_geometric"), [(0.0, False), (-1.0, False), (1e-3, True)])
+def test_a_law_is_drawn_over_zero_too(least, is_geometric):
+    data = xr.Dataset(coords={"velocity": [least, 1.0, 4.0]})
+    fine = law_room.along(data, "velocity", 5)["velocity"].to_numpy()
+    np.testing.assert_allclose(fine, (np.geomspace if is_geometric else np.linspace)(least, 4.0, 5))
 
 
 @pytest.mark.parametrize("text", ["85", "85x60", "mm", "85mmx", "1mm", "3m", "85 kg", "85mm x 60N"])
