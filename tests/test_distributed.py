@@ -338,6 +338,8 @@ def test_a_block_whose_worker_died_untold_is_found_in_the_ledger(toy, url, retry
     assert again is not None
     assert sum(again.counts) == work.wanted.sum()
     assert again.counts[Status.FAILED] == 6
+    record = store.record(work.place.url, work.place.series, work.place.index, work.attempt)
+    assert (again.compute_seconds, again.write_seconds) == (record["compute_seconds"], 0.0)
     assert toy.COMPUTED == []
     assert task.finished(replace(work, attempt=work.attempt + 1)) is None
     (Path(url) / "status/c/0/0").unlink()  # a record, and no ledger yet

@@ -87,6 +87,7 @@ def test_two_more_laws_where_one_exponential_is_not_enough() -> None:
     assert rates["unexplained"].item() > 0.01
     assert rates["probability"].item() < 0.05
     found = FIT["relaxation_shape"].compute(series).squeeze()
+    assert found.attrs["window"].startswith("one exponential over")
     assert found["stretched_exponent"].item() == pytest.approx(0.5, rel=1e-3)
     assert found["stretched_rate"].item() == pytest.approx(float(rates["passing_number"]) ** 0.3, rel=1e-3)
     assert found["two_unexplained"].item() < 0.3 * found["unexplained"].item()

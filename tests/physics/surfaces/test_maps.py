@@ -174,6 +174,14 @@ def test_the_exponent_and_the_cut_offs_are_found(hurst):
     assert limit == pytest.approx(crossing, rel=0.3)
 
 
+@pytest.mark.parametrize("power", [3.0, 4.0])
+def test_noise_begins_where_roughness_is_as_high(power):
+    """A power law and a floor, of C = 1 each at q = 20: bins of 1 %."""
+    wavenumber = np.geomspace(1.0, 1e3, 694)
+    bins = Cut(wavenumber, (wavenumber / 20) ** -power + 1.0, np.full(wavenumber.size, 0.1))
+    assert noise_limit(bins) == pytest.approx(20.0, rel=0.011)
+
+
 @pytest.mark.parametrize(
     ("density", "limit"),
     [
