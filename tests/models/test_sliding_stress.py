@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_store import relative_error
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from mdr_dask.models.base import Block, Status
@@ -48,6 +48,7 @@ def assert_answers_or_says_why(result):
 
 
 @settings(max_examples=60, deadline=None)
+@example(0.0, -6.0, 3.0, 4.0, 6.0, BODIES[1], 1, "hermite", False)  # the load is lost in the rounding of the line
 @given(
     hurst=st.floats(0, 1),
     force=fifteen_decades,
@@ -118,7 +119,7 @@ QUANTITIES = {
 @settings(max_examples=25, deadline=None)
 @given(data=st.data(), body=st.sampled_from(BODIES), general=st.booleans())
 def test_units_do_not_matter(data, body, general):
-    """One case in metres, millimetres or micrometres: the same friction, bit by bit, and lengths to rounding."""
+    """One case in metres, millimetres or micrometres: the same to rounding, and the same bits of the same numbers."""
     plain, other = {}, {}
     for name, (unit, *others) in QUANTITIES.items():
         value = (LINE | KELVIN | LOAD)[name] * 10 ** data.draw(st.floats(-1, 1))
@@ -126,7 +127,7 @@ def test_units_do_not_matter(data, body, general):
         plain[name] = value
         other[name] = to_si(f"{value * factor!r} {chosen}", unit)
         assert other[name] == pytest.approx(value, rel=1e-15)
-    found = []
+    is_same, found = plain == other, []
     for numbers in (plain, other):
         modulus, time = numbers.pop("shear_modulus"), numbers.pop("relaxation_time")
         solid = {"standard_solid": {"static_modulus": modulus, "glass_modulus": 50 * modulus, "relaxation_time": time}}
@@ -137,8 +138,8 @@ def test_units_do_not_matter(data, body, general):
     assert np.array_equal(one.status, two.status)
     for name in ALL:
         assert two.values[name] == pytest.approx(one.values[name], rel=1e-12, nan_ok=True)
-    if body["shape"] == "plane":  # dimensionless numbers are the same, and so are the bits of what has no unit
-        assert one.values["contact_fraction"].tobytes() == two.values["contact_fraction"].tobytes()
+        if is_same:
+            assert two.values[name].tobytes() == one.values[name].tobytes()
 
 
 @settings(max_examples=40, deadline=None)

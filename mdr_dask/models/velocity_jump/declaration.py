@@ -88,7 +88,7 @@ SOLVE = "mdr_dask.models.velocity_jump.solve"
 
 MODEL = Model(
     name="velocity_jump",
-    version=17,
+    version=18,
     summary="friction before, at and after a jump of the sliding velocity at constant load",
     parameters=VelocityJump,
     outputs=OUTPUTS,

@@ -128,10 +128,10 @@ def _decayed(x: float) -> float:
 
 @compiled
 def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
-    """Return where w + deborah w' falls through 0 first between start and 1, or `NONE`."""
-    # the force is a cubic itself, cut into its monotone pieces
+    """Return where w + deborah w', not negative at the start, falls through 0 first from there to 1, or `NONE`."""
+    # the force is a cubic itself, cut into its monotone pieces; at the start its sign may be lost in rounding
     p, q, r = w0 + deborah * a, a + 2 * deborah * b, b + 3 * deborah * c
-    low, force = start, p + start * (q + start * (r + start * c))
+    low, positive = start, True
     discriminant = r * r - 3 * c * q
     root = math.sqrt(discriminant) if discriminant > 0 else 0.0
     lead = -(r + root) if r > 0 else root - r
@@ -142,9 +142,9 @@ def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: floa
         if not low < high <= 1:
             continue
         end = p + high * (q + high * (r + high * c))
-        if force > 0 and end <= 0:
+        if positive and end <= 0:
             return _falling(p, q, r, c, low, high)
-        low, force = high, end
+        low, positive = high, end > 0
     return NONE
 
 

@@ -67,7 +67,8 @@ def _begin(trail: FloatArray, depth: float, load: float) -> None:
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
     """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press.
 
-    Were it pressed everywhere, it would be deepest; tangents of the load are above the depth, too.
+    Were it pressed everywhere, it would be deepest; tangents of the load are above the depth, too. Where the load is
+    lost in the rounding of these, nothing better than the start is known.
     """
     fade, memory = np.exp(-BLOCK / deborah), -deborah * math.expm1(-BLOCK / deborah)
     depth, most, slope = math.exp(start), load / (memory * peak.size) - peak.mean(), 1.0
@@ -89,7 +90,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
         depth *= math.exp(ahead)
         if abs(ahead) < OUTLINED:
             break
-    return math.log(depth), slope
+    return (math.log(depth), slope) if depth > 0 else (start, 1.0)
 
 
 @compiled
