@@ -38,7 +38,7 @@ ITERATIONS = 200
 PATIENCE = 20  # sweeps before the bracket is halved
 OUTLINES, OUTLINED = 12, 0.02  # looks at the tops of blocks for a guess of the depth, and the change that is the last
 OUTLINED_FROM = 64.0  # Deborah number in cells: of elements that fade sooner, what is between the tops counts
-SHORTEST = 1e-12  # length in contact, in cells, whose ends may be rounding
+LOST = 1e-13  # rise of a line into contact, over its heights there, that may be rounding
 TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its change, Deborah number
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
@@ -116,12 +116,16 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line as sweeps at one Deborah number take it, and its mean height, from the highest point."""
+    """A line as sweeps at one Deborah number take it.
+
+    With its mean height from the highest point, and how far the cell of that falls.
+    """
 
     cells: Cells
     blocks: Blocks
     barriers: Barriers
     mean: float
+    fall: float
 
 
 class Touching(NamedTuple):
@@ -173,7 +177,7 @@ def _solve(
     contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
     wanted. It is unique, and so the answer does not depend on the `trail` that the search follows.
     """
-    cells, blocks, barriers, mean = line
+    cells, blocks, barriers, mean, _ = line
     low, high = 0.0, np.inf
     most = load / (cells.mean.size - 1) - mean
     depth = _floor(lesser(_guess(trail, load), most))
@@ -226,7 +230,7 @@ def _states(
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
-    (cells, blocks, barriers, _), (deborahs, loads) = line, cases
+    (cells, blocks, barriers, _, fall), (deborahs, loads) = line, cases
     n, (results, status, touching, rows) = cells.mean.size - 1, found
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
@@ -255,8 +259,8 @@ def _states(
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
-        # drag is force times slope
-        if sums[LENGTH] < SHORTEST and results[k, 0] > 2 * results[k, 3] * loads[k] / n:
+        # the dashpots carry the load where the line rises by load / deborah
+        if fall > 0 and loads[k] < LOST * deborah * (fall + depth):
             status[k] = Outcome.DEPTH_NOT_FOUND
 
 
@@ -388,6 +392,8 @@ def _swept(
         np.zeros(TRAIL),
     )
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
+    highest = int(np.argmax(cells.peak[:-1]))
+    fall = -float(np.min(cells.height[highest : highest + 2]))
     _begin(first, loads[0] / n - mean, loads[0])
     outlined, beyond = first[0], 0.0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
@@ -398,7 +404,7 @@ def _swept(
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
             first[:3] = outlined + beyond, np.log(load), slope
-        line = _Swept(cells, blocks, near, mean)
+        line = _Swept(cells, blocks, near, mean, fall)
         found = _Found(ordered[some], ordered_status[some], kept.touching, rows[order[some]])
         _states(line, alike, starts[some], close, first, found)
         outlined = outlined if outlines else first[0]

@@ -16,6 +16,7 @@ from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # a position in a cell that is not there
 STEEPEST_RISE = 4 / 27  # of a cubic over its ends, of the slopes there
+UNRESOLVED = 0.5  # of the slope squared, between sums over nodes and over cells; noise without gaps has 0.1
 
 
 class CubicLine(NamedTuple):
@@ -170,8 +171,10 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 def cut(line: CubicLine) -> Cells:
     """Cut a line into its cells, a periodic one at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
+    if line.smooth and place == 1:  # a turn begins with a whole cell, wherever the line begins
+        best, place = (best + 1) % line.enter.size, 0.0
     columns = _turned(line, top, best if line.periodic else 0)
-    if line.smooth:
+    if line.smooth and _is_resolved(columns[1][:-1], columns[5][:-1]):
         _resum(columns[1], columns[5])
     return Cells(*columns, place if line.periodic else 0.0, top, line.periodic)
 
@@ -214,6 +217,12 @@ def _turned(
     if not line.periodic:
         height[n] = height[n + 1] = nodes[n] - top
     return height, enter, leave, peak, mean, stretch
+
+
+def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
+    """Return whether nodes and cells know the slope squared alike, which two nodes a wave do not."""
+    by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
+    return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
 
 @kernel
