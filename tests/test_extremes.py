@@ -8,7 +8,7 @@ import contextlib
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 from schemes import on_line
@@ -88,6 +88,7 @@ def test_more_load_goes_deeper_and_touches_more(kind, nodes, seed, deborah, sche
 @given(**ANY_LINE, deborah=st.floats(-5, 0), force=st.floats(-3, 3), turn=st.integers(1, 2000))
 def test_where_a_periodic_line_begins_does_not_matter(kind, nodes, seed, deborah, force, turn):
     height, slope = line(kind, nodes, seed)
+    assume(kind == "flat" or np.sum(height > height.max() - 1e-9) == 1)  # of two tops the first one begins the turn
     case, load = np.array([10**deborah]), np.array([10**force])
     one = on_line(height, slope, case, load)
     two = on_line(np.roll(height, turn), np.roll(slope, turn), case, load)
@@ -207,6 +208,7 @@ def factors(groups, curves, vertical):
     vertical=st.booleans(),
 )
 @example(seed=0, points=4, noise=1e-4, along=0.0, up=5.0, vertical=True)
+@example(seed=3158, points=4, noise=1e-4, along=0.0, up=0.0, vertical=True)  # a scan without a scatter
 @example(seed=18638, points=4, noise=1e-4, along=0.0, up=0.25, vertical=True)
 def test_master_curves_know_no_unit_and_no_order(seed, points, noise, along, up, vertical):
     """All curves moved along both axes, their points and the curves themselves in another order: the same factors."""

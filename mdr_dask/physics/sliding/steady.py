@@ -116,16 +116,12 @@ def _guess(trail: FloatArray, load: float) -> float:
 
 
 class _Swept(NamedTuple):
-    """A line as sweeps at one Deborah number take it.
-
-    With its mean height from the highest point, and how far the cell of that falls.
-    """
+    """A line as sweeps at one Deborah number take it, and its mean height, from the highest point."""
 
     cells: Cells
     blocks: Blocks
     barriers: Barriers
     mean: float
-    fall: float
 
 
 class Touching(NamedTuple):
@@ -177,7 +173,7 @@ def _solve(
     contact does: a lattice depth below the root whose tangent reaches the load before the next lattice depth is the one
     wanted. It is unique, and so the answer does not depend on the `trail` that the search follows.
     """
-    cells, blocks, barriers, mean, _ = line
+    cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
     most = load / (cells.mean.size - 1) - mean
     depth = _floor(lesser(_guess(trail, load), most))
@@ -230,7 +226,7 @@ def _states(
     own; or it starts from its guess where that is a number. Where the tangent at a guess moves it by less than
     ``close``, relatively, that is taken for the answer.
     """
-    (cells, blocks, barriers, _, fall), (deborahs, loads) = line, cases
+    (cells, blocks, barriers, _), (deborahs, loads) = line, cases
     n, (results, status, touching, rows) = cells.mean.size - 1, found
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
     copy_into(trail, first)
@@ -259,9 +255,6 @@ def _states(
         results[k, 1] = depth + shift
         results[k, 2] = sums[LENGTH] / n
         results[k, 3] = n * np.sqrt(sums[STRETCH] / sums[LENGTH]) if sums[LENGTH] > 0 else 0.0
-        # the dashpots carry the load where the line rises by load / deborah
-        if fall > 0 and loads[k] < LOST * deborah * (fall + depth):
-            status[k] = Outcome.DEPTH_NOT_FOUND
 
 
 def steady_sliding(
@@ -392,8 +385,6 @@ def _swept(
         np.zeros(TRAIL),
     )
     n, mean = cells.mean.size - 1, float(np.mean(cells.mean[:-1]))
-    highest = int(np.argmax(cells.peak[:-1]))
-    fall = -float(np.min(cells.height[highest : highest + 2]))
     _begin(first, loads[0] / n - mean, loads[0])
     outlined, beyond = first[0], 0.0
     edges = np.flatnonzero(np.diff(deborah, prepend=-1.0, append=-1.0))
@@ -404,15 +395,28 @@ def _swept(
         if outlines:
             outlined, slope = _outlined(blocks.peak, speed, load, outlined)
             first[:3] = outlined + beyond, np.log(load), slope
-        line = _Swept(cells, blocks, near, mean, fall)
+        line = _Swept(cells, blocks, near, mean)
         found = _Found(ordered[some], ordered_status[some], kept.touching, rows[order[some]])
         _states(line, alike, starts[some], close, first, found)
         outlined = outlined if outlines else first[0]
         beyond = first[0] - outlined  # changes slowly with the speed
     results, status = np.empty_like(ordered), np.empty_like(ordered_status)
     results[order], status[order] = ordered, ordered_status
+    highest = int(np.argmax(cells.peak[:-1]))
+    status[_is_lost(cases, cells.height[highest : highest + 2], results[:, 1])] = Outcome.DEPTH_NOT_FOUND
     results[:, 1] -= cells.top
     return results.T, status
+
+
+def _is_lost(cases: Cases, near: FloatArray, depth: FloatArray) -> NDArray[np.bool_]:
+    """Return for which cases the dashpots carry the load where the line rises by no more than rounding.
+
+    That is by F_N / (4 G dx) over the Deborah number in cells; heights near the highest point are below it.
+    """
+    fall = -np.min(near)
+    with np.errstate(over="ignore"):
+        lost: NDArray[np.bool_] = (cases.loads / cases.deborah < LOST * (fall + depth)) & (fall > 0)
+    return lost
 
 
 def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, NDArray[np.int8]]:
@@ -425,6 +429,8 @@ def _stepped(line: CubicLine, cases: Cases, contact: bool) -> tuple[FloatArray, 
     results = np.full((4, cases.loads.size), np.nan)
     depths, results[0], outside = backward_euler.steady_by_steps(below, line.periodic, *cases)
     results[1] = depths - top
+    near = np.take(nodes, (highest - 1, highest + 1), mode="wrap") - top
+    results[0, _is_lost(cases, near, depths)] = np.nan
     if contact:
         backward_euler.contact(below, line.periodic, cases.deborah, depths, results[2], results[3])
         results[2] /= n

@@ -30,6 +30,7 @@ def is_lost_in_rounding(load, deborah):
 @example(0.0, 300, 1, 15.0, 3.0, 0.0, "piecewise_linear", 0)
 @example(0.0, 50, 1, 11.5, -13.0, 0.0, "hermite", 1)  # the rise in which the dashpots carry the load is
 @example(0.328125, 16, 1, 12.0, -4.0, 0.0, "piecewise_linear", 160)
+@example(0.0, 16, 1, 14.9375, 0.0, 1.0, "backward_euler", 0)
 @given(
     hurst=st.floats(0, 1),
     points=st.sampled_from([16, 50, 300]),
