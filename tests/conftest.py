@@ -1,7 +1,12 @@
+import importlib
+import pkgutil
+
 import hypothesis
 import pytest
 import threadpoolctl
 import toy as toy_model
+
+import mdr_dask
 
 # the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)
@@ -12,6 +17,14 @@ hypothesis.settings.load_profile("repeatable")
 def pytest_collection_modifyitems(items):
     """What waits or takes long begins first: other workers have the cores meanwhile, and none is idle in the end."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+def pytest_collection_finish(session):
+    """Constants of modules are among the examples: of all modules, whatever the tests before have imported."""
+    if any(getattr(getattr(item, "obj", None), "is_hypothesis_test", False) for item in session.items):
+        for each in pkgutil.walk_packages(mdr_dask.__path__, "mdr_dask."):
+            if not each.name.endswith("__main__"):
+                importlib.import_module(each.name)
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -42,6 +42,7 @@ def test_closed_forms(exponent, c, cycles, xi):
 @example(2.0, 0.001, 1e4)
 @example(1.0, 0.999, 1e-4)
 @example(20.0, 1 - 1e-6, 1e4)
+@example(4.0, 0.001, 100.0)
 @example(18.0, 0.8125, 10**1.875)
 @example(2.625, 0.00390625, 10**0.8125)
 def test_exact_evolution(exponent, c, cycles):
@@ -54,7 +55,8 @@ def test_exact_evolution(exponent, c, cycles):
     assert abs(worn.wear_volume - worn.energy_volume) <= share
     assert 1.0 - 1e-4 <= worn.contact_radius <= limit.contact_radius * (1.0 + 2e-3)  # to a tenth of what was asked
     assert worn.wear_volume <= limit.wear_volume * 1.003
-    assert limit.normal_force * (1.0 - 1e-3) - 1e-6 <= worn.normal_force <= 2.0
+    least = limit.normal_force - worn.error("normal_force", np.array([1.0]))
+    assert least * (1.0 - 1e-3) - 1e-6 <= worn.normal_force <= 2.0
     # beside a stick radius of a few thousandths a tenth is stated where a thousandth is true
     assert np.max(worn.error("worn_profile", np.linspace(0.0, limit.contact_radius, 100))) < 0.2
     r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
