@@ -98,6 +98,12 @@ STUDIES: dict[str, tuple[str, dict[str, object], set[str]]] = {
 }
 
 
+def test_all_but_curves_that_are_merged_are_fitted_to_each_series_for_itself():
+    models = ("sliding_friction", "velocity_jump", "mixed_lubrication", "ehl_line", "fretting_wear")
+    joined = {name for model in models for name, fit in fits.available(model).items() if not fit.apart}
+    assert joined == {"master_curve", "film_exponents"}
+
+
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_fit_finds_constants_or_says_why_not(study, tmp_path):
     text, special, holds = STUDIES[study]
