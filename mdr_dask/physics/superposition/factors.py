@@ -137,8 +137,8 @@ def _joined(problem: ShiftProblem, found: Found, steps: Steps, spread: FloatArra
     Curves that overlap nowhere tell nothing of a step beside a vertical one: it is taken to be as others are.
     """
     scanned, linear, sums = steps.shared + np.diag(steps.own), np.diff(found.shifts.across), np.tri(steps.mean.size)
-    own = np.diag(scanned)
-    share = np.clip(1 - np.divide(np.diag(spread), own, out=np.ones_like(own), where=own > 0), 0.0, 1.0)
+    width = np.diag(scanned)
+    share = np.clip(1 - np.divide(np.diag(spread), width, out=np.ones_like(width), where=width > 0), 0.0, 1.0)
     wide, apart = np.sqrt(np.maximum(share, 1 - steps.told)), steps.mean - linear
     between = linear + share * apart
     place = np.clip(between, *problem.windows.T)

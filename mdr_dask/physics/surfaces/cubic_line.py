@@ -32,7 +32,7 @@ class CubicLine(NamedTuple):
         Whether the line closes; if not, elements enter undeformed at its first node.
     smooth : bool
         Whether slopes of a periodic line are continuous, so that the integral of their square is summed by Euler and
-        Maclaurin: exact over the whole line if that is resolved, as no wave of two nodes is.
+        Maclaurin: exact over the whole line where the nodes resolve it.
     """
 
     height: FloatArray
@@ -57,7 +57,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
         return CubicLine(height, rise, rise, True, False)
     rise = np.append(slope, slope[0])
     rise /= slope.size
-    return CubicLine(height, rise[:-1], rise[1:], True, slope.size > 2)
+    return CubicLine(height, rise[:-1], rise[1:], True, True)
 
 
 def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Shape) -> CubicLine:
