@@ -234,32 +234,37 @@ def _collapsed_from(x: FloatArray, row: FloatArray, curve: FloatArray, start: Fl
     knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
     bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
     stiff = np.hstack([bends, np.zeros((len(bends), 2 * free.size))])
+    splines = _splines(knots)
 
     def residuals(unknown: FloatArray) -> FloatArray:
         height, along, up = np.split(unknown, [knots.size, knots.size + free.size])
-        common = _basis(x + member @ along, knots)[0] @ height
+        common = splines(x + member @ along)[0] @ height
         return np.concatenate([row + member @ up - common, -bends @ height])
 
     def jacobian(unknown: FloatArray) -> FloatArray:
         height, along, _ = np.split(unknown, [knots.size, knots.size + free.size])
-        basis, slopes = _basis(x + member @ along, knots)
+        basis, slopes = splines(x + member @ along)
         return np.vstack([np.hstack([-basis, -(slopes @ height)[:, None] * member, member]), -stiff])
 
-    basis, _ = _basis(x + start[curve], knots)
+    basis, _ = splines(x + start[curve])
     height = np.linalg.lstsq(np.vstack([basis, bends]), np.concatenate([row, np.zeros(len(bends))]))[0]
     found = least_squares(residuals, np.concatenate([height, start[free], 0 * start[free]]), jacobian, method="lm")
     shift = found.x[knots.size :].reshape(2, -1)
     return _Minimum(-jacobian(found.x), found.fun, shift, float(found.cost))
 
 
-def _basis(place: FloatArray, knots: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return natural cubic splines of unit height at each knot, and their slopes, at some places."""
+def _splines(knots: FloatArray) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
+    """Return natural cubic splines of unit height at each knot, and their slopes, as a function of places."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
-    inside = np.clip(place, knots[0], knots[-1])
-    basis: FloatArray = spline(inside) + spline(inside, 1) * (place - inside)[:, None]
-    return basis, np.asarray(spline(inside, 1))
+
+    def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        inside = np.clip(place, knots[0], knots[-1])
+        slopes = spline(inside, 1)
+        return spline(inside) + slopes * (place - inside)[:, None], slopes
+
+    return at
 
 
 def _collapse(data: xr.Dataset) -> Variables:
@@ -296,7 +301,7 @@ def _collapse(data: xr.Dataset) -> Variables:
 def _spread(x: FloatArray, row: FloatArray) -> float:
     """Return the rms distance of the points from a common curve before they are shifted."""
     knots = np.linspace(x.min(), x.max(), 2 + int(np.ceil(KNOTS * np.ptp(x) / np.log(10))))
-    basis, _ = _basis(x, knots)
+    basis, _ = _splines(knots)(x)
     left = row - basis @ np.linalg.lstsq(basis, row)[0]
     return float(np.sqrt(np.mean(left**2)))
 

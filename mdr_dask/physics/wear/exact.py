@@ -204,14 +204,17 @@ def _fretted(profile: Profile, c: float, wanted: Sequence[float], resolution: Re
 def _fretted_contact(problem: PartialSlip, dense: Dense, time: float, energy: float) -> Worn:
     """Turn the nodal values at one time into a worn contact.
 
-    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is; over the root of r^2 - c^2
-    it is smooth next to c, before and after the image has jumped there.
+    What is worn is eta s0 (exp(gathered) - 1), free of cancellation however little it is, and eta (s - s0) where that
+    is much: what long steps gather late is not as well known as the slip. Over the root of r^2 - c^2 it is smooth next
+    to c, before and after the image has jumped there.
     """
     profile, panels, c, eta = problem.profile, problem.panels, problem.inner_radius, problem.eta
     unknowns = dense.unknowns(time) if time > 0.0 else problem.start().unknowns
     width, (y, factor), root = problem.width(unknowns), problem.image(unknowns), np.sqrt(panels.nodes)
     a = float(np.sqrt(c * c + width))
-    rooted = eta * np.exp(problem.virgin_slip(width * panels.nodes)) * np.expm1(dense.gathered(time)) / root
+    virgin, gathered = np.exp(problem.virgin_slip(width * panels.nodes)), dense.gathered(time)
+    little = virgin * np.expm1(np.minimum(gathered, 1.0))
+    rooted = eta * np.where(gathered < 1.0, little, problem.slip(unknowns) - virgin) / root
     slope = panels.slope @ y
 
     def place(x: FloatArray) -> FloatArray:
