@@ -264,7 +264,7 @@ class Ladder:
         with np.errstate(all="ignore"):
             drag = np.maximum(np.abs(steady.drag / other.drag - 1), SETTINGS.rounding)
             errors = SETTINGS.safety * _changes(_columns(steady), _columns(other))
-            of_drag = np.maximum(SETTINGS.safety * drag, least) * steady.drag
+            of_drag = np.maximum(SETTINGS.safety * drag, least) * np.abs(steady.drag)
         errors[COLUMNS.index("drag")] = np.where(steady.drag == 0, errors[COLUMNS.index("drag")], of_drag)
         # where one of the grids has no solution nothing is known
         errors = np.where(np.isnan(errors), np.inf, errors)
@@ -280,7 +280,7 @@ def in_full_contact(
 ) -> tuple[Steady, Errors] | None:
     """Return steady states and errors of what is in full contact with a plane, NaN of what is not; None without any."""
     steady = full_contact.steady_full_contact(line.roughness, arms, nodes, deborah, loads)
-    return None if steady is None else (steady, Errors(*full_contact.ROUNDING * _columns(steady)))
+    return None if steady is None else (steady, Errors(*full_contact.ROUNDING * np.abs(_columns(steady))))
 
 
 def goes_from_node_to_node(body: Shape | None, accuracy: float) -> bool:

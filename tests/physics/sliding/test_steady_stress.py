@@ -34,7 +34,7 @@ def is_lost_in_rounding(load, deborah):
 @given(
     hurst=st.floats(0, 1),
     points=st.sampled_from([16, 50, 300]),
-    oversampling=st.sampled_from([1, 2, 5]),
+    oversampling=st.sampled_from([2, 3, 5]),  # the coarsest grid has two nodes a point: four in the shortest wave
     deborah=exponents,
     load=exponents,
     height=st.floats(-9, 6),
