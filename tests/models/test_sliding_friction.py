@@ -172,6 +172,18 @@ def test_the_error_estimate_is_honest():
     assert ratio < 100
 
 
+def test_friction_below_zero_lies_within_an_error_that_is_not():
+    """On two nodes a wave friction may be negative; its error was so, too."""
+    wanted = ("friction_coefficient", "friction_coefficient_error")
+    case = {"points": 50, "hurst": 0.0, "normal_force": 0.01, "velocity": 1.0}
+    found = [
+        MODEL.compute(Block(BASE.model_copy(update=case | {"oversampling": grid}), {}, 1, (366,), 0, wanted, None))
+        for grid in (1, 64)
+    ]
+    (coarse, error), (fine, _) = ([one.values[name].item() for name in wanted] for one in found)
+    assert coarse < 0 < fine < coarse + error
+
+
 @pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
 def test_time_is_estimated_by_what_is_done(scheme):
     """Finer grids, more cases, more lines, errors and a grid that has to be found take longer; steps the least."""
