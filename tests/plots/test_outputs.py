@@ -39,6 +39,11 @@ STUDIES = {
         "  speed_parameter: {geometric: [1e-12, 1e-10, 5]}\n",
         {},
     ),
+    "sampled film": (
+        planted.NUMBERS + "  material_parameter: 5000\n  load_parameter: {geometric: [1e-6, 1e-5]}\n"
+        "  speed_parameter: {geometric: [1e-12, 1e-10]}\nsampling: {latin_hypercube: 3}\n",
+        {},
+    ),
     "wear": (
         planted.FRETTING
         + f"  {planted.RULE}: [exact, fast, limit]\n  stick_radius: [0.4, 0.6]\n  cycles: [0.5, 1, 2]\n",
@@ -313,6 +318,13 @@ def test_a_legend_names_what_is_seen(stores):
         ("grid", MU, ("velocity", "hurst"), {"by": "normal_force"}, "a map of one series, without --by"),
         ("film", "pressure", ("speed_parameter",), {}, "pressure goes along position: --over position, or --select"),
         ("sampled", MU, ("velocity",), {"panels": "hurst"}, "every case of a sampled study has another hurst: --by"),
+        (
+            "sampled film",
+            "pressure",
+            ("position",),
+            {"panels": "speed_parameter"},
+            "every case of a sampled study has another speed_parameter: --by",
+        ),
     ],
 )
 def test_what_cannot_be_drawn_is_one_sentence(study, output, over, view, sentence, stores):

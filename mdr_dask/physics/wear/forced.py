@@ -209,7 +209,7 @@ def _end(problem: ForcedSlip, moment: Pressed) -> Worn:
         high = min(1.5 * high, profile.largest_radius)
     scar = virgin._replace(radius=bisect(excess, border, high))
     force = 2.0 * (virgin_load(profile, c) + eta * problem.virgin_load)
-    return worn_by(profile, scar, border, border, depth, force)
+    return worn_by(profile, scar, border, scar.radius, depth, force)
 
 
 def _contact(problem: ForcedSlip, dense: Dense, time: float, energy: float, steps: int) -> Worn:

@@ -5,7 +5,8 @@ With y = 1 - (d - g) / eta, negative where the contact sticks, the rule of thesi
     dy/dN = (xi / a) q (1 - y) - (dd/dN) / eta,    q = max(y, 0) for y < 1,  1 beyond,
 
 and the force on the first contact stays if dd/dN = (xi / a) eta int_0^1 max(y, 0) (1 - y) dx. As d depends on N
-alone, it is found once for a few dozen places; any other place follows it. a is the a(c) of constant depth.
+alone, it is found once for a few dozen places. Any other place follows it by its first y alone, in a table that crowds
+where contact turns into stick. a is the a(c) of constant depth.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.compiling import compiled, kernel
@@ -32,11 +34,14 @@ class Settings(NamedTuple):
         Step of the classical Runge-Kutta rule in xi N / a, and where nothing changes any more.
     error : float
         Error of every output over its largest value: that of the rule's own equation, no more.
+    crowd : int
+        Places of the table whenever the distance from the border of stick doubles.
     """
 
-    step: float = 0.05
+    step: float = 0.0125
     last: float = 60.0
-    error: float = 1e-5
+    error: float = 1e-4
+    crowd: int = 24
 
 
 SETTINGS = Settings()
@@ -66,21 +71,22 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     step, stages, load = _depth_stages(profile, c, eta, min(xi * cycles / reach, SETTINGS.last))
     rise = float(stages[:, 4].sum())
 
+    followed = _followed(stages, step)
+    steepness = followed.derivative()
+
     def share(x: FloatArray) -> FloatArray:
-        y = (profile.rise(np.atleast_1d(x) - c, c) / eta).ravel()
-        _follow(stages, step, y)
-        return y.reshape(np.shape(x))
+        return np.asarray(followed(profile.rise(x - c, c) / eta))
 
     def change(x: FloatArray) -> FloatArray:
         return np.asarray(eta * (rise + share(x)) - profile.rise(x - c, c))
 
     def slope(x: FloatArray) -> FloatArray:
-        gap = 1e-6 * np.maximum(x - c, 1e-3 * (1.0 - c))
-        return np.asarray((change(x + gap) - change(x)) / gap)
+        return np.asarray(profile.image_slope(x) * (steepness(profile.rise(x - c, c) / eta) - 1.0))
 
     border = bisect(lambda x: float(share(np.array(x))[()]), c, 1.0) if rise > 0.0 else c
-    near = (*(border + (1.0 - border) * 0.25**k for k in range(1, 8)), border, 1.0)
-    breaks = tuple(sorted({*near, *(border - (border - c) * 0.25**k for k in range(1, 4))} - {c}))
+    halvings = _halvings(step * len(stages))
+    near = (*(border + (1.0 - border) * 0.25**k for k in range(1, halvings)), border, 1.0)
+    breaks = tuple(sorted({*near, *(border - (border - c) * 0.25**k for k in range(1, halvings - 4))} - {c}))
     whole = Scar(c, reach, change, slope, breaks)
 
     def fall(radius: float) -> float:
@@ -95,6 +101,11 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     force = 2.0 * (virgin_load(profile, c) + eta * load)
     worn = worn_by(profile, scar, border, edge, 1.0 + eta * rise, force)
     return replace(worn, relative_error=SETTINGS.error)
+
+
+def _halvings(duration: float) -> int:
+    """Return how often what is left to the border is quartered: differences between radii grow as exp(t) there."""
+    return int(np.clip(np.ceil(duration / np.log(4.0)) + 3, 8, 17))
 
 
 def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tuple[float, FloatArray, float]:
@@ -117,6 +128,13 @@ def _rate(y: float) -> float:
     if y >= 1.0:
         return 1.0 - y
     return max(y, 0.0) * (1.0 - y)
+
+
+@compiled
+def _rate_slope(y: float) -> float:
+    if y >= 1.0:
+        return -1.0
+    return 1.0 - 2.0 * y if y > 0.0 else 0.0
 
 
 @compiled
@@ -147,14 +165,35 @@ def _advance(y: FloatArray, weights: FloatArray, step: float, stages: FloatArray
         s[4] = step / 6.0 * (s[0] + 2.0 * (s[1] + s[2]) + s[3])
 
 
-@compiled
-def _follow(stages: FloatArray, step: float, y: FloatArray) -> None:
-    """Advance y at any places under the depths found."""
+def _followed(stages: FloatArray, step: float) -> CubicHermiteSpline:
+    """Return y at the end as a function of y at the start, from 0 to where it still lies beyond the contact."""
+
+    def end(first: float) -> float:
+        y = np.array([first])
+        _follow(stages, step, y, np.ones(1))
+        return float(y[0])
+
+    border = bisect(end, 0.0, 1.0) if stages.size else 0.0
+    doublings = 2.0 ** (np.arange(-50 * SETTINGS.crowd, 0) / SETTINGS.crowd)
+    farther = 2.0 ** (np.arange(SETTINGS.crowd * (8.0 + step * len(stages) / np.log(2.0))) / SETTINGS.crowd)
+    places = np.unique([0.0, *(border * (1.0 - doublings)), border, *(border + doublings), *(border + farther)])
+    y, growth = places.copy(), np.ones_like(places)
+    _follow(stages, step, y, growth)
+    return CubicHermiteSpline(places, y, growth)
+
+
+@kernel
+def _follow(stages: FloatArray, step: float, y: FloatArray, growth: FloatArray) -> None:
+    """Advance y at any places under the depths found, and its derivative by its first value."""
     for number in range(stages.shape[0]):
         s = stages[number]
         for k in range(y.size):
-            one = _rate(y[k]) - s[0]
-            two = _rate(y[k] + 0.5 * step * one) - s[1]
-            three = _rate(y[k] + 0.5 * step * two) - s[2]
-            four = _rate(y[k] + step * three) - s[3]
+            one, by_one = _rate(y[k]) - s[0], _rate_slope(y[k])
+            place, by_place = y[k] + 0.5 * step * one, 1.0 + 0.5 * step * by_one
+            two, by_two = _rate(place) - s[1], _rate_slope(place) * by_place
+            place, by_place = y[k] + 0.5 * step * two, 1.0 + 0.5 * step * by_two
+            three, by_three = _rate(place) - s[2], _rate_slope(place) * by_place
+            place, by_place = y[k] + step * three, 1.0 + step * by_three
+            four, by_four = _rate(place) - s[3], _rate_slope(place) * by_place
             y[k] += step / 6.0 * (one + 2.0 * (two + three) + four)
+            growth[k] *= 1.0 + step / 6.0 * (by_one + 2.0 * (by_two + by_three) + by_four)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from references.literal_wear import literal
 from scipy.integrate import quad
-from scipy.optimize import brentq
 
 from mdr_dask.physics.mdr.half_integrals import graded_panels
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
@@ -211,28 +210,6 @@ def test_fast_rule_keeps_the_force_and_its_error_is_as_documented(worn):
         assert 2.0 * load == pytest.approx(4.0 / 3.0, rel=1e-3)
         assert contact.depth == pytest.approx(followed.depth, abs=0.01)
         assert contact.wear_volume == pytest.approx(followed.wear_volume, rel=0.06, abs=1e-9)
-
-
-@pytest.mark.parametrize("cycles", [0.0, 0.5, 2.0, 8.0])
-def test_pressure_of_the_fast_rule_carries_what_its_image_carries(cycles):
-    """The load of the contact is twice the area between depth and image, and the integral of the pressure."""
-    contact = fast_forced(PARABOLA, 0.455, cycles)
-    outermost = contact.contact_radius
-    if contact.depth < float(contact.image(np.array(outermost))):
-        outermost = brentq(lambda x: contact.depth - float(contact.image(np.array(x))), contact.stick_border, outermost)
-    abscissa, weight = gauss(8)
-    inner, outer = contact.stick_border, outermost - contact.stick_border
-    parts = 0.25 ** np.arange(1, 12)
-    cuts = [0.0, *(inner * (1 - parts)), inner, *(inner + outer * parts), *(inner + outer * (1 - parts)), outermost]
-    cuts = np.unique(cuts)
-    radius = cuts[:-1, None] + np.diff(cuts)[:, None] * abscissa
-    carried = 2 * np.sum(
-        np.diff(cuts)[:, None] * weight * (contact.depth - contact.image(radius.ravel()).reshape(radius.shape))
-    )
-    pressed = np.sum(
-        np.diff(cuts)[:, None] * weight * 2 * np.pi * radius * contact.pressure(radius.ravel()).reshape(radius.shape)
-    )
-    assert pressed == pytest.approx(carried, rel=1e-4)
 
 
 def test_fast_rule_reaches_a_plateau_like_the_limit():

@@ -1,0 +1,57 @@
+"""The pressure of worn contacts, of every rule and condition, carries what the contact carries."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from mdr_dask.physics.mdr.revolution import PowerProfile
+from mdr_dask.physics.mdr.transforms import gauss
+from mdr_dask.physics.wear.exact import exact, limit_under_force
+from mdr_dask.physics.wear.forced_rule import fast_forced
+from mdr_dask.physics.wear.rules import fast, limit
+
+
+def places(contact, edge):
+    """Return radii that crowd at the border of stick and at an edge, and the weights of their integral."""
+    abscissa, weight = gauss(8)
+    inner, outer = contact.stick_border, edge - contact.stick_border
+    parts = 0.25 ** np.arange(1, 12)
+    cuts = [0.0, *(inner * (1 - parts)), inner, *(inner + outer * parts), *(inner + outer * (1 - parts)), edge]
+    widths = np.diff(np.unique(cuts))[:, None]
+    return (np.unique(cuts)[:-1, None] + widths * abscissa).ravel(), (widths * weight).ravel()
+
+
+def pressed(contact, edge):
+    radius, weights = places(contact, edge)
+    return 2 * np.pi * (weights * radius) @ contact.pressure(radius)
+
+
+@pytest.mark.parametrize("cycles", [0.0, 0.5, 2.0, 8.0, 30.0, 200.0])
+def test_pressure_of_the_fast_rule_under_force(cycles):
+    """Twice the area between depth and image; late, what carries at the border was counted twice, 64 % of the load."""
+    contact = fast_forced(PowerProfile(2.0), 0.455, cycles)
+    edge = contact.contact_radius
+    if contact.depth < float(contact.image(np.array(edge))):
+        edge = brentq(lambda x: contact.depth - float(contact.image(np.array(x))), contact.stick_border, edge)
+    radius, weights = places(contact, edge)
+    assert pressed(contact, edge) == pytest.approx(2 * weights @ (contact.depth - contact.image(radius)), rel=1e-4)
+
+
+CONTACTS = {
+    "limit": limit,
+    "fast": lambda body, c: fast(body, c, 4.0),
+    "exact": lambda body, c: exact(body, c, [4.0], errors=False)[0],
+    "exact, late": lambda body, c: exact(body, c, [200.0], errors=False)[0],
+    "exact under force": lambda body, c: exact(body, c, [4.0], constant_force=True, errors=False)[0],
+    "limit under force": lambda body, c: limit_under_force(body, c, errors=False),
+    "gross slip": lambda body, c: exact(body, 0.0, [2.0], errors=False)[0],
+    "gross slip under force": lambda body, c: exact(body, 0.0, [2.0], constant_force=True, errors=False)[0],
+}
+
+
+@pytest.mark.parametrize(("exponent", "c"), [(1.0, 0.2), (2.0, 0.455), (6.0, 0.8)])
+@pytest.mark.parametrize("name", CONTACTS)
+def test_pressure_is_the_normal_force(name, exponent, c):
+    """At the end under constant force the jump at the border was counted twice, as border and as edge."""
+    contact = CONTACTS[name](PowerProfile(exponent), c)
+    assert pressed(contact, contact.contact_radius) == pytest.approx(contact.normal_force, rel=1e-3)
