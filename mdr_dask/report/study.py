@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import platform
 import shlex
 from collections import Counter
@@ -270,7 +271,7 @@ def _law(url: str, name: str, summary: str, result: xr.Dataset) -> Table:
         each for each in plain if not any(each == f"{other}{end}" for other in plain for end in ("_low", "_high"))
     ]
     dims = [str(dim) for dim in result.sizes]
-    cells = int(np.prod([result.sizes[dim] for dim in dims], dtype=int)) if dims else 1
+    cells = math.prod(result.sizes[dim] for dim in dims)
     along = {
         dim: result[dim] if dim in result.coords else xr.DataArray(np.arange(result.sizes[dim]), dims=dim)
         for dim in dims

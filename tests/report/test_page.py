@@ -51,6 +51,17 @@ def test_constants_stand_under_their_names_and_units(study):
             assert unit.removesuffix("]") == found[name].attrs.get("units", "1").replace("1", ""), heading
 
 
+def test_long_tables_of_laws_end_and_say_how_many_rows_are_left(url, study, monkeypatch):
+    monkeypatch.setattr(study_room, "MOST_ROWS", 1)
+    several = 0
+    for whole, cut in zip(study.laws, read_study(url).laws, strict=True):
+        left = len(whole.rows) - 1
+        assert cut.rows == whole.rows[:1]
+        assert cut.note == (f"{left} more rows; " if left else "") + whole.note
+        several += left > 0
+    assert several
+
+
 def test_a_page_is_one_file_that_names_no_other(html):
     without = SCRIPT.sub("", html)
     assert not re.search(

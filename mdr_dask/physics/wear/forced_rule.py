@@ -70,7 +70,6 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     eta = float(profile.rise(np.array(1.0 - c), c))
     step, stages, load = _depth_stages(profile, c, eta, min(xi * cycles / reach, SETTINGS.last))
     rise = float(stages[:, 4].sum())
-
     followed = _followed(stages, step)
     steepness = followed.derivative()
 
@@ -84,9 +83,9 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
         return np.asarray(profile.image_slope(x) * (steepness(profile.rise(x - c, c) / eta) - 1.0))
 
     border = bisect(lambda x: float(share(np.array(x))[()]), c, 1.0) if rise > 0.0 else c
-    halvings = _halvings(step * len(stages))
-    near = (*(border + (1.0 - border) * 0.25**k for k in range(1, halvings)), border, 1.0)
-    breaks = tuple(sorted({*near, *(border - (border - c) * 0.25**k for k in range(1, halvings - 4))} - {c}))
+    quarterings = _quarterings(step * len(stages))
+    near = (*(border + (1.0 - border) * 0.25**k for k in range(1, quarterings)), border, 1.0)
+    breaks = tuple(sorted({*near, *(border - (border - c) * 0.25**k for k in range(1, quarterings - 4))} - {c}))
     whole = Scar(c, reach, change, slope, breaks)
 
     def fall(radius: float) -> float:
@@ -103,7 +102,7 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
     return replace(worn, relative_error=SETTINGS.error)
 
 
-def _halvings(duration: float) -> int:
+def _quarterings(duration: float) -> int:
     """Return how often what is left to the border is quartered: differences between radii grow as exp(t) there."""
     return int(np.clip(np.ceil(duration / np.log(4.0)) + 3, 8, 17))
 
@@ -177,13 +176,13 @@ def _followed(stages: FloatArray, step: float) -> CubicHermiteSpline:
     doublings = 2.0 ** (np.arange(-50 * SETTINGS.crowd, 0) / SETTINGS.crowd)
     farther = 2.0 ** (np.arange(SETTINGS.crowd * (8.0 + step * len(stages) / np.log(2.0))) / SETTINGS.crowd)
     places = np.unique([0.0, *(border * (1.0 - doublings)), border, *(border + doublings), *(border + farther)])
-    y, growth = places.copy(), np.ones_like(places)
-    _follow(stages, step, y, growth)
-    return CubicHermiteSpline(places, y, growth)
+    y, steepness = places.copy(), np.ones_like(places)
+    _follow(stages, step, y, steepness)
+    return CubicHermiteSpline(places, y, steepness)
 
 
 @kernel
-def _follow(stages: FloatArray, step: float, y: FloatArray, growth: FloatArray) -> None:
+def _follow(stages: FloatArray, step: float, y: FloatArray, steepness: FloatArray) -> None:
     """Advance y at any places under the depths found, and its derivative by its first value."""
     for number in range(stages.shape[0]):
         s = stages[number]
@@ -196,4 +195,4 @@ def _follow(stages: FloatArray, step: float, y: FloatArray, growth: FloatArray) 
             place, by_place = y[k] + step * three, 1.0 + step * by_three
             four, by_four = _rate(place) - s[3], _rate_slope(place) * by_place
             y[k] += step / 6.0 * (one + 2.0 * (two + three) + four)
-            growth[k] *= 1.0 + step / 6.0 * (by_one + 2.0 * (by_two + by_three) + by_four)
+            steepness[k] *= 1.0 + step / 6.0 * (by_one + 2.0 * (by_two + by_three) + by_four)
