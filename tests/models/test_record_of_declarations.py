@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import record
 from flattened import flat
+from pydantic import BaseModel
 
 from mdr_dask.models import base, load
 from mdr_dask.models.base import Block, Result, Status
@@ -99,6 +100,20 @@ def test_what_models_share(dataframe_regression):
     with pytest.raises(ValueError, match="too shallow"):
         per_case(solve)(block.part(2, 0))
     record.check(dataframe_regression, flat("", found))
+
+
+class Sizes(BaseModel):
+    share: float = base.quantity("1", "a pure number")
+    length: float = base.quantity("m", "a length")
+    factor: float = base.quantity("m^(1-n)", "of a body r^n")
+
+
+def test_sizes_that_no_quantity_has_are_refused_of_quantities_alone():
+    assert Sizes(share=1e-200, length=1e-29, factor=1e200).factor == 1e200
+    with pytest.raises(
+        ValueError, match="length.*\n.*expected a size between 1e-30 and 1e\\+30 in SI units, got 1e-200"
+    ):
+        Sizes(share=1, length=1e-200, factor=1)
 
 
 def test_files_that_are_no_tables_tell_nothing(tmp_path):
