@@ -111,7 +111,7 @@ class Sizes(BaseModel):
 def test_sizes_that_no_quantity_has_are_refused_of_quantities_alone():
     assert Sizes(share=1e-200, length=1e-29, factor=1e200).factor == 1e200
     with pytest.raises(
-        ValueError, match="length.*\n.*expected a size between 1e-30 and 1e\\+30 in SI units, got 1e-200"
+        ValueError, match=r"length.*\n.*expected a size between 1e-30 and 1e\+30 in SI units, got 1e-200"
     ):
         Sizes(share=1, length=1e-200, factor=1)
 
