@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -9,6 +11,7 @@ import zipfile
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 import zarr
@@ -80,7 +83,10 @@ def test_it_holds_all_that_belongs_to_it(folder):
         assert packed.read("published/road.csv").decode() == spectrum()
         assert "spectrum: road.csv" in packed.read("published/road.yaml").decode()
         assert b"<h1>road</h1>" in packed.read("published/report.html")
-        assert b"numpy==" in packed.read("published/environment.txt")
+        machine, when, *installed = packed.read("published/environment.txt").decode().splitlines()
+        assert machine.startswith(f"# Python {platform.python_version()}, ")
+        assert re.fullmatch(r"# [\d-]+T[\d:]+\+00:00; what computed each block is in status/records", when)
+        assert f"numpy=={np.__version__}" in installed
         crate = json.loads(packed.read("ro-crate-metadata.json"))
         known = {each["@id"]: each for each in crate["@graph"]}
         root = known["./"]
