@@ -71,6 +71,14 @@ def test_store_without_the_axes_is_refused():
         FITS[0].compute({"": store().isel(velocity=0)})
 
 
+def test_units_of_a_study_stay_with_its_means():
+    study = store().rename(friction_coefficient="tangential_force")
+    study["tangential_force"].attrs["units"] = "N"
+    study["velocity"].attrs["units"] = "m/s"
+    curve = master_curve(study, "velocity", "tangential_force", "normal_force", draws=0)
+    assert [curve[f"curve_{name}"].attrs["units"] for name in ("abscissa", "ordinate")] == ["m/s", "N"]
+
+
 def test_frame_of_columns_with_other_names():
     force, velocity = (a.ravel() for a in np.meshgrid(np.geomspace(1, 100, 12), [1e-3, 1e-2, 1e-1]))
     frame = pd.DataFrame({"Load": force, "Speed": velocity, "COF": law(force, velocity)})
