@@ -59,6 +59,13 @@ def test_same_dimensionless_numbers_are_one_case() -> None:
         assert np.array_equal(result.values[name][0], result.values[name][1])
 
 
+def test_misses_of_a_transient_are_told_where_an_accuracy_is_asked_for() -> None:
+    coarse = block({"velocity": np.array([0.05])}, (0, 1), hurst=0.3, oversampling=2, steps_per_decade=4)
+    assert not compute(coarse).messages
+    told = compute(replace(coarse, accuracy=0.01)).messages
+    assert all("is missed: friction_coefficient by" in told[0, line] for line in (0, 1))
+
+
 def test_accuracy_leaves_out_what_is_smaller_and_says_so() -> None:
     whole = block({"velocity": np.array([1e-4, 1e-3, 5e-3, 0.05, 0.5])})
     exact, quick = compute(whole).values, compute(replace(whole, accuracy=1e-2)).values
