@@ -103,7 +103,10 @@ def fast_forced(profile: Profile, stick_radius: float, cycles: float, xi: float 
 
 
 def _quarterings(duration: float) -> int:
-    """Return how often what is left to the border is quartered: differences between radii grow as exp(t) there."""
+    """Return how often what is left to the border is quartered, down to where a change of the image is a jump.
+
+    Differences between radii grow as exp(t) there; a quadrature with fixed pieces misses up to 4 % of the load.
+    """
     return int(np.clip(np.ceil(duration / np.log(4.0)) + 3, 8, 17))
 
 

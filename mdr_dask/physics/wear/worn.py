@@ -28,7 +28,7 @@ VOLUMES = ("wear_volume", "energy_volume")
 SHAPED, KEPT_DEPTH = ("normal_force", "worn_depth"), 1.0
 NOWHERE = np.zeros(0)
 #: Distance from a border over its radius within which a change of the image is a jump.
-AT = 1e-9
+JUMP_WIDTH = 1e-9
 
 
 class Settings(NamedTuple):
@@ -260,11 +260,11 @@ def contact_pressure(profile: Profile, scar: Scar, edge: float, depth: float, bo
 
     def slope(x: FloatArray) -> FloatArray:
         inside = np.maximum(x, c)
-        changes = (x > c) & ~(np.abs(x - border) < AT * border)  # what changes there counts as a jump
+        changes = (x > c) & ~(np.abs(x - border) < JUMP_WIDTH * border)  # what changes there counts as a jump
         return np.asarray(profile.image_slope(x) + np.where(changes, scar.slope(inside), 0.0))
 
     def stress(radius: FloatArray) -> FloatArray:
-        near = np.array([border * (1.0 - AT), border * (1.0 + AT), edge * (1.0 - 1e-13)])
+        near = np.array([border * (1.0 - JUMP_WIDTH), border * (1.0 + JUMP_WIDTH), edge * (1.0 - 1e-13)])
         before, after, last = scar.change(near)
         jump = float(after) - (float(before) if border > c else 0.0)
         gap = depth - float(profile.image(near[2:])[0]) - float(last)
