@@ -49,7 +49,7 @@ def _rounded(number: float, digits: int) -> str:
     return f"{number:.{digits}g}"
 
 
-def apart(
+def distinguishable(
     value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
 ) -> tuple[str, ...]:
     """Return a number and its limits with the fewest digits, some at least, that tell it from those it differs from."""

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from mdr_dask import models
 from mdr_dask.campaign import Axis, Campaign, Series, measured
-from mdr_dask.errors import CampaignError, apart
-from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, replaced
+from mdr_dask.errors import CampaignError, distinguishable
+from mdr_dask.models.base import Block, Coordinate, Model, Output, notes_of, with_value
 from mdr_dask.models.numbers import numbers_of
 
 #: Work that a block should hold; a task costs about 3 ms of scheduling and a chunk about 1 ms of writing.
@@ -95,7 +95,7 @@ class Template:
     def notes(self) -> tuple[str, ...]:
         """What parts and model say of the parameters, each sentence once, every axis by itself."""
         base = self.series.parameters
-        sets = [base, *(replaced(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
+        sets = [base, *(with_value(base, axis.path, value) for axis in self.series.axes for value in axis.some)]
         told = [note for parameters in sets for note in notes_of(parameters)]
         return tuple(dict.fromkeys((*told, *models.load(self.campaign.model).notes(sets))))
 
@@ -292,7 +292,7 @@ def _memory_problems(template: Template, model: Model[Any]) -> list[str]:
     limit = available_memory()
     if needed <= limit:
         return []
-    wanted, most = apart(needed / 2**30, limit / 2**30)
+    wanted, most = distinguishable(needed / 2**30, limit / 2**30)
     return [
         f"{template.campaign.source}: one case needs about {wanted} GiB of memory, "
         f"expected at most the {most} GiB of this machine (fewer points, or less oversampling)"

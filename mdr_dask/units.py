@@ -9,7 +9,7 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from mdr_dask.errors import apart, did_you_mean
+from mdr_dask.errors import did_you_mean, distinguishable
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -224,7 +224,7 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
 
 def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
     """Return a quantity and its limits as a reader writes them, with the digits that tell one from the other."""
-    return apart(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
+    return distinguishable(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
 def seconds(duration: float) -> str:

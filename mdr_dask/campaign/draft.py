@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.reference import yaml_text
-from mdr_dask.models.base import Model, Parameters, said, unit_of
+from mdr_dask.models.base import Model, Parameters, describe, unit_of
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.units import is_unit, shown
 
@@ -67,8 +67,8 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
     """Yield the lines of all parameters: those that are needed live, the others as comments."""
     needed = _needed(parameters)
     told: dict[str, None] = {}
-    for ways in parameters.ways:
-        yield from textwrap.wrap(f"{said(ways)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
+    for ways in parameters.alternatives:
+        yield from textwrap.wrap(f"{describe(ways)}:", 110, initial_indent="  # ", subsequent_indent="  # ")
         names = {name.partition(".")[0]: None for way in ways for name in way}
         for name in [name for name in names if name not in told]:
             yield from _entry(parameters, name, needed)
@@ -81,7 +81,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
     """Return the parameters without which there is no case, dotted ones of structures among them."""
-    ways = getattr(parameters, "ways", ())
+    ways = getattr(parameters, "alternatives", ())
     required = {name for name, info in parameters.model_fields.items() if info.is_required()}
     return required | {name for each in ways for name in each[0]}
 
@@ -121,7 +121,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
     """Return a structure on one line, once for each way to give it."""
-    needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "ways", ())
+    needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "alternatives", ())
     required = {name for name, info in kind.model_fields.items() if info.is_required()}
     alternatives: list[set[str]] = [required.union(way) for way in next(iter(ways), ())] or [needed]
     texts = []

@@ -19,7 +19,7 @@ from mdr_dask.campaign.remarks import remarks
 from mdr_dask.campaign.spec import CampaignSpec, Drawn, TableSpec
 from mdr_dask.campaign.tolerances import refinement
 from mdr_dask.campaign.variation import Origin, Variation
-from mdr_dask.models.base import Model, Parameters, replaced
+from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
 #: Axes that a study refines itself, at most.
@@ -109,7 +109,7 @@ class _Expansion:
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
-        first, *others = (model.coordinates(replaced(base, axis.path, value)) for value in axis.some)
+        first, *others = (model.coordinates(with_value(base, axis.path, value)) for value in axis.some)
         for output in wanted:
             for dim in first.keys() & set(output.dims):
                 if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):

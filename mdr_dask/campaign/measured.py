@@ -10,7 +10,7 @@ from pydantic import BaseModel
 from mdr_dask import models
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.definition import Campaign, Series
-from mdr_dask.errors import DataError, apart, did_you_mean
+from mdr_dask.errors import DataError, did_you_mean, distinguishable
 from mdr_dask.models.numbers import numbers_of
 from mdr_dask.tables import Column, read_sheet, read_table
 from mdr_dask.units import shown
@@ -103,7 +103,7 @@ def _short_names(names: Sequence[str], structures: Iterable[str]) -> dict[str, l
 def require_readable(text: str, source: str, model: str, outputs: Sequence[str], series: Sequence[Series]) -> None:
     """Refuse a table that is of no series of a campaign; DataError with the reason of the first one."""
     if len(text) > LARGEST:
-        size, most = apart(len(text) / 1e6, LARGEST / 1e6)
+        size, most = distinguishable(len(text) / 1e6, LARGEST / 1e6)
         raise DataError(f"{source}: expected a table of at most {most} MB, got {size} MB")
     reasons = []
     for one in series:

@@ -261,7 +261,7 @@ def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Say that the last part of a path is no key: what it is called now, or what it may have been meant to be."""
     around = _structure_around(path, kind, data)
-    instead = getattr(around, "gone", {}).get(path[-1])
+    instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:
         return f"there is no {path[-1]} any more: {instead}"
     known = around.model_fields if around else {}

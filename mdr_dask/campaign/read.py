@@ -132,8 +132,8 @@ def _outputs(document: Document, spec: CampaignSpec, model: Model[Any], problems
         if name in errors:
             what = f"this error comes with its output: expected {errors[name]!r}, and not errors: false, got {name!r}"
             problems.add(document.place(path), dotted(path), what)
-        elif name in model.parameters.gone:
-            what = f"there is no {name} any more: {model.parameters.gone[name]}"
+        elif name in model.parameters.renamed:
+            what = f"there is no {name} any more: {model.parameters.renamed[name]}"
             problems.add(document.place(path), dotted(path), what)
         elif name not in names:
             problems.add(document.place(path), dotted(path), f"unknown output {name!r}{did_you_mean(name, names)}")

@@ -14,7 +14,7 @@ from mdr_dask import models
 from mdr_dask.campaign import fields
 from mdr_dask.campaign.messages import plain
 from mdr_dask.campaign.spec import CampaignSpec
-from mdr_dask.models.base import Model, said, unit_of
+from mdr_dask.models.base import Model, describe, unit_of
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.units import DEFINITIONS
 
@@ -98,8 +98,8 @@ def ways_told(model: Model[Any]) -> list[str]:
 
 
 def _ways(parameters: type[BaseModel], before: str) -> Iterator[str]:
-    for ways in getattr(parameters, "ways", ()):
-        yield said(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
+    for ways in getattr(parameters, "alternatives", ()):
+        yield describe(tuple(tuple(f"{before}{name}" for name in way) for way in ways))
     for name, info in parameters.model_fields.items():
         for structure in fields.structures(info):
             yield from _ways(structure, f"{before}{name}.")

@@ -17,7 +17,7 @@ import xarray as xr
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign import Campaign
-from mdr_dask.errors import FitError, apart
+from mdr_dask.errors import FitError, distinguishable
 
 #: Departure of a law, rms and half of the largest, that counts as none: laws of friction are not meant to hold better.
 WITHIN = 0.05
@@ -165,7 +165,10 @@ def law_holds(
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
     rms, largest = np.sqrt(np.mean(departures**2)), np.max(np.abs(departures))
-    (mean, of_mean), (most, of_most) = apart(rms, within, digits=2), apart(largest, 2 * within, digits=2)
+    (mean, of_mean), (most, of_most) = (
+        distinguishable(rms, within, digits=2),
+        distinguishable(largest, 2 * within, digits=2),
+    )
     departs = f"departs by {mean} rms, at most {most}{f' at {where}' if where else ''}"
     if max(rms, largest / 2) <= within:
         return f"yes: {departs}, within {of_mean} and {of_most}"

@@ -11,7 +11,7 @@ import xarray as xr
 from scipy.special import stdtrit
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.fits.base import Fit
 from mdr_dask.fits.collapse import laws_of, with_verdict
 from mdr_dask.fits.curve_tables import (
@@ -163,7 +163,7 @@ def _inside(groups: FloatArray, reference: float) -> float:
     """Return the reference, or the first or last group if it lies just outside: set points are met by so much."""
     margin = 0.1 * np.ptp(groups) / max(groups.size - 1, 1)
     if not groups.min() - margin <= reference <= groups.max() + margin:
-        told, low, high = apart(reference, groups.min(), groups.max(), digits=6)
+        told, low, high = distinguishable(reference, groups.min(), groups.max(), digits=6)
         raise DataError(f"the reference must lie between {low} and {high}, got {told}")
     return float(np.clip(reference, groups.min(), groups.max()))
 

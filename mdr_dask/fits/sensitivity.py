@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import FitError, apart
+from mdr_dask.errors import FitError, distinguishable
 
 #: Half width of an interval that is narrow enough to tell inputs apart.
 NARROW = 0.1
@@ -272,7 +272,7 @@ def _advice(result: xr.Dataset) -> str:
     if widest <= NARROW:
         return f"enough points: every interval is narrower than +-{NARROW:g}"
     more = int(np.ceil(cases * ((widest / NARROW) ** 2 - 1)))
-    told, narrow = apart(widest, NARROW, digits=2)
+    told, narrow = distinguishable(widest, NARROW, digits=2)
     return (
         f"not enough points: the widest interval is +-{told}; about {float(f'{more:.2g}'):g} cases more would "
         f"make all of them +-{narrow}"

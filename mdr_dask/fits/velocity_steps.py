@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from scipy.special import stdtr
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, FitError, apart
+from mdr_dask.errors import DataError, FitError, distinguishable
 from mdr_dask.fits.calibration import read_file
 from mdr_dask.fits.determined import ENDS, SHARES, quantiles
 from mdr_dask.fits.misfit import Residuals, law_holds
@@ -96,7 +96,7 @@ def read_trace(text: str, source: str) -> Trace:
         raise DataError(f"{source}: expected at least {FEWEST} rows, got {trace.time.size}")
     if np.any(np.diff(trace.time) <= 0):
         row = int(np.flatnonzero(np.diff(trace.time) <= 0)[0])
-        later, sooner = apart(trace.time[row + 1], trace.time[row], digits=6)
+        later, sooner = distinguishable(trace.time[row + 1], trace.time[row], digits=6)
         raise DataError(f"{source}: expected a time that goes on, got {later} s behind {sooner} s")
     if np.ptp(trace.velocity) == 0:
         raise DataError(

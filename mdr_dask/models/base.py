@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 
 
 class Status(IntEnum):
@@ -28,7 +28,7 @@ class Status(IntEnum):
     NOT_NEEDED = 4
 
 
-Ways = tuple[tuple[str, ...], ...]
+Alternatives = tuple[tuple[str, ...], ...]
 _WHOLE = re.compile(r"[+-]?\d{1,18}")
 
 
@@ -43,16 +43,16 @@ class Parameters(BaseModel):
     `gone` has the parameters and outputs that there once were, and what to write instead of each. `ways` has the
     parameters that belong together: an entry has the ways to give one thing, each of which names parameters, dotted
     ones inside structures, that are given together. `replaced` has parameters, and the one whose place each takes.
-    `settings` names parameters of the solver or of what is stored, `only_with` those that have a say only where
+    `settings` names parameters of the solver or of what is stored, `requires` those that have a say only where
     another parameter has a value.
     """
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-    gone: ClassVar[Mapping[str, str]] = {}
-    ways: ClassVar[tuple[Ways, ...]] = ()
-    replaced: ClassVar[Mapping[str, str]] = {}
+    renamed: ClassVar[Mapping[str, str]] = {}
+    alternatives: ClassVar[tuple[Alternatives, ...]] = ()
+    overrides: ClassVar[Mapping[str, str]] = {}
     settings: ClassVar[frozenset[str]] = frozenset()
-    only_with: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    requires: ClassVar[Mapping[str, tuple[str, str]]] = {}
 
     @model_validator(mode="before")
     @classmethod
@@ -62,17 +62,17 @@ class Parameters(BaseModel):
             return data
         return {**data, **{key: unquoted(data[key]) for key in data.keys() & _whole_fields(cls)}}
 
-    def require_one_way(self) -> None:
-        """Demand that each thing is given in one way, and in no other beside it; ValueError if it is not."""
-        for ways in self.ways:
+    def require_one_alternative(self) -> None:
+        """Raise ValueError unless exactly one of each group of alternatives is given."""
+        for ways in self.alternatives:
             given = {name for way in ways for name in way if getattr(self, name) is not None}
             if not any(given == set(way) for way in ways):
-                raise ValueError(f"expected {said(ways)}, got {' and '.join(sorted(given)) or 'none'}")
+                raise ValueError(f"expected {describe(ways)}, got {' and '.join(sorted(given)) or 'none'}")
 
     @property
-    def idle(self) -> dict[str, str]:
-        """The parameters that have no say, each with the one that takes its place."""
-        return {other: name for name, other in self.replaced.items() if getattr(self, name) not in (None, ())}
+    def inactive(self) -> dict[str, str]:
+        """The parameters that have no effect because another one overrides them, each with that other one."""
+        return {other: name for name, other in self.overrides.items() if getattr(self, name) not in (None, ())}
 
 
 @lru_cache(maxsize=256)
@@ -85,10 +85,9 @@ def _may_be_whole(annotation: Any) -> bool:
     return annotation is int or any(map(_may_be_whole, get_args(annotation)))
 
 
-def said(ways: Ways) -> str:
-    """Return the ways to give one thing in words: ``length with rms_roughness, or profile``."""
-    told = [f"{way[0]} with {', '.join(way[1:])}" if len(way) > 1 else way[0] for way in ways]
-    return ", or ".join(told)
+def describe(ways: Alternatives) -> str:
+    """Return a group of alternatives as text: ``length with rms_roughness, or profile``."""
+    return ", or ".join(f"{way[0]} with {', '.join(way[1:])}" if len(way) > 1 else way[0] for way in ways)
 
 
 def _looks_numeric(value: Any) -> bool:
@@ -141,7 +140,7 @@ def _conceivable(least: float, value: Any) -> Any:
     """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
-            told, low, high = apart(number, least, MOST, digits=6)
+            told, low, high = distinguishable(number, least, MOST, digits=6)
             raise ValueError(f"expected a size between {low} and {high} in SI units, got {told}")
     return value
 
@@ -210,8 +209,10 @@ class Output:
     comment : str
         What it does not tell, for its attribute ``comment`` in the store.
     scatter : str
-        The output with its standard error as one realisation alone knows it, from parts of itself; it comes along with
-        errors.
+        Name of the output that estimates the standard error from one realisation alone; it is stored with the errors.
+    floor : float
+        Size, in `unit`, below which errors are relative to `floor` instead of the value: for outputs that are
+        normally zero. An accuracy a allows the error ``a * max(abs(value), floor)``.
     """
 
     name: str
@@ -222,6 +223,7 @@ class Output:
     has_error: bool = False
     comment: str = ""
     scatter: str = ""
+    floor: float = 0.0
 
     @property
     def error(self) -> Output:
@@ -303,7 +305,7 @@ class Block(Generic[P]):
         case = self.parameters
         for path, column in self.columns.items():
             value = column[index]
-            case = replaced(case, path, value.item() if isinstance(value, np.generic) else value)
+            case = with_value(case, path, value.item() if isinstance(value, np.generic) else value)
         return case
 
     def part(self, index: int, realisation: int) -> Block[P]:
@@ -312,11 +314,11 @@ class Block(Generic[P]):
         return Block(self.parameters, columns, 1, (realisation,), self.seed, self.outputs, self.accuracy)
 
 
-def replaced(parameters: Any, path: str, value: Any) -> Any:
+def with_value(parameters: Any, path: str, value: Any) -> Any:
     """Return a parameter set with another value at a dotted path."""
     name, _, rest = path.partition(".")
     if rest:
-        value = replaced(getattr(parameters, name), rest, value)
+        value = with_value(getattr(parameters, name), rest, value)
     return parameters.model_copy(update={name: value})
 
 

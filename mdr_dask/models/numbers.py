@@ -11,7 +11,7 @@ from mdr_dask.models.data_file import DataFile
 def numbers_of(parameters: BaseModel, prefix: str = "") -> dict[str, tuple[float, str, str]]:
     """Return value, unit and meaning of each number that has a say in a parameter set, nested names joined by ``_``."""
     found: dict[str, tuple[float, str, str]] = {}
-    idle = parameters.idle if isinstance(parameters, Parameters) else {}
+    idle = parameters.inactive if isinstance(parameters, Parameters) else {}
     for name, field in type(parameters).model_fields.items():
         value = getattr(parameters, name)
         if isinstance(value, BaseModel) and not isinstance(value, DataFile):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 from mdr_dask.physics.compiling import kernel, nested
 
 GAS_CONSTANT = 8.31446261815324
@@ -289,7 +289,7 @@ def wlf_factor(temperature: ArrayLike, reference: float, c1: float, c2: float) -
     """
     difference = np.asarray(temperature, dtype=np.float64) - reference
     if np.any(c2 + difference <= 0):
-        lowest, end = apart(float(np.min(temperature)), reference - c2, digits=6)
+        lowest, end = distinguishable(float(np.min(temperature)), reference - c2, digits=6)
         raise ValueError(f"the law of Williams, Landel and Ferry ends at {end} K, got {lowest} K")
     return np.asarray(10 ** (-c1 * difference / (c2 + difference)), dtype=np.float64)
 

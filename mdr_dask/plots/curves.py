@@ -297,7 +297,7 @@ def _silent(data: xr.Dataset) -> set[str]:
     """Return the parameters that have no say: another one does not have the value that they are for."""
     if "model" not in data.attrs:
         return set()
-    conditions = models.load(data.attrs["model"]).parameters.only_with
+    conditions = models.load(data.attrs["model"]).parameters.requires
     return {name for name, (other, value) in conditions.items() if value not in _given(data, other)}
 
 

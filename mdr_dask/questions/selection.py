@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.errors import DataError, apart, did_you_mean
+from mdr_dask.errors import DataError, did_you_mean, distinguishable
 from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import Columns, fixed_words
 from mdr_dask.units import to_si
@@ -120,7 +120,7 @@ def written(value: Any, unit: str | None, digits: int = 6) -> str:
 
 def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
     """Return a value and its limits with their unit and the digits that tell one from the other."""
-    return apart(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
+    return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
 def _parsed(text: str) -> tuple[str, str]:

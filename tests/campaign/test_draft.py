@@ -9,7 +9,7 @@ from mdr_dask import models
 from mdr_dask.campaign import loads
 from mdr_dask.campaign.draft import draft
 from mdr_dask.cli import main
-from mdr_dask.models.base import said
+from mdr_dask.models.base import describe
 
 NAMES = ("sliding_friction", "velocity_jump", "fretting_wear", "ehl_line", "mixed_lubrication")
 #: Optional entries that need more than themselves.
@@ -43,7 +43,7 @@ def test_every_optional_entry_passes_when_its_mark_is_taken_off(name, tmp_path):
     (tmp_path / "table.csv").write_text("T [degC],nu [cSt]\n40,320\n100,38\n")
     model = models.load(name)
     text = draft(name, model, "first.yaml")
-    beside = {each.partition(".")[0] for ways in model.parameters.ways for way in ways for each in way}
+    beside = {each.partition(".")[0] for ways in model.parameters.alternatives for way in ways for each in way}
     entries = re.findall(r"^  # (?:or )?((\w+): .*)$", text, flags=re.M)
     tried = [entry for entry, field in entries if field not in beside | set(NEED_MORE) and "[...]" not in entry]
     assert len(tried) > 5
@@ -57,9 +57,9 @@ def test_every_way_to_give_a_thing_passes(name, tmp_path):
     spectrum = "q [1/mm],C2D [m^4]\n1,1e-18\n100,1e-24\n"
     model = models.load(name)
     text = draft(name, model, "first.yaml")
-    for ways in model.parameters.ways:
+    for ways in model.parameters.alternatives:
         fields = {each.partition(".")[0] for way in ways for each in way}
-        others = {each for more in model.parameters.ways if more is not ways for each in more[0]}
+        others = {each for more in model.parameters.alternatives if more is not ways for each in more[0]}
         for way in ways:
             kept = {each.partition(".")[0] for each in way} | others
             changed = text
@@ -69,7 +69,7 @@ def test_every_way_to_give_a_thing_passes(name, tmp_path):
             alone = way == ("surface",)  # a line as it is brings its length with it
             (tmp_path / "table.csv").write_text(line if alone else spectrum)
             kind = "{profile: {file: table.csv}}" if alone else "{spectrum: {files: [table.csv]}}"
-            loads(changed.replace("{spectrum: {files: [table.csv]}}", kind), said((way,)), str(tmp_path))
+            loads(changed.replace("{spectrum: {files: [table.csv]}}", kind), describe((way,)), str(tmp_path))
 
 
 def test_a_model_of_ones_own_has_a_draft_too(tmp_path, monkeypatch, capsys):

@@ -35,8 +35,8 @@ def declared(model):
         found[f"number {number.name}"] = number.formula
     parameters = model.parameters
     found["settings"] = sorted(parameters.settings)
-    found["ways"] = [base.said(way) for way in parameters.ways]
-    found["replaced"] = [*map(str, {**parameters.replaced, **parameters.only_with, **parameters.gone}.items())]
+    found["ways"] = [base.said(way) for way in parameters.alternatives]
+    found["replaced"] = [*map(str, {**parameters.overrides, **parameters.requires, **parameters.renamed}.items())]
     return found | {"whole": model.whole, "compiling": model.compiling}
 
 
@@ -51,7 +51,7 @@ class Inner(base.Parameters):
 
 
 class Outer(base.Parameters):
-    replaced: ClassVar = {"force": "width"}
+    overrides: ClassVar = {"force": "width"}
     width: float = base.quantity("m", "how wide", default=0.5)
     force: float | None = base.quantity("N", "how strong", default=None)
     flag: bool = False

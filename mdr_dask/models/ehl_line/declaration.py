@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
-from mdr_dask.models.base import Block, Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.errors import distinguishable
+from mdr_dask.models.base import Alternatives, Block, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 
 #: Contact modulus of steel on steel, 210 GPa and 0.3 each.
 STEEL = 210e9 / (2 * (1 - 0.3**2))
@@ -28,12 +28,12 @@ _PAIRS = (
 class EhlLineParameters(Parameters):
     """A line contact by dimensionless numbers or by dimensional quantities: one of each pair."""
 
-    gone: ClassVar[Mapping[str, str]] = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "neighbours": "every case is solved alone, so leave it out",
         "discretisation_error": "central_film and minimum_film come with central_film_error and minimum_film_error",
         "traction_error": "traction_coefficient comes with traction_coefficient_error",
     }
-    ways: ClassVar[tuple[Ways, ...]] = tuple(
+    alternatives: ClassVar[tuple[Alternatives, ...]] = tuple(
         ((dimensional, *companions), (number,)) for number, dimensional, companions in _PAIRS
     )
     settings: ClassVar[frozenset[str]] = frozenset({"profile_start", "profile_end", "profile_points"})
@@ -85,7 +85,7 @@ class EhlLineParameters(Parameters):
         if self.viscosity_law == "roelands" and self.viscosity is None:
             raise ValueError("viscosity_law roelands needs viscosity, which it refers to a pole in Pa s")
         if self.profile_end <= self.profile_start:
-            end, start = apart(self.profile_end, self.profile_start, digits=6)
+            end, start = distinguishable(self.profile_end, self.profile_start, digits=6)
             raise ValueError(f"expected profile_end above profile_start {start}, got {end}")
         return self
 

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Coordinate, Model, Number, Output, Parameters, Ways, deferred, quantity
+from mdr_dask.models.base import Alternatives, Coordinate, Model, Number, Output, Parameters, deferred, quantity
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.parts.indenter import Other
 from mdr_dask.tables import Column, read_table
@@ -106,7 +106,7 @@ _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 class FrettingWear(Parameters):
     """Parameters of fretting wear, dimensionless (no modulus) or dimensional; sliding if a `path` is given."""
 
-    gone: ClassVar[Mapping[str, str]] = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "shape": "write indenter: {shape: ...}, with radius, angle, coefficient and exponent inside",
         "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "method": "write wear_rule: exact, fast or limit; exact is the default",
@@ -119,16 +119,16 @@ class FrettingWear(Parameters):
         "block_normal_force": "write block_contact_force",
         "discretisation_error": "every output comes with its own error, such as wear_volume_error",
     }
-    ways: ClassVar[tuple[Ways, ...]] = (
+    alternatives: ClassVar[tuple[Alternatives, ...]] = (
         (
             ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "normal_force"),
             ("indenter.radius", "contact_modulus", *_OSCILLATION, "hardness", "wear_coefficient", "depth"),
             ("stick_radius",),
         ),
     )
-    replaced: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
+    overrides: ClassVar[Mapping[str, str]] = {"history": "cycles", "path": "cycles"}
     settings: ClassVar[frozenset[str]] = frozenset({"accuracy", "cells", "extent", "points"})
-    only_with: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
+    requires: ClassVar[Mapping[str, tuple[str, str]]] = {"xi": ("wear_rule", "fast")}
     indenter: Indenter = Field(Parabola(), description="virgin body; its size is not needed without dimensions")
     wear_rule: Literal["exact", "fast", "limit"] = Field(
         "exact",
@@ -223,7 +223,7 @@ class FrettingWear(Parameters):
     def _history(self) -> FrettingWear:
         if self.history and self.wear_rule != "exact":
             raise ValueError(f"a history has wear_rule exact only, got {self.wear_rule!r}")
-        for other, name in self.idle.items():
+        for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} takes the place of {other}: leave out one or the other")
         return self

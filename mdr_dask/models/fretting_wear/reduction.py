@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, canonical
 from mdr_dask.models.data_file import NamedFile
 from mdr_dask.models.fretting_wear.declaration import FrettingWear, Indenter, Pressed, Table, profile_columns
@@ -187,7 +187,7 @@ def refuse_gross_slip(block: Block[FrettingWear], numbers: Numbers, messages: di
     if block.parameters.path is not None or block.parameters.history or "history" in block.columns:
         return
     for case, realisation in np.argwhere(~(numbers.level > 0.0)):
-        times, _ = apart(1.0 - numbers.level[case, realisation], 1.0, digits=4)
+        times, _ = distinguishable(1.0 - numbers.level[case, realisation], 1.0, digits=4)
         messages.setdefault(
             (int(case), int(realisation)),
             f"the amplitude is in gross slip: it must stay below mu E* d0 / G*, got {times} times that; "

@@ -9,15 +9,15 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import (
+    Alternatives,
     Block,
     Coordinate,
     Model,
     Number,
     Output,
     Parameters,
-    Ways,
     deferred,
     quantity,
 )
@@ -41,7 +41,7 @@ POSITIONS = np.linspace(-1.5, 1.5, 1501)
 class MixedLubrication(Parameters):
     """Two equal rough rollers pressed together on an oil film; the defaults are the twin-disc rig of the thesis."""
 
-    gone: ClassVar[Mapping[str, str]] = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "young_modulus": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "measured": "write measured: {table: ...} beside parameters, and fit calibration",
@@ -50,7 +50,7 @@ class MixedLubrication(Parameters):
         "profile_2": "write surface_2: {profile: ...}",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
     }
-    ways: ClassVar[tuple[Ways, ...]] = ((("rms_roughness",), ("surface_1", "surface_2")),)
+    alternatives: ClassVar[tuple[Alternatives, ...]] = ((("rms_roughness",), ("surface_1", "surface_2")),)
     settings: ClassVar[frozenset[str]] = frozenset({"points", "trace_points"})
     normal_force: float = quantity("N", "normal force F_N on the rollers", usual="800 N", gt=0)
     rotation_speed: float = quantity("rad/s", "mean rotation speed of the two rollers", usual="100 rpm", gt=0)
@@ -198,7 +198,7 @@ class MixedLubrication(Parameters):
             return ""
         least = LEAST_PER_WAVE * self.perimeter / MOST_POINTS
         if self.shortest_wavelength < least:
-            wave, limit = apart(self.shortest_wavelength, least, digits=4)
+            wave, limit = distinguishable(self.shortest_wavelength, least, digits=4)
             return (
                 f"expected a shortest_wavelength of at least {limit} m, {LEAST_PER_WAVE} spacings of {MOST_POINTS} "
                 f"points, got {wave} m"
@@ -209,7 +209,7 @@ class MixedLubrication(Parameters):
         length = source.points * source.spacing(self.perimeter)
         width = 2 * float(self.dry_contact(self.normal_force).half_width)
         if width > length:
-            told, most = apart(width, length, digits=4)
+            told, most = distinguishable(width, length, digits=4)
             return f"the contact is wider than the line: expected 2a of at most {most} m, got {told} m"
         return ""
 

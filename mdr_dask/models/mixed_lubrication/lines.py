@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 from mdr_dask.models.parts.measured_line import ProfileFile, line_of
 from mdr_dask.models.parts.surface import Surface, lines_of
 
@@ -34,10 +34,10 @@ class _Random:
     def problem(self, perimeter: float) -> str:
         """Say why there are no such lines around a roller of a perimeter in m; an empty string if there are."""
         if self.longest > self.modes:
-            longest, shortest = apart(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
+            longest, shortest = distinguishable(perimeter / self.longest, perimeter / max(self.modes, 1), digits=4)
             return f"expected the longest wavelength above the shortest, got {longest} m and {shortest} m"
         if 2 * self.modes > self.points:
-            wave, least = apart(perimeter / self.modes, 2 * perimeter / self.points, digits=4)
+            wave, least = distinguishable(perimeter / self.modes, 2 * perimeter / self.points, digits=4)
             return f"expected a shortest wavelength of at least two spacings, {least} m, got {wave} m; raise points"
         return ""
 

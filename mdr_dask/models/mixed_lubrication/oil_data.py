@@ -10,7 +10,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
 from mdr_dask.physics.lubrication.oil import Oil, density_at, kinematic_viscosity, walther_constants, walther_fit
 from mdr_dask.tables import Column, read_sheet, read_table
@@ -22,7 +22,7 @@ _TWO = ("temperature_1", "viscosity_1", "temperature_2", "viscosity_2")
 class OilData(Parameters):
     """An oil by the numbers of its data sheet, or by a table of viscosities."""
 
-    ways: ClassVar[tuple[Ways, ...]] = ((_TWO, ("viscosities",)),)
+    alternatives: ClassVar[tuple[Alternatives, ...]] = ((_TWO, ("viscosities",)),)
     temperature_1: float | None = quantity(
         "K", "first temperature of the two viscosities", usual="40 degC", gt=0, default=None
     )
@@ -54,7 +54,7 @@ class OilData(Parameters):
 
     @model_validator(mode="after")
     def _is_an_oil(self, info: ValidationInfo) -> OilData:
-        self.require_one_way()
+        self.require_one_alternative()
         if self.viscosities is None or info.context is not None:  # a table is looked at where a campaign names it
             try:
                 walther_constants(*self.two_viscosities)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, Result, Status
 from mdr_dask.models.mixed_lubrication import points
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
@@ -182,6 +182,6 @@ def _warn(result: Result, block: Block[MixedLubrication], index: int, operation:
     ratio = operation.film / operation.rms
     _note(result, index, position, operation.warning)
     if ratio < FILM_RATIO_WARNING:
-        told, least = apart(ratio, FILM_RATIO_WARNING, digits=2)
+        told, least = distinguishable(ratio, FILM_RATIO_WARNING, digits=2)
         what = f"film ratio {told} is below {least}: overlaps merge into clusters that do not break"
         _note(result, index, position, f"{what}, the probability is too low")

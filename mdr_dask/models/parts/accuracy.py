@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 
 
 def share(error: ArrayLike, value: ArrayLike, whole: ArrayLike = 0.0) -> FloatArray:
@@ -29,4 +29,4 @@ def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str
 
 
 def _amount(share: float, accuracy: float) -> str:
-    return apart(share, accuracy, digits=2)[0] if np.isfinite(share) else "an unknown amount"
+    return distinguishable(share, accuracy, digits=2)[0] if np.isfinite(share) else "an unknown amount"

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.errors import DataError
-from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.parts.moduli_table import SAME_TEMPERATURE, Moduli, ModulusTable, one_curve
 from mdr_dask.models.parts.temperature import Arrhenius, Law, ShiftFactors, Wlf
 from mdr_dask.units import shown
@@ -71,7 +71,7 @@ LAWS = ("wlf", "arrhenius", "shift_factors")
 class Material(Parameters):
     """One linear viscoelastic material, and perhaps its temperature."""
 
-    ways: ClassVar[tuple[Ways, ...]] = (tuple((kind,) for kind in KINDS),)
+    alternatives: ClassVar[tuple[Alternatives, ...]] = (tuple((kind,) for kind in KINDS),)
     kelvin: Kelvin | None = Field(default=None, description="spring and dashpot")
     standard_solid: StandardSolid | None = Field(default=None, description="spring and one relaxing arm")
     prony: PronySeries | None = Field(default=None, description="spring and any number of relaxing arms")

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from mdr_dask.models.base import Number, Parameters, Ways, quantity
+from mdr_dask.models.base import Alternatives, Number, Parameters, quantity
 from mdr_dask.models.parts.indenter import Indenter, Plane
 from mdr_dask.models.parts.material import Material, frequencies
 from mdr_dask.models.parts.measured_line import line_of
@@ -37,11 +37,11 @@ NUMBERS = (
 class SlidingBody(Parameters):
     """A viscoelastic body under a load on a generated or a measured rough line, flat or of an indenter's shape."""
 
-    gone: ClassVar[Mapping[str, str]] = {
+    renamed: ClassVar[Mapping[str, str]] = {
         "profile": "write surface: {profile: ...}",
         "discretisation_error": "every output comes with its own error, such as friction_coefficient_error",
     }
-    ways: ClassVar[tuple[Ways, ...]] = (
+    alternatives: ClassVar[tuple[Alternatives, ...]] = (
         (("length", "rms_roughness"), ("length", "surface"), ("surface",)),
         (("shear_modulus", "relaxation_time"), ("material",)),
     )
@@ -81,7 +81,7 @@ class SlidingBody(Parameters):
         problem = self._problem_of_line()
         if problem:
             raise ValueError(problem)
-        self.require_one_way()
+        self.require_one_alternative()
         return self
 
     def _problem_of_line(self) -> str:

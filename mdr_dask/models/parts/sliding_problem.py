@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import Block, Status, canonical
 from mdr_dask.models.parts.material import solid_of
 from mdr_dask.models.parts.measured_line import line_of
@@ -113,7 +113,7 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
     """Note every case whose dimensionless numbers, or their squares, are no numbers of a computer."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
-            number, least, most = apart(column[j], LEAST, 1 / LEAST, digits=6)
+            number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
             faults.setdefault(int(j), f"expected {name} between {least} and {most}, got {number}; look at the units")
 
 

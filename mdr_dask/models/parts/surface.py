@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import Field, ValidationInfo, model_validator
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
-from mdr_dask.models.base import Parameters, Ways, quantity
+from mdr_dask.errors import DataError, distinguishable
+from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.measured_line import ProfileFile
 from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables
@@ -26,7 +26,7 @@ NO_GAP = "approach of the line: it says nothing of mean separation and gaps of a
 class Surface(Parameters):
     """A measured surface, in place of a generated one."""
 
-    ways: ClassVar[tuple[Ways, ...]] = ((("spectrum",), ("map",), ("scan",), ("profile",)),)
+    alternatives: ClassVar[tuple[Alternatives, ...]] = ((("spectrum",), ("map",), ("scan",), ("profile",)),)
     spectrum: SpectrumTables | None = Field(default=None, description="table of the spectrum")
     map: MapFiles | None = Field(default=None, description="areal map")
     scan: ScanFiles | None = Field(default=None, description="scan of an isotropic surface, a straight cut")
@@ -42,7 +42,7 @@ class Surface(Parameters):
     @model_validator(mode="after")
     def _one_kind(self, info: ValidationInfo) -> Surface:
         """Refuse a bad file where a campaign names it, before any case fails of it."""
-        self.require_one_way()
+        self.require_one_alternative()
         ends = self.longest_wavelength, self.shortest_wavelength
         if self.profile is not None and (self.extrapolate or any(ends)):
             raise ValueError("a profile is taken as it is: give its cut-offs with its file, profile: {file: ...}")
@@ -123,7 +123,7 @@ def _within(surface: Surface, found: Found, file: DataFile) -> Spectrum:
 
 
 def _beyond(name: str, wavelength: float, which: str, end: float) -> str:
-    told, limit = apart(wavelength, end, digits=4)
+    told, limit = distinguishable(wavelength, end, digits=4)
     return (
         f"expected {name} of at {which} {limit} m, where the spectrum ends, got {told} m: "
         "`extrapolate: true` goes on by a power law"
@@ -145,7 +145,10 @@ def lines_of(surface: Surface, length: float, modes: int) -> tuple[FloatArray, .
     for file, spectrum, line in zip(surface.measured.files, spectra_of(surface), lines, strict=False):
         if not np.any(line):
             longest, shortest = spectrum.wavelengths
-            (last, least), (first, most) = apart(length, shortest, digits=4), apart(length / modes, longest, digits=4)
+            (last, least), (first, most) = (
+                distinguishable(length, shortest, digits=4),
+                distinguishable(length / modes, longest, digits=4),
+            )
             raise DataError(
                 f"{file.name}: expected a line with waves of {least} to {most} m, "
                 f"got {first} to {last} m: change length or points"

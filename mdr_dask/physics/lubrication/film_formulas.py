@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 
 
 class HertzLine(NamedTuple):
@@ -105,7 +105,7 @@ def thick_film(film: float) -> str:
     """Say that a film h/R is too thick for lubrication theory; an empty string if it is not."""
     if not film > THICKEST_FILM:
         return ""
-    told, most = apart(film, THICKEST_FILM, digits=2)
+    told, most = distinguishable(film, THICKEST_FILM, digits=2)
     return (
         f"the film is {told} of the radius, more than {most}: rollers are no parabolas there, and "
         "Reynolds' equation does not hold"
@@ -186,7 +186,7 @@ class FilmFormula:
         """Say which of W, U, G lie outside the range of the formula; an empty string if none does."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
         parts = [
-            f"{symbol} = {apart(value, low, high)[0]} is outside {low:g} to {high:g}"
+            f"{symbol} = {distinguishable(value, low, high)[0]} is outside {low:g} to {high:g}"
             for symbol, value, (low, high) in ranges
             if not low <= value <= high
         ]

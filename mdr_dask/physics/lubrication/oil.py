@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 
 _MM2 = 1e-6
 #: Density of water at 15.6 C in kg/m^3, to which a specific gravity refers.
@@ -209,7 +209,7 @@ class Oil:
         """Say that a temperature lies outside the oil's data; an empty string if it does not."""
         if self.lowest <= temperature <= self.highest:
             return ""
-        told, lowest, highest = apart(temperature, self.lowest, self.highest, digits=6)
+        told, lowest, highest = distinguishable(temperature, self.lowest, self.highest, digits=6)
         return f"expected a temperature within the oil's data, {lowest} to {highest} K, got {told} K"
 
 

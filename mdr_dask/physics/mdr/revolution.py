@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator, PPoly
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import apart
+from mdr_dask.errors import distinguishable
 from mdr_dask.physics.compiling import inlined, last_until, nested
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
 
@@ -227,7 +227,7 @@ def from_table(radius: ArrayLike, height: ArrayLike, depth: float) -> TableProfi
     image = forward_transform(slope, nodes, breaks=tuple(r[1:-1]), tolerance=1e-12).value
     image_curve = _monotone(nodes, image)
     if image[-1] < depth:
-        told, end = apart(depth, image[-1], digits=4)
+        told, end = distinguishable(depth, image[-1], digits=4)
         raise ValueError(
             f"the contact reaches beyond the table: its image ends at the height {end}, got depth {told}; "
             "extend the table or press less deep"

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.superposition.factors import Found, find_both, find_horizontal
 from mdr_dask.physics.superposition.least_squares import Points, extent, fit, rows, slopes
 from mdr_dask.physics.superposition.problem import ShiftProblem
@@ -343,7 +343,7 @@ def rereference(result: Superposition, reference: float, logarithmic: bool = Fal
     """
     groups = result.groups
     if not groups[0] <= reference <= groups[-1]:
-        told, low, high = apart(reference, groups[0], groups[-1], digits=6)
+        told, low, high = distinguishable(reference, groups[0], groups[-1], digits=6)
         raise DataError(f"the reference must lie between {low} and {high}, got {told}")
     place, places = (np.log(reference), np.log(groups)) if logarithmic else (reference, groups)
     share = np.array([np.interp(place, places, unit) for unit in np.eye(groups.size)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy import fft, sparse
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import DataError, apart
+from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.physics.surfaces.scans import Cut, averaged
 from mdr_dask.physics.surfaces.spectrum import Spectrum
 
@@ -88,7 +88,7 @@ def filled(surface: SurfaceMap) -> SurfaceMap:
     missing = ~np.isfinite(height)
     count = int(np.count_nonzero(missing))
     if count > MOST_MISSING * height.size:
-        share, most = apart(100 * count / height.size, 100 * MOST_MISSING)
+        share, most = distinguishable(100 * count / height.size, 100 * MOST_MISSING)
         raise DataError(f"expected at most {most} % of missing points, which are filled, got {share} %")
     return SurfaceMap(_hung(height, missing) if count else height, surface.size)
 
