@@ -1,0 +1,196 @@
+"""Grid refinement: solve on a grid, solve on the next finer one, and estimate the error from their difference.
+
+Every solver that works on a grid uses this driver. A solver of order p on grids whose cells are halved from one level
+to the next reduces its error by r = 2^p per level. If c is the relative change of the results from the last grid but
+one to the last grid, and b the change before that, the relative error left on the last grid is estimated as
+
+    error = safety max( c / (r - 1),  b / (r (r - 1)) ).
+
+The first term is Richardson's estimate, with the safety factor of the grid convergence index (Roache, J. Fluids Eng.
+116, 405, 1994). The second term is what the first would be if c had fallen by r since b. It is there because two grids
+may agree by chance; it exists from the third grid on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.outcome import Outcome
+
+SAFETY = 3.0
+"""Roache's safety factor for an estimate from two grids."""
+
+
+class Solution(NamedTuple):
+    """Results of some cases on one grid.
+
+    Parameters
+    ----------
+    values : sequence of array, shape (cases, ...)
+        One array per output: one number per case, or a whole profile per case at positions that are the same on every
+        grid. NaN marks positions where the output does not exist.
+    outcome : int8 array, shape (cases,)
+        Values of `Outcome`.
+    """
+
+    values: Sequence[FloatArray]
+    outcome: NDArray[np.int8]
+
+
+class Refined(NamedTuple):
+    """Results of all cases, each on the coarsest grid that meets the accuracy.
+
+    Parameters
+    ----------
+    values : list of array, shape (cases, ...)
+        One array per output; NaN where a case has no solution.
+    errors : array, shape (outputs, cases)
+        Estimated absolute errors in the unit of the output; for a profile the largest error along it. Infinite where
+        nothing can be said.
+    met : bool array, shape (cases,)
+        Whether every output meets the accuracy.
+    level : int array, shape (cases,)
+        The level of the grid of the result.
+    outcome : int8 array, shape (cases,)
+        Values of `Outcome`; ``Outcome(number).sentence`` gives the reason of a failure.
+    """
+
+    values: list[FloatArray]
+    errors: FloatArray
+    met: NDArray[np.bool_]
+    level: IntArray
+    outcome: NDArray[np.int8]
+
+
+def refine(
+    solve: Callable[[int, IntArray], Solution],
+    cases: int,
+    levels: Sequence[int],
+    accuracy: float,
+    order: float,
+    *,
+    safety: float = SAFETY,
+    floors: float | Sequence[float] = 0.0,
+    shared: bool = True,
+) -> Refined:
+    """Solve every case on the coarsest grid on which all outputs meet an accuracy.
+
+    Parameters
+    ----------
+    solve : callable, (level, cases) -> Solution
+        Solves the cases with these indices on the grid of a level. It does not raise for a case that fails. All
+        outputs that it returns have to meet the accuracy.
+    cases : int
+        Number of cases.
+    levels : sequence of int
+        Increasing levels, such as numbers of cells. Cells are halved from each level to the next. All cases are solved
+        on the first two levels; with one level alone the errors are infinite.
+    accuracy : float
+        Error allowed for every output, relative to its largest absolute value or to its floor if that is larger.
+        Infinity if errors on the second level are wanted, whatever they are.
+    order : float
+        Order of convergence p of the solver, at least where most of the error arises.
+    safety : float
+        Safety factor of the estimate.
+    floors : float or sequence of float
+        Absolute size, for all outputs or for each, below which an error is not measured relative to the value. It is
+        needed by outputs of which zero is a normal value, such as a probability.
+    shared : bool
+        Whether all outputs of a case have the same relative error, that of the output with the largest change. Two
+        grids may agree by chance in one number but hardly in all. Choose False for outputs that converge differently.
+
+    Returns
+    -------
+    Refined
+        A case without a solution on the last grids keeps the solution of a coarser one, if there was any.
+
+    Notes
+    -----
+    A case that fails for a reason that no grid can mend (`Outcome.is_impossible`) is not refined.
+
+    Examples
+    --------
+    The integral of x^a from 0 to 1 by the trapezium rule, for two exponents:
+
+    >>> def integral(cells, cases):
+    ...     x = np.linspace(0.0, 1.0, cells + 1)
+    ...     areas = np.array([np.trapezoid(x**a, x) for a in np.array([2.0, 9.0])[cases]])
+    ...     return Solution([areas], np.zeros(cases.size, np.int8))
+    >>> found = refine(integral, 2, [4, 8, 16, 32, 64], 0.01, order=2)
+    >>> found.level, found.met
+    (array([16, 64]), array([ True,  True]))
+    >>> bool(np.all(np.abs(found.values[0] - [1 / 3, 1 / 10]) < found.errors[0]))
+    True
+    """
+    reduction = 2.0**order
+    left = np.arange(cases)
+    coarse = solve(levels[0], left)
+    floor = np.broadcast_to(np.asarray(floors, dtype=np.float64), len(coarse.values))
+    values = [np.array(value, dtype=np.float64) for value in coarse.values]
+    errors = np.full((len(values), cases), np.inf)
+    outcome, level, met = coarse.outcome.copy(), np.full(cases, levels[0]), np.zeros(cases, np.bool_)
+    before = np.zeros((len(values), cases))
+    for finer in levels[1:]:
+        going_on = ~met[left] & ~_is_impossible(outcome[left])
+        left, before, coarse = left[going_on], before[:, going_on], _only(coarse, going_on)
+        if not left.size:
+            break
+        fine = solve(finer, left)
+        change = relative_changes(coarse, fine, floor)
+        if shared:
+            change = np.broadcast_to(change.max(axis=0, initial=0.0), change.shape)
+        # before is infinite where the grid before had no solution: that says nothing about the last change
+        earlier = np.where(np.isfinite(before), before, 0.0) / reduction
+        relative = safety / (reduction - 1) * np.maximum(change, earlier)
+        solved = fine.outcome == Outcome.CONVERGED
+        better = solved | (outcome[left] != Outcome.CONVERGED)
+        kept = left[better]
+        for value, found in zip(values, fine.values, strict=True):
+            value[kept] = found[better]
+        outcome[kept], level[kept] = fine.outcome[better], finer
+        errors[:, kept] = np.where(solved, relative * _sizes(fine.values, floor), np.inf)[:, better]
+        met[left] = solved & np.all(relative <= accuracy, axis=0)
+        coarse, before = fine, change
+    for value in values:
+        value[outcome != Outcome.CONVERGED] = np.nan
+    return Refined(values, errors, met, level, outcome)
+
+
+def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> FloatArray:
+    """Return the change of every output from one grid to the next relative to its size, shape (outputs, cases).
+
+    Of a profile it is the largest change over the largest value. It is infinite where either grid has no solution.
+    """
+    solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
+    changes = []
+    for one, other, size in zip(coarse.values, fine.values, _sizes(fine.values, floors), strict=True):
+        nowhere = np.isnan(one) & np.isnan(other) & solved.reshape(-1, *(1,) * (other.ndim - 1))
+        with np.errstate(invalid="ignore"):
+            difference = np.where(nowhere, 0.0, np.abs(other - one)).reshape(solved.size, -1)
+        changes.append(_ratio(np.max(difference, axis=1, initial=0.0), size))
+    return np.where(solved & ~np.isnan(changes), changes, np.inf)
+
+
+def _sizes(values: Sequence[FloatArray], floors: FloatArray) -> FloatArray:
+    """Return the largest absolute value of every output and case, or the floor, shape (outputs, cases)."""
+    largest = [np.max(np.abs(np.nan_to_num(value)).reshape(len(value), -1), axis=1, initial=0.0) for value in values]
+    return np.maximum(largest, floors[:, None])
+
+
+def _ratio(change: FloatArray, size: FloatArray) -> FloatArray:
+    """Return change over size, 0 where nothing changes."""
+    with np.errstate(all="ignore"):
+        return np.where(change == 0, 0.0, change / size)
+
+
+def _only(solution: Solution, cases: NDArray[np.bool_]) -> Solution:
+    return Solution([value[cases] for value in solution.values], solution.outcome[cases])
+
+
+def _is_impossible(outcome: NDArray[np.int8]) -> NDArray[np.bool_]:
+    return np.isin(outcome, [each for each in Outcome if each.is_impossible])
