@@ -182,7 +182,7 @@ def test_steps_of_velocity_and_force_are_pieces_between_their_times() -> None:
         BASE | {"protocol": {"shape": "steps", "times": [0.0, 2.0], "velocities": [0.3, 0.5], "forces": [7.0, 9.0]}}
     ).protocol
     before, found = pieces(protocol, 0.1, 5.0, 0.2)
-    assert before == 0.1
+    assert before == (0.1, 5.0)
     assert [(each.start, each.end, each.velocity, each.force) for each in found] == [
         (0.0, 2.0, (0.3, 0.3), (7.0, 7.0)),
         (2.0, np.inf, (0.5, 0.5), (9.0, 9.0)),
@@ -193,6 +193,63 @@ def test_steps_of_velocity_and_force_are_pieces_between_their_times() -> None:
     (rising, kept) = pieces(ramp, 0.1, 5.0, 0.2)[1]
     assert (rising.start, rising.end, rising.velocity, rising.force) == (0.0, 2.0, (0.1, 0.5), (5.0, 9.0))
     assert (kept.velocity, kept.force) == ((0.5, 0.5), (9.0, 9.0))
+
+
+def load_step(shape: str, start: str, tmp_path: Path) -> dict[str, object]:
+    """Return a history whose load falls from 640 to 320 N at t = 0."""
+    if shape == "steps":
+        return {"shape": "steps", "start": start, "times": [0.0], "velocities": [0.05], "forces": [320.0]}
+    if shape == "late":
+        times, velocities = [0.0, 3e-3], [0.05, 0.05]
+        return {"shape": "steps", "start": start, "times": times, "velocities": velocities, "forces": [320.0, 320.0]}
+    first = {"table": "", "two rows": f"0,{0.05 if start == 'steady' else 0},640\n"}[shape]
+    file = tmp_path / "load.csv"
+    file.write_text(f"time [s],velocity [m/s],force [N]\n{first}0,0.05,320\n1,0.05,320\n")
+    return {"shape": "table", "start": start, "file": str(file)}
+
+
+@pytest.mark.parametrize("glass", [None, 3.0])
+@pytest.mark.parametrize("start", ["steady", "rest"])
+@pytest.mark.parametrize("shape", ["steps", "late", "table", "two rows"])
+def test_a_load_step_at_the_beginning_starts_from_the_load_before_it(
+    shape: str, start: str, glass: float | None, tmp_path: Path
+) -> None:
+    """In full contact the depth creeps by the compliance J(t), and mu = 4 eta v L s^2 / F_N under each load."""
+    body, recovery, instant = {}, 1.0, 0.0  # J(t) = 1 - (1 - instant) exp(-t / recovery)
+    if glass is not None:
+        solid = {"static_modulus": 1e7, "glass_modulus": glass * 1e7, "relaxation_time": 1e-3}
+        body = {"shear_modulus": None, "relaxation_time": None, "material": {"standard_solid": solid}}
+        recovery, instant = glass, 1 / glass
+    protocol, times = load_step(shape, start, tmp_path), np.array([0.0, 0.1, 1.0, 5.0])
+    found = compute(block(protocol=protocol, normal_force=640.0, relaxation_times=tuple(times), points=32, **body))
+    assert np.all(found.status == Status.DONE), found.messages
+    creep = 1 - (1 - instant) * np.exp(-times / recovery)
+    depth = (640 - 320 * creep) / (4 * 1e7 * 0.002)
+    assert np.allclose(found.values["indentation_depth"], depth, rtol=1e-3)
+    before = found.values["friction_coefficient_before"]
+    if start == "rest":
+        assert np.all(np.abs(before) < 1e-12)
+    elif glass is None:
+        slope = found.values["rms_slope"]
+        assert np.allclose(before, 4 * 1e4 * 0.05 * 0.002 * slope**2 / 640, rtol=0.02)
+        assert np.allclose(found.values["friction_coefficient"][..., -1], 2 * before, rtol=0.02)
+
+
+@pytest.mark.parametrize("force", [0.05, 0.2])
+def test_the_friction_before_a_load_step_is_that_of_the_load_before(force: float) -> None:
+    step = {"shape": "steps", "times": [0.0], "velocities": [0.05], "forces": [force]}
+    found = compute(block(protocol=step)).values
+    for name in ("friction_coefficient_before", "friction_coefficient_before_error"):
+        assert np.all(np.isfinite(found[name]))
+    steady = compute(block()).values["friction_coefficient_before"]
+    assert np.all(np.abs(found["friction_coefficient_before"] - steady) < found["friction_coefficient_before_error"])
+
+
+def test_a_table_that_contradicts_the_state_before_it_is_a_failed_case(tmp_path: Path) -> None:
+    protocol = load_step("two rows", "steady", tmp_path)
+    found = compute(block(protocol=protocol, normal_force=600.0))
+    assert np.all(found.status == Status.FAILED)
+    assert all("load.csv" in text and "600 N" in text and "640 N" in text for text in found.messages.values())
 
 
 def test_the_error_of_a_history_is_that_of_half_the_nodes_in_half_the_steps(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -95,20 +95,20 @@ def _check_rows(times: tuple[float, ...], velocities: tuple[float, ...], forces:
         raise ValueError(f"expected positive forces, got {forces!r}")
 
 
-def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[float, list[Piece]]:
-    """Return the velocity before t = 0, and the loading history from there on for ever.
+def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> tuple[tuple[float, float], list[Piece]]:
+    """Return velocity and normal force before t = 0, and the loading history from t = 0 on without end.
 
     Raises
     ------
     DataError
-        If a table does not hold a loading history.
+        If a table does not hold a loading history, or contradicts the state before t = 0.
     """
     from mdr_dask.physics.transients.elements.loading_history import Piece
 
     if isinstance(protocol, Jump):
         after = velocity * (1 + change)
-        return velocity, [Piece(0.0, np.inf, (after, after), (force, force))]
-    before = velocity if protocol.start == "steady" else 0.0
+        return (velocity, force), [Piece(0.0, np.inf, (after, after), (force, force))]
+    before = (velocity if protocol.start == "steady" else 0.0), force
     if isinstance(protocol, Oscillation):
         if protocol.force_amplitude >= force:
             raise DataError(f"expected a force_amplitude below the normal force, got {protocol.force_amplitude!r}")
@@ -116,15 +116,20 @@ def pieces(protocol: Protocol, velocity: float, force: float, change: float) -> 
         return before, [Piece(0.0, np.inf, (velocity, velocity), (force, force), swing)]
     if isinstance(protocol, Ramp):
         last = (velocity if protocol.velocity is None else protocol.velocity, protocol.force or force)
-        rows = [(0.0, before, force), (protocol.duration, *last)]
+        rows = [(0.0, *before), (protocol.duration, *last)]
     elif isinstance(protocol, Steps):
         forces = protocol.forces or (force,) * len(protocol.times)
-        rows, now = [(0.0, before, force)], (before, force)
+        rows = [(0.0, *before)]
         for time, *then in zip(protocol.times, protocol.velocities, forces, strict=True):
-            rows += [(time, *now), (time, then[0], then[1])]
-            now = then[0], then[1]
+            rows += [(time, rows[-1][1], rows[-1][2]), (time, then[0], then[1])]
     else:
         rows = _table_rows(protocol.file, force)
+        if len(rows) > 1 and rows[1][0] == 0 and not np.allclose(rows[0][1:], before, rtol=1e-9, atol=0):
+            raise DataError(
+                f"{protocol.file.name}: expected the velocity and force before t = 0, {before[0]:g} m/s and "
+                f"{before[1]:g} N, in the first of two rows at t = 0, got {rows[0][1]:g} m/s and {rows[0][2]:g} N; "
+                "correct that row, or velocity, normal_force and start of the campaign"
+            )
     found = [Piece(a[0], b[0], (a[1], b[1]), (a[2], b[2])) for a, b in pairwise(rows) if b[0] > a[0]]
     end = rows[-1]
     return before, [*found, Piece(end[0], np.inf, (end[1], end[1]), (end[2], end[2]))]

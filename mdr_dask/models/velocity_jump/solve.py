@@ -244,7 +244,7 @@ class _Followed(_Group):
         height, length = (float(column[self.members[0]]) for column in (self.problems.height, self.problems.length))
         solid, unit = case.solid(), case.time_unit()
         static = solid.static_modulus
-        before, history = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
+        (before, load), history = pieces(case.protocol, case.velocity, case.normal_force, case.velocity_change)
         velocity, force = length / unit, 4 * static * length * height
         history = [piece.scaled(unit, velocity, force) for piece in history]
         nodes = waves.points * self.oversampling
@@ -252,7 +252,7 @@ class _Followed(_Group):
         line = without_kinks(RoughLine(waves, self.setting.body).through(heights, slopes))
         elements = foundation(solid.moduli / static, solid.times / unit, solid.viscosity / static / unit)
         times = np.array(case.relaxation_times)
-        return trace(line, elements, before / velocity, history, times, self.steps / every)
+        return trace(line, elements, (before / velocity, load / force), history, times, self.steps / every)
 
 
 def _check_rough(roughness: Roughness) -> None:

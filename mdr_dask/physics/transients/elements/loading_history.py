@@ -144,7 +144,12 @@ class _Stand(NamedTuple):
 
 
 def trace(
-    line: CubicLine, solid: Foundation, before: float, pieces: Sequence[Piece], times: FloatArray, per_decade: float
+    line: CubicLine,
+    solid: Foundation,
+    before: tuple[float, float],
+    pieces: Sequence[Piece],
+    times: FloatArray,
+    per_decade: float,
 ) -> Trace:
     """Follow every element of a body through a history.
 
@@ -152,8 +157,9 @@ def trace(
     ----------
     line, solid
         As in :func:`~mdr_dask.physics.transients.elements.follow.follow_line`.
-    before : float
-        Velocity until t = 0, at which the body slides steadily, or rests, under the first load.
+    before : tuple of float
+        Velocity and load until t = 0: the body slides steadily, or rests where the velocity is 0. Both may jump at
+        t = 0.
     pieces : sequence of Piece
         From t = 0 on for ever.
     times : array, shape (m,)
@@ -162,11 +168,11 @@ def trace(
         Steps in a factor ten of the time after every change.
     """
     times = _snapped(times, np.array([piece.start for piece in pieces]))
-    first_load = pieces[0].force[0]
-    state, depth, status = steady_start(line, solid, abs(before), first_load)
+    velocity, load_before = before
+    state, depth, status = steady_start(line, solid, abs(velocity), load_before)
     if status != Outcome.CONVERGED:
         return _failed(times, Outcome(status))
-    first = _still(line, solid, before, first_load, state, depth)
+    first = _still(line, solid, velocity, load_before, state, depth)
     stand = _Stand(state, depth, 0.0)
     found: list[tuple[FloatArray, FloatArray, FloatArray]] = []
     for piece in pieces:
@@ -186,7 +192,7 @@ def trace(
         stand = _Stand(part.state, float(part.depth[-1]), float(travels[-1]))
     moment, friction, depths = (np.concatenate(column) for column in zip(*found, strict=True))
     return Trace(
-        float(first.drag[0]) / first_load,
+        float(first.drag[0]) / load_before,
         float(friction[0]),
         _end(line, solid, pieces[-1]),
         _at(times, moment, friction),
