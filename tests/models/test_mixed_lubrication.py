@@ -124,7 +124,9 @@ def test_trace_agrees_with_its_mean():
     trace = values["contact_length_trace"][0, 0]
     assert np.mean(trace > 0) == pytest.approx(values["breakthrough_probability"][0, 0], rel=1e-12)
     assert np.mean(trace) == pytest.approx(values["contact_length"][0, 0], rel=1e-12)
-    assert values["contact_resistance"][0, 0] == pytest.approx(2e-7 / np.mean(trace), rel=1e-12)
+    squares = 0.01 / (2 * values["contact_half_width"][0, 0])  # the longest wave is 2a at this force
+    assert values["independent_squares"][0, 0] == pytest.approx(squares, rel=1e-12)
+    assert values["contact_resistance"][0, 0] == pytest.approx(2e-7 / np.mean(trace) / squares, rel=1e-12)
 
 
 def test_profiles_overlap_where_there_is_contact():
@@ -203,8 +205,9 @@ def test_errors_of_a_turn_come_from_other_splines_of_its_waves(force, parts, com
     assert found["contact_length_error"] == pytest.approx(off, rel=0.02)
     off = found["contact_length_error"][0, 0]
     assert found["contact_length"] == pytest.approx(length, rel=1e-12)
-    assert found["contact_conductance_error"] == pytest.approx(off / 2e-7, rel=1e-9)
-    assert found["contact_resistance_error"] == pytest.approx(2e-7 / (length - off) - 2e-7 / length, rel=1e-6)
+    specific = 2e-7 / found["independent_squares"]
+    assert found["contact_conductance_error"] == pytest.approx(off / specific, rel=1e-9)
+    assert found["contact_resistance_error"] == pytest.approx(specific / (length - off) - specific / length, rel=1e-6)
 
 
 @pytest.mark.parametrize("number", [50_000, 100_000])
@@ -628,6 +631,23 @@ def test_measured_profiles_take_the_place_of_generated_lines(tmp_path):
     assert result.values["film_ratio"][0, 0] == pytest.approx(4e-7 / (6e-7 / 3 * np.sqrt(2)), rel=0.1)
     scaled = MODEL.compute(block(**files | {"rms_roughness": 2e-7})).values["film_ratio"][0, 0]
     assert scaled == pytest.approx(4e-7 / (2e-7 * np.sqrt(2)), rel=1e-3)  # the cut line is not quite of unit rms
+
+
+def test_creep_on_measured_profiles_has_the_mean_of_pure_rolling_and_of_swapped_rollers(tmp_path):
+    """With S = -1 a revolution covers half of line 1: a fixed start would bias the mean by 20 standard errors."""
+    files = profiles(tmp_path)
+    files["surface_1"]["profile"] = write_profile(
+        tmp_path / "uneven.csv", 1e-6, 5e-7 * np.sin(np.arange(4000) ** 2 / 4e4) * (np.arange(4000) > 2000)
+    )
+    swapped = files | {"surface_1": files["surface_2"], "surface_2": files["surface_1"]}
+    found = [
+        MODEL.compute(block(["breakthrough_probability"], range(60), slide_roll_ratio=creep, **rollers))
+        for creep, rollers in ((0.0, files), (-1.0, files), (1.0, swapped))
+    ]
+    values = [one.values["breakthrough_probability"][0] for one in found]
+    means, errors = (np.array([f(one) for one in values]) for f in (np.mean, lambda one: one.std(ddof=1) / 60**0.5))
+    for other in (1, 2):
+        assert abs(means[other] - means[0]) < 3 * np.hypot(errors[other], errors[0])
 
 
 def test_bad_profiles_give_one_error(tmp_path):

@@ -170,17 +170,21 @@ class Measured:
         return float(np.sqrt(sum(np.mean(line**2) for line in self._pair())))
 
     def lines(self, seed: int, realisation: int, other: bool = False) -> tuple[FloatArray, FloatArray]:
-        """Return the splines through both lines, the second one turned by a random number of points.
+        """Return the splines through both lines, each of which starts at a random point of its ring.
 
-        The other ones go through every second point.
+        With creep, one revolution of the mean surface covers 1 + S/2 of line 1 and 1 - S/2 of line 2. Means over
+        realisations are therefore unbiased only if the starts of both lines are random. `other` gives the splines
+        through every second point.
         """
         from mdr_dask.physics.surfaces.splines import through_heights
 
-        line_1, line_2 = self._pair()
-        stream = np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,)))
-        turned = np.roll(line_2, int(np.random.Generator(stream).integers(line_2.size)))
+        stream = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(realisation,))))
+        offset, start = (int(stream.integers(self.points)) for _ in range(2))
         step = 2 if other else 1
-        first, second = (through_heights(line[: line.size // step * step : step]) for line in (line_1, turned))
+        first, second = (
+            through_heights(np.roll(line, roll)[: line.size // step * step : step])
+            for line, roll in zip(self._pair(), (start, start + offset), strict=True)
+        )
         return first, second
 
     def slope(self, perimeter: float) -> float:

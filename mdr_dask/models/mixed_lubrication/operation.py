@@ -85,6 +85,14 @@ class Operation:
         return breakthrough.Pair(*lines, self.level, self.length / lines[0].size, self.strength)
 
     @property
+    def squares(self) -> float:
+        """Number of squares with the longest wavelength as edge, side by side in the width of the rollers.
+
+        One line stands for one square.
+        """
+        return self.case.roller_width / self.case.longest()
+
+    @property
     def rms(self) -> float:
         """Rms height of both lines together in m."""
         return self.scale * self.source.combined_rms()
@@ -221,7 +229,10 @@ def fixed_values(operation: Operation) -> dict[str, float]:
             ),
         }
     values |= {f"{name}_error": value for name, value in errors.items()}
-    return values | {"contact_half_width": float(operation.contact.half_width)}
+    return values | {
+        "contact_half_width": float(operation.contact.half_width),
+        "independent_squares": operation.squares,
+    }
 
 
 def friction(operation: Operation, film: float, asperity_share: float) -> float:

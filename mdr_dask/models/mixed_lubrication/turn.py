@@ -159,7 +159,7 @@ def turn_values(
     operation: Operation, turn: Turn, errors: Callable[[], FloatArray], wanted: Collection[str]
 ) -> dict[str, float]:
     """Return the scalar outputs of a realisation that are wanted, and their errors from those of `Turn.errors`."""
-    resistivity = operation.case.resistivity
+    resistivity = operation.case.resistivity / operation.squares  # the squares conduct in parallel
     length = turn.length
     found: dict[str, Callable[[], float]] = {
         "breakthrough_probability": lambda: turn.probability,
