@@ -24,7 +24,6 @@ Variables = dict[str, xr.Variable]
 MODELS = ("sliding_friction",)
 ZONE_ONE = (0.01, 0.3)  # F_N / (G h L) over which alpha and beta are fitted; they depend on it by up to 0.02 and 0.14
 LINEAR = 0.05  # change of mu / v between the two lowest velocities that still counts as region I
-LAW_FROM = 0.1  # F_N / (G h L) above which the interpolation law is fitted
 
 
 def spectral_slope(data: xr.Dataset) -> xr.DataArray:
@@ -339,13 +338,13 @@ def least_squares(
     return constants
 
 
-def law_error(departures: FloatArray, suffix: str, which: str) -> Variables:
-    """Return how far a law is from the data, both in units of the plateau sqrt 2 slope."""
+def law_error(departures: FloatArray, suffix: str, unit: str, which: str) -> Variables:
+    """Return the rms and the largest departure of the data from a law."""
     away = np.abs(departures)
     rms, largest = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     return {
-        **measure(f"rms_error{suffix}", rms, f"rms error of the law over its plateau, {which}"),
-        **measure(f"largest_error{suffix}", largest, f"largest error of the law over its plateau, {which}"),
+        **measure(f"rms_error{suffix}", rms, f"rms error of the law, {unit}, {which}"),
+        **measure(f"largest_error{suffix}", largest, f"largest error of the law, {unit}, {which}"),
     }
 
 
@@ -356,39 +355,39 @@ def peak_velocity(velocity: FloatArray, mean: FloatArray) -> float:
 
 
 def _interpolation(data: xr.Dataset) -> Variables:
-    """Fit alpha and beta of eq. 3.18 to regions I to III."""
+    """Fit alpha and beta of eq. 3.18 to the logarithms of friction in regions I to III."""
     forces, velocities = loads_and_velocities(data)
     table = table_of(data, np.sqrt(2) * spectral_slope(data), forces, velocities)
     force, velocity = table.columns
     mean = np.nan_to_num(table.mean())
-    used = (force >= LAW_FROM) & (mean > 0)
+    used = (force >= ZONE_ONE[0]) & (mean > 0)
     for load in np.unique(force[used]):
         same = used & (force == load)
         used[same] = velocity[same] <= peak_velocity(velocity[same], mean[same])
     if np.count_nonzero(used) < 5:
         raise FitError(
-            f"expected five cases with F_N / (G h L) above {LAW_FROM} below region IV, got {int(used.sum())}"
+            f"expected five cases with F_N / (G h L) above {ZONE_ONE[0]} below region IV, got {int(used.sum())}"
         )
     force, velocity, count = force[used], velocity[used], table.count(used)
 
     def model(constants: FloatArray) -> FloatArray:
-        law: FloatArray = laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:]))
+        law: FloatArray = np.log(laws.interpolation(force, velocity, constants[:, :1], np.exp(constants[:, 1:])))
         return law
 
     hurst = one_value(data, "hurst")
     start = (laws.alpha(hurst), float(np.log(laws.BETA)))
-    stack = table.stack(used)
+    stack = table.logarithms(used)
     found = fitted(
         lambda rows: least_squares(model, start, rows), lambda rows, found: rows - model(found), stack, count
     )
     at = int(np.argmax(np.abs(found.departures)))
-    worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}, of the plateau"
+    worst = f"F_N / (G h L) = {force[at]:.2g}, v tau slope / (sqrt 2 h) = {velocity[at]:.2g}"
     return {
         **constant("alpha", found.constants[:, 0], count, "exponent of the force in the interpolation law"),
         **measure("alpha_stated", laws.alpha(hurst), "H / (1 + H)"),
         **constant("beta", np.exp(found.constants[:, 1]), count, "factor of the interpolation law", positive=True),
-        **law_error(found.departures, "", "constants fitted"),
-        **law_error(stack[0] - model(np.array([start]))[0], "_stated", "with H / (1 + H) and 1.6"),
+        **law_error(found.departures, "", "relative", "constants fitted"),
+        **law_error(stack[0] - model(np.array([start]))[0], "_stated", "relative", "with H / (1 + H) and 1.6"),
         **measure("cases", int(used.sum()), "number of cases fitted"),
         **holds(law_holds(found.departures, found.chance, 2, worst)),
     }

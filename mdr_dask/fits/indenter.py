@@ -111,8 +111,10 @@ def _indenter(data: xr.Dataset) -> Variables:
     worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
     return {
         **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
-        **law_error(of_plateau, "", "exponent fitted"),
-        **law_error(np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "exponent 1.5"),
+        **law_error(of_plateau, "", "in units of sqrt 2 slope", "exponent fitted"),
+        **law_error(
+            np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "in units of sqrt 2 slope", "exponent 1.5"
+        ),
         **measured,
         **holds(law_holds(found.departures, found.chance, 1, worst)),
     }

@@ -49,13 +49,16 @@ def full_contact(force: Any, velocity: Any) -> Any:
 
 
 def interpolation(force: Any, velocity: Any, exponent: Any, beta: Any) -> Any:
-    """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`."""
+    """Return mu / (sqrt 2 slope) in regions I to III and both zones (eq. 3.17, 3.18); arguments as in `zone_one`.
+
+    The squares of the reciprocals of three laws are added: that of the plateau, `full_contact` and `zone_one`.
+    """
     return (1 + (crossover(force, exponent, beta) / velocity) ** 2) ** -0.5
 
 
 def crossover(force: Any, exponent: Any, beta: Any) -> Any:
     """Return the `velocity_number` at which the law of low velocities meets the plateau."""
-    return force / 4 + force**exponent / beta
+    return np.hypot(force / 4, force**exponent / beta)
 
 
 def regions(force: Any, exponent: Any, beta: Any, share: float = 0.9) -> tuple[Any, Any]:
