@@ -1,5 +1,8 @@
+import hashlib
 import importlib
+import os
 import pkgutil
+from pathlib import Path
 
 import hypothesis
 import pytest
@@ -7,6 +10,13 @@ import threadpoolctl
 import toy as toy_model
 
 import mdr_dask
+
+PHYSICS = Path(mdr_dask.__file__).parent / "physics"
+if "NUMBA_CACHE_DIR" not in os.environ:
+    # numba compares a kernel's own file only: a changed function that kernels of other files call needs a new cache
+    sources = b"".join(path.read_bytes() for path in sorted(PHYSICS.rglob("*.py")))
+    name = hashlib.sha1(sources, usedforsecurity=False).hexdigest()[:12]
+    os.environ["NUMBA_CACHE_DIR"] = str(PHYSICS.parents[1] / ".numba_cache" / name)
 
 # the same examples every time; `--hypothesis-profile=search` looks for new ones; no deadline, for machines may be busy
 hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None)

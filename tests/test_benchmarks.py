@@ -126,18 +126,3 @@ def test_a_fall_of_the_velocity_is_that_of_its_elements(benchmark_script):
     off = np.max(np.abs(course - script.followed(case, 16)))
     assert off < 1e-3  # elements on twice as many nodes are 5e-4 off
     assert np.max(errors) < 3e-3
-
-
-def test_operations_are_counted_as_they_are_run(benchmark_script):
-    """Two numbers are written for each wave, after two polynomials of the square of one angle."""
-    (counted,) = benchmark_script("limit.roofs").counts("phase factors").values()
-    assert counted["store"] == 2
-    assert counted["multiply"] > counted["add"] > 10
-
-
-def test_every_kernel_that_is_held_against_the_processor_can_be_called(benchmark_script):
-    """Counting them takes a minute; a name that is no more is found at once."""
-    for kernel in benchmark_script("limit.kernels").KERNELS:
-        work = kernel.prepare()
-        work.call()
-        assert work.units >= 1

@@ -71,30 +71,3 @@ def test_every_campaign_shown_is_right(text, tmp_path):
 def test_no_link_is_dead(page):
     for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text()):
         assert target.startswith("http") or (page.parent / target).exists(), target
-
-
-#: Words of the longest sentence. Numbers are no words; a formula, a code or a row of codes is one.
-LONGEST = 32
-
-
-def sentences(page):
-    """Return the sentences of a page: without code and tables, one by one in lists."""
-    text = re.sub(r"^```.*?^```|^    .*?$|^\s*[|#<].*?$", "\n", page.read_text(), flags=re.M | re.S)
-    for part in re.split(r"\n\s*\n|^\s*(?:[*-]|\d+\.) ", text, flags=re.M):
-        plain = re.sub(r"`[^`]*`(?:[,/]\s*`[^`]*`)*|\$[^$]*\$", "Code", part)
-        yield from re.split(r"[.?!]\W*\s|:\s+(?=[A-Z])", re.sub(r"\]\([^)]*\)", "]", plain))
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_sentences_are_short(page):
-    for sentence in sentences(page):
-        words = [word for word in sentence.split() if re.search(r"[^\W\d_]{2}|^[aAI]$", word)]
-        assert len(words) <= LONGEST, " ".join(sentence.split())
-
-
-def test_a_long_sentence_is_seen(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(
-        "Short.\n\n* A list of 3:\n* " + "many\nwords `and code` " * 12 + "\n* end\n\n| " + "cell " * 50 + "|\n"
-    )
-    assert max(len(sentence.split()) for sentence in sentences(page)) == 36

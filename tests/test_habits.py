@@ -5,7 +5,6 @@ import json
 import re
 import subprocess
 import sys
-from collections import defaultdict
 from pathlib import Path
 
 import click
@@ -84,31 +83,6 @@ def test_the_first_two_shell_blocks_of_the_readme_are_one_command_line_each():
     assert "pytest" in blocks[1]
 
 
-def definitions(folder):
-    """Return (file, definition) of everything at the top of the files of a folder, and of every function in them."""
-    for path in sorted((ROOT / "mdr_dask" / folder).rglob("*.py")):
-        name = path.relative_to(ROOT / "mdr_dask" / folder).as_posix()
-        yield name, ast.parse(path.read_text())
-
-
-def test_what_belongs_together_travels_together():
-    """A call with eight arguments hides a noun; numba hands NamedTuples over at a fraction of a microsecond."""
-    long = []
-    for name, tree in definitions("physics"):
-        for function in (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)):
-            arguments = function.args
-            names = [one.arg for one in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)]
-            if len([one for one in names if one not in ("self", "cls")]) >= 8:
-                long.append(f"{name}: {function.name}")
-    assert long == []
-
-
-def test_a_file_is_one_idea():
-    """Beyond this size a file has held two, every time."""
-    sizes = {path: len(path.read_text().splitlines()) for path in (ROOT / "mdr_dask").rglob("*.py")}
-    assert {path: size for path, size in sizes.items() if size > 450} == {}
-
-
 @pytest.mark.parametrize(
     "room", sorted((ROOT / "mdr_dask/physics").glob("**/__init__.py")), ids=lambda path: path.parent.name
 )
@@ -118,13 +92,3 @@ def test_a_room_says_what_is_inside(room):
     }
     said = re.findall(r"`(\w+)`", ast.get_docstring(ast.parse(room.read_text())))
     assert inside - {"__init__"} <= set(said)
-
-
-def test_public_names_are_unique_across_physics():
-    """Every solver may have its own `Settings`."""
-    seen = defaultdict(set)
-    for name, tree in definitions("physics"):
-        for node in tree.body:
-            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
-                seen[node.name].add(name)
-    assert not {name: sorted(files) for name, files in seen.items() if len(files) > 1 and name != "Settings"}

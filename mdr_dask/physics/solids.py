@@ -14,7 +14,7 @@ from scipy.optimize import nnls
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
-from mdr_dask.physics.compiling import kernel, nested
+from mdr_dask.physics.jit import jit
 
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant, J / (mol K)."""
@@ -356,7 +356,7 @@ def recovery(moduli: FloatArray, times: FloatArray) -> Recovery:
     return Recovery(zeros, stretch, amplitude)
 
 
-@nested
+@jit
 def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> tuple[float, float]:
     """Return 1 + sum G tau / (tau - lambda) at a distance `offset` from pole `k`, and its derivative by lambda."""
     total, rate = 1.0, 0.0
@@ -367,7 +367,7 @@ def _imbalance(k: int, offset: float, weight: FloatArray, times: FloatArray) -> 
     return total, rate
 
 
-@kernel
+@jit
 def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the times lambda_k of free recovery, the zeros of 1 + sum weight_m / (tau_m - lambda).
 
@@ -400,7 +400,7 @@ def recovery_times(weight: FloatArray, times: FloatArray) -> tuple[FloatArray, F
     return zeros, distance
 
 
-@nested
+@jit
 def _distance_to_zero(pole: int, sign: float, gap: float, weight: FloatArray, times: FloatArray) -> float:
     """Return how far the zero beside a pole is from it: bisection of its logarithm, ended by Newton's method."""
     high = np.log(gap)

@@ -14,8 +14,6 @@ import re
 import numpy as np
 import planted
 import pytest
-import record
-import seen
 import xarray as xr
 from drawn import LAST, check_colours, check_laws, check_limits, check_picture, check_words, expected, mismatches
 
@@ -269,7 +267,7 @@ RENDERED = {(name, model_of(text)): shape for shape, (text, _, holds) in TABLE.i
 
 
 @pytest.mark.parametrize(("shape", "name"), CASES)
-def test_every_figure_is_drawn_or_says_why_not(shape, name, stores, dataframe_regression):
+def test_every_figure_is_drawn_or_says_why_not(shape, name, stores):
     text, _, holds = TABLE[shape]
     plot, groups = available(model_of(text))[name], stores(shape)
     if name not in holds:
@@ -315,53 +313,8 @@ def test_every_figure_is_drawn_or_says_why_not(shape, name, stores, dataframe_re
         )
         if data[column].tail(1).notna().all() and data[column].abs().max() > 0:
             assert len(mismatches(moved, known)) == 1, f"a change of {column} by 0.1 % is not seen"
-    record.check_part(dataframe_regression, re.sub(r"\W+", "_", shape), name, seen.of(figure))
     if shape == RENDERED[name, model_of(text)]:
         figure.savefig(io.BytesIO(), dpi=20)
-
-
-#: Figures, and stores that they are drawn of when some of the values are zero or negative.
-ODD = [
-    ("cone", "indenter"),
-    ("force, velocity", "force"),
-    ("velocity", "velocity"),
-    ("velocity", "regions"),
-    ("velocity", "plateau"),
-    ("jumps: velocity", "jump_law"),
-    ("jumps: velocity", "jump_height"),
-    ("jumps: velocity", "jump_velocities"),
-    ("jumps: velocity", "jump_trace"),
-    ("jumps: velocity", "relaxation_rate"),
-    ("rollers: creep too", "stribeck"),
-    ("film: map", "film_formula"),
-    ("film: map", "film_regimes"),
-    ("film: map", "regime_map"),
-    ("film: one case", "film_profile"),
-    ("film: units", "traction"),
-    ("wear: rules", "wear_growth"),
-]
-
-
-def odd(data):
-    """A series with a case of zeros, one of negative numbers or zeros, and some without piezoviscosity."""
-    cases = [dim for dim in data["status"].dims if dim != "realisation"]
-    factor = np.ones([data.sizes[dim] for dim in cases])
-    factor.flat[1:2], factor.flat[2:3] = 0.0, -1.0 if data.attrs["model"] != "velocity_jump" else 0.0
-    found = {name: data[name] * xr.DataArray(factor, dims=cases) for name in data.data_vars if name != "status"}
-    found = {name: each.transpose(*data[name].dims).assign_attrs(data[name].attrs) for name, each in found.items()}
-    data = data.assign(found)
-    values = data.get("material_parameter", xr.DataArray(0))
-    return data.assign_coords(material_parameter=values * [0.0, 1.0]) if values.ndim else data
-
-
-@pytest.mark.parametrize(("shape", "name"), ODD)
-def test_values_that_are_no_positive_numbers_are_drawn_as_on_record(shape, name, stores, dataframe_regression):
-    groups = {series: odd(data) for series, data in stores(shape).items()}
-    try:
-        found = seen.of(available(model_of(TABLE[shape][0]))[name].figure(groups))
-    except (DataError, FitError) as refused:
-        found = {"words": str(refused)}
-    record.check_part(dataframe_regression, "odd", f"{shape}, {name}", found)
 
 
 #: Figures with a point for each case, whose tables have all its parameters.

@@ -3,8 +3,6 @@
 import numpy as np
 import planted
 import pytest
-import record
-import seen
 import xarray as xr
 from drawn import check_picture, mismatches, rows, stored
 from matplotlib.colors import LogNorm
@@ -93,7 +91,7 @@ LINES = [
 
 
 @pytest.mark.parametrize(("study", "output", "over", "view"), LINES)
-def test_an_output_against_a_parameter_is_what_the_store_holds(study, output, over, view, stores, dataframe_regression):
+def test_an_output_against_a_parameter_is_what_the_store_holds(study, output, over, view, stores):
     data = stores[study]
     figure = drawn({"": data}, output, over, **view)
     table = figure.table()
@@ -109,58 +107,6 @@ def test_an_output_against_a_parameter_is_what_the_store_holds(study, output, ov
     empty = bool(data[output].isnull().all("realisation").any())
     marked = set(table["what"]) & {"failed"}
     assert bool(marked) == empty or "values of" in style.left_out(figure)
-    asked = " ".join([study, output, over, *(f"{key}={value}" for key, value in view.items())])
-    record.check_part(dataframe_regression, "lines", asked, seen.of(figure))
-
-
-#: Further views of studies at places: an output over axes, what is asked besides, size of a page and style.
-VIEWS = [
-    ({"grid": None}, MU, ("velocity", "normal_force"), {}, None, None),
-    ({"grid": None}, MU, ("normal_force", "velocity"), {"panels": "hurst", "log": "x"}, None, None),
-    ({"grid": None}, "indentation_depth", ("hurst", "velocity"), {"log": ""}, "85x60mm", None),
-    ({"sampled": None}, MU, ("velocity", "hurst"), {}, None, None),
-    ({"wear": None}, "wear_volume", (planted.RULE, "cycles"), {"panels": "stick_radius"}, None, None),
-    ({"grid": None}, MU, (), {}, None, None),
-    ({"sampled": None}, MU, (), {"log": "y"}, None, None),
-    ({"rollers": None}, "contact_length", (), {}, "170mm", None),
-    ({"rollers": None}, "contact_length", ("temperature",), {"by": "normal_force"}, "60mm", "grayscale"),
-    ({"rollers": None}, "film_ratio", ("rotation_speed",), {"panels": "normal_force", "log": "y"}, "85mm", "ggplot"),
-    ({"jump": None}, "friction_coefficient_jump", ("velocity_change",), {"by": "velocity"}, None, "grayscale"),
-    ({"film": None}, "film", ("position",), {"panels": "speed_parameter"}, "120mm", None),
-    ({"film": None}, "pressure", ("position", "speed_parameter"), {"panels": "load_parameter"}, None, None),
-    (
-        {"grid": {"hurst": 0, "normal_force": 3}, "jump": {"velocity_change": 0}},
-        "rms_slope",
-        ("velocity",),
-        {},
-        None,
-        None,
-    ),
-    ({"grid": {"hurst": 0}, "sampled": {}}, MU, ("velocity",), {}, None, None),
-    ({"grid": {"hurst": 0}, "sampled": {}}, MU, ("velocity", "normal_force"), {}, None, None),
-    ({"grid": {"hurst": 1}, "jump": {}}, MU, ("velocity",), {}, None, "grayscale"),
-    (
-        {"grid": {"normal_force": 8, "hurst": 0}, "sampled": {"case": 0}},
-        MU,
-        ("velocity",),
-        {"log": "xy"},
-        "3x2in",
-        None,
-    ),
-]
-
-
-def test_views_are_what_they_were(stores, dataframe_regression):
-    found = {}
-    for number, (studies, output, over, view, size, look) in enumerate(VIEWS):
-        series = {name if len(studies) > 1 else "": stores[name].isel(at or {}) for name, at in studies.items()}
-        asked = page.Page(
-            *(page.size(size) if size else (None, None)), {"velocity": "mm/s", "contact_length": "um"} if size else {}
-        )
-        with page.drawing_for(asked, look):
-            shown = seen.of(drawn(series, output, over, **view))
-        found |= {f"{number} {what}": value for what, value in shown.items()}
-    record.check(dataframe_regression, found)
 
 
 def test_what_is_held_fixed_stands_in_the_title_and_in_the_table(stores):

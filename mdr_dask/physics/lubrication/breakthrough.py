@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.clusters import Clusters, crossings, total, whole_piece
 from mdr_dask.physics.surfaces.splines import integral, piece, shares, zeros
 
@@ -43,13 +43,13 @@ def layer_strength(shear_strength: ArrayLike, E_star: ArrayLike, thickness: Arra
     return np.asarray(np.pi * np.asarray(shear_strength) / (12 * np.asarray(E_star) * np.asarray(thickness)))
 
 
-@compiled
+@jit
 def _counted(length: float) -> int:
     """Return a length in spacings as whole parts of a spacing, at least one."""
     return max(1, int(length * PARTS + 0.5))
 
 
-@compiled
+@jit
 def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> None:
     """Add a number to `count` positions of the circle from `begin` on, as jumps."""
     points = jumps.size - 1
@@ -65,7 +65,7 @@ def _block(jumps: NDArray[np.int32], begin: int, count: int, number: int) -> Non
     jumps[end] -= number
 
 
-@nested
+@jit
 def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
     """Add a number to one position of the circle, at most once around off, as jumps."""
     points = jumps.size - 1
@@ -74,7 +74,7 @@ def _add(jumps: NDArray[np.int32], at: int, number: int) -> None:
     jumps[at + 1] -= number
 
 
-@nested
+@jit
 def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: float, jumps: NDArray[np.int32]) -> None:
     """Add what the window's edges leave of a cluster: its head and its tail.
 
@@ -104,7 +104,7 @@ def _add_cuts(clusters: Clusters, c: int, window: float, judged: bool, reach: fl
         node += 1
 
 
-@nested
+@jit
 def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps: NDArray[np.int32]) -> None:
     """Add the windows that lie within a cluster, which they cut on both sides."""
     overlap, points, limit = clusters.overlap, clusters.overlap.size - 3, clusters.limit
@@ -124,7 +124,7 @@ def _add_middles(clusters: Clusters, c: int, window: float, judged: bool, jumps:
         force += whole_piece(overlap, edge) - whole_piece(overlap, node % points)
 
 
-@kernel
+@jit
 def _collect(clusters: Clusters, window: float, rule: int, jumps: NDArray[np.int32]) -> None:
     """Gather the jumps of the trace cluster by cluster, then sum them up in place."""
     points = jumps.size - 1
@@ -197,7 +197,7 @@ class Pair(NamedTuple):
     strength: float
 
 
-@compiled
+@jit
 def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
     """Fill the spline of the overlap from nodes (p, q) on."""
     points = pair.line_1.size
@@ -205,7 +205,7 @@ def _fill(pair: Pair, p: int, q: int, overlap: FloatArray) -> None:
         overlap[k] = pair.line_1[(p + k - 1) % points] + pair.line_2[(q + k - 1) % points] - pair.level
 
 
-@compiled
+@jit
 def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work: FloatArray) -> tuple[float, float]:
     """Follow a cluster beyond the edge of a window, to the right from 0 on where `most` is positive, so far at most.
 
@@ -233,7 +233,7 @@ def _reach(pair: Pair, position: tuple[int, int], edge: float, most: float, work
     return abs(at - edge), force
 
 
-@nested
+@jit
 def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work: FloatArray) -> int:
     """Return the length in intimate contact of one window; `work` has room for its overlap and what crosses it."""
     points, pieces = pair.line_1.size, int(np.ceil(window))
@@ -264,7 +264,7 @@ def _judge(pair: Pair, position: tuple[int, int], window: float, rule: int, work
     return contact
 
 
-@kernel
+@jit
 def _windows(
     pair: Pair, positions: tuple[IntArray, IntArray], window: float, rule: int, work: FloatArray, contact: IntArray
 ) -> None:
@@ -319,7 +319,7 @@ def creep_positions(way: ArrayLike, points: int, slide_roll_ratio: float) -> tup
     return first, second
 
 
-@compiled
+@jit
 def _occupied(contact: NDArray[np.int32] | IntArray, windows: IntArray, lengths: IntArray, ends: IntArray) -> None:
     """Count windows in contact, their lengths in contact, and where contact begins or ends, part by part."""
     parts = windows.size

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.surfaces.splines import integral, piece, zeros
 
 
@@ -52,14 +52,14 @@ class Clusters(NamedTuple):
         return self.total > self.limit * self.length**3
 
 
-@nested
+@jit
 def whole_piece(overlap: FloatArray, k: int) -> float:
     """Return the integral of a spline from node k to the next."""
     found: float = (overlap[k] + 11 * overlap[k + 1] + 11 * overlap[k + 2] + overlap[k + 3]) / 24
     return found
 
 
-@compiled
+@jit
 def total(overlap: FloatArray, start: float, end: float) -> float:
     """Return the integral of a closed spline of ``overlap.size - 3`` nodes from `start`, on it, to `end` beyond."""
     points = overlap.size - 3
@@ -72,7 +72,7 @@ def total(overlap: FloatArray, start: float, end: float) -> float:
     return found
 
 
-@compiled
+@jit
 def crossings(overlap: FloatArray, found: FloatArray) -> int:
     """Collect where a spline, of three nodes fewer than coefficients, enters and leaves contact; return how often."""
     count = 0
@@ -84,7 +84,7 @@ def crossings(overlap: FloatArray, found: FloatArray) -> int:
     return count
 
 
-@compiled
+@jit
 def _totals(overlap: FloatArray, start: FloatArray, end: FloatArray, found: FloatArray) -> None:
     for c in range(start.size):
         found[c] = total(overlap, start[c], end[c])

@@ -10,17 +10,17 @@ from math import log, pi
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel, nested
+from mdr_dask.physics.jit import jit
 
 
-@nested
+@jit
 def _second_integral(x: float) -> float:
     """Return the function whose second derivative is ``ln|x|``."""
     square = x * x
     return 0.0 if square == 0.0 else 0.25 * square * (log(square) - 3.0)
 
 
-@nested
+@jit
 def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     """Turn second integrals of ``ln|x|`` at the nodes into integrals over hat functions there; zero at both ends."""
     left, left_slope = row[0], 0.0
@@ -33,7 +33,7 @@ def _over_hats(nodes: FloatArray, row: FloatArray) -> None:
     row[-1] = 0.0
 
 
-@compiled
+@jit
 def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
     """Fill ``row[j]`` with the integral of ``ln|point - X|`` over the hat function of node j; zero at both ends."""
     for j in range(nodes.size):
@@ -41,7 +41,7 @@ def _influence_row(point: float, nodes: FloatArray, row: FloatArray) -> None:
     _over_hats(nodes, row)
 
 
-@kernel
+@jit
 def influence_matrix(nodes: FloatArray) -> FloatArray:
     """Return the matrix that turns nodal pressures into deformations at the nodes, relative to that of ``X = 0``.
 
@@ -69,7 +69,7 @@ def influence_matrix(nodes: FloatArray) -> FloatArray:
     return matrix
 
 
-@kernel
+@jit
 def film(points: FloatArray, nodes: FloatArray, pressure: FloatArray, central_film: float) -> FloatArray:
     """Return the film ``H = H(0) + X^2/2 + delta(X) - delta(0)`` at any points (thesis eq. B.19).
 

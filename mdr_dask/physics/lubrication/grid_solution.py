@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.lubrication.deformation import film as film_at
 from mdr_dask.physics.lubrication.grids import adapted_density
 
@@ -159,7 +159,7 @@ def expected(
     return np.asarray(last + share * (last - reading(before[-2])))
 
 
-@kernel
+@jit
 def _between(nodes: FloatArray, values: FloatArray, positions: FloatArray, sides: int) -> FloatArray:
     """Return the polynomial through as many nodes before as behind each position, `sides` each."""
     result = np.empty(positions.size)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import factorise
 from mdr_dask.physics.lubrication.deformation import influence_matrix
 from mdr_dask.physics.outcome import Outcome
@@ -103,7 +103,7 @@ class Liquid(NamedTuple):
     density_saturation: float
 
 
-@compiled
+@jit
 def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
     """Return ``ln(eta/eta0)`` at the pressure P (in p0) and its derivative: Barus, or Roelands with an exponent."""
     if liquid.exponent == 0.0:
@@ -113,7 +113,7 @@ def log_viscosity_at(P: float, liquid: Liquid) -> tuple[float, float]:
     return liquid.alpha * liquid.pole / liquid.exponent * (power * ratio - 1.0), liquid.alpha * power
 
 
-@kernel
+@jit
 def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     """Return ``ln(eta/eta0)`` at every pressure (in p0)."""
     result = np.empty_like(pressure)
@@ -122,7 +122,7 @@ def log_viscosities(pressure: FloatArray, liquid: Liquid) -> FloatArray:
     return result
 
 
-@compiled
+@jit
 def _mobility(left: float, right: float) -> tuple[float, float, float]:
     """Return the mean of 1/eta between two log-viscosities, exact for an exponential law, and its two derivatives."""
     rise = right - left
@@ -137,7 +137,7 @@ def _mobility(left: float, right: float) -> tuple[float, float, float]:
     return scale * mean, -scale * (mean + slope), scale * slope
 
 
-@nested
+@jit
 def _couette_weights(nodes: FloatArray, f: int) -> tuple[float, float, float]:
     """Return the weights of nodes f-1, f, f+1 for the value at the face between f and f+1, flow to the right."""
     if f == 0:
@@ -163,7 +163,7 @@ class Imbalance(NamedTuple):
     by_film: FloatArray
 
 
-@compiled
+@jit
 def balance(
     nodes: FloatArray, liquid: Liquid, K: float, P: FloatArray, H: FloatArray, state: FloatArray, found: Imbalance
 ) -> None:
@@ -208,7 +208,7 @@ def balance(
             derivative[g, 2] -= d2
 
 
-@nested
+@jit
 def _fill_jacobian_row(
     i: int, influence: FloatArray, by_pressure: FloatArray, by_film: FloatArray, row: FloatArray
 ) -> None:
@@ -222,7 +222,7 @@ def _fill_jacobian_row(
             row[i - 2 + k] += by_pressure[i, k]
 
 
-@compiled
+@jit
 def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active: NDArray[np.int64]) -> int:
     """List the inner nodes that carry pressure, ``P + R/d > 0`` with d the size of their own derivative; count them."""
     R, by_pressure, by_film = found
@@ -237,7 +237,7 @@ def _fill_active(influence: FloatArray, P: FloatArray, found: Imbalance, active:
     return count
 
 
-@kernel
+@jit
 def _fill_equations(
     grid: Grid, P: FloatArray, found: Imbalance, active: NDArray[np.int64], A: FloatArray, b: FloatArray
 ) -> None:
@@ -264,7 +264,7 @@ def _fill_equations(
     A[count, count] = 0.0
 
 
-@kernel
+@jit
 def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np.int64], b: FloatArray) -> None:
     """Fill the right side of those equations where the other pressures are zero already."""
     for k in range(active.size):
@@ -274,7 +274,7 @@ def _fill_imbalance(grid: Grid, P: FloatArray, R: FloatArray, active: NDArray[np
         b[active.size] -= grid.weights[j] * P[j]
 
 
-@compiled
+@jit
 def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> None:
     """Add to H what the pressures P deform; four rows at once, as their sums do not wait for one another."""
     n = P.size
@@ -292,7 +292,7 @@ def _add_deformation(influence: FloatArray, P: FloatArray, H: FloatArray) -> Non
             H[i] += influence[i, j] * P[j]
 
 
-@compiled
+@jit
 def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None:
     """Fill the film H at the nodes, given the pressure there and the film at ``X = 0``."""
     for i in range(P.size):
@@ -300,7 +300,7 @@ def _fill_film(grid: Grid, P: FloatArray, central: float, H: FloatArray) -> None
     _add_deformation(grid.influence, P, H)
 
 
-@kernel
+@jit
 def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, change: float, clip: float) -> float:
     """Return the share of a step that neither moves a pressure by more than `clip` nor closes the film."""
     largest = np.max(np.abs(step))
@@ -313,7 +313,7 @@ def _step_length(grid: Grid, P: FloatArray, H: FloatArray, step: FloatArray, cha
     return share
 
 
-@kernel
+@jit
 def _take_step(
     grid: Grid, clip: float, P: FloatArray, central: float, H: FloatArray, step: FloatArray, change: float
 ) -> tuple[float, float]:

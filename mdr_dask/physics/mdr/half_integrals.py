@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, last_until
+from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.mdr.transforms import gauss
 
 
@@ -173,20 +173,20 @@ def interpolate_weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stret
     return result
 
 
-@compiled
+@jit
 def _weighted(mesh: Mesh, rows: FloatArray, shares: FloatArray, stretch: FloatArray, result: FloatArray) -> None:
     for k in range(shares.size):
         for node in range(mesh.nodes.size):
             result[node] += shares[k] * value_at(mesh, rows[k], mesh.nodes[node] * stretch[k])
 
 
-@compiled
+@jit
 def _interpolate(mesh: Mesh, values: FloatArray, places: FloatArray, result: FloatArray) -> None:
     for number in range(places.size):
         result[number] = value_at(mesh, values, places[number])
 
 
-@inlined
+@jit_inline
 def value_at(mesh: Mesh, values: FloatArray, place: float) -> float:
     """Return the piecewise polynomial through `values` at a place on the mesh, and zero beyond."""
     if place >= mesh.edges[-1]:

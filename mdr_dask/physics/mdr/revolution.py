@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline, PchipInterpolator
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
-from mdr_dask.physics.compiling import inlined, last_until, nested
+from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.mdr.transforms import forward_transform, gauss, power_factor
 
 
@@ -166,7 +166,7 @@ class TableProfile:
 _ABSCISSA, _WEIGHT = gauss(8)
 
 
-@inlined
+@jit_inline
 def image_rise(image: Image, start: float, level: float, gap: float) -> float:
     """Return g0(start + gap) - level, with level = g0(start), without cancellation."""
     if image.knots.size == 0:
@@ -188,7 +188,7 @@ def image_rise(image: Image, start: float, level: float, gap: float) -> float:
     return rise * gap
 
 
-@nested
+@jit
 def _piece(image: Image, place: float, derivative: int) -> float:
     """Return the piecewise cubic at a place, or its slope."""
     cell = last_until(image.knots, place, 0, image.coefficients.shape[1])

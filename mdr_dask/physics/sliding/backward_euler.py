@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.cases import Cases
 
 ITERATIONS = 200
@@ -87,14 +87,14 @@ class Lanes(NamedTuple):
     sums: FloatArray
 
 
-@kernel
+@jit
 def lanes_for(cases: int) -> Lanes:
     """Return the workspace of a sweep."""
     packed = np.empty((ROWS + 2, cases + LANES))
     return Lanes(np.empty((ROWS, cases)), packed, np.empty(cases, np.int64), np.empty((SUMS, cases)))
 
 
-@compiled
+@jit
 def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float) -> tuple[float, float, float]:
     """Go on by one node: return u, its derivative by the depth, and the drag times 1 - lambda."""
     free = decay * u
@@ -104,7 +104,7 @@ def _step(h: float, t: float, decay: float, depth: float, u: float, fade: float)
     return now, 1.0 if touches else decay * fade, (now - free) * t
 
 
-@kernel
+@jit
 def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     """Return what is known of every block, shape (n // BLOCK, KNOWN)."""
     blocks = np.empty((height.size // BLOCK, KNOWN))
@@ -127,7 +127,7 @@ def _blocks(height: FloatArray, rise: FloatArray, periodic: bool) -> FloatArray:
     return blocks
 
 
-@nested
+@jit
 def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) -> int:
     """Take every case over a block by closed sums; queue those that touch or leave in it, and return their number."""
     peak, lowest, steepest, before = block[PEAK], block[LOWEST], block[STEEPEST], block[BEFORE]
@@ -153,7 +153,7 @@ def _pass_block(block: FloatArray, last: float, moving: Moving, lanes: Lanes) ->
     return queued
 
 
-@nested
+@jit
 def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatArray, workspace: FloatArray) -> None:
     """Take all cases from node to node, adding to their `LOAD`, `RATE` and `LOSS`."""
     whole = height.size // 4 * 4
@@ -180,7 +180,7 @@ def _walk(height: FloatArray, rise: FloatArray, decay: FloatArray, depth: FloatA
             workspace[LOSS, k] += x0
 
 
-@compiled
+@jit
 def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lanes, queued: int) -> None:
     """Take the cases of the queue from node to node, together."""
     decay, depth = moving.decay, moving.depth
@@ -202,7 +202,7 @@ def _walk_some(height: FloatArray, rise: FloatArray, moving: Moving, lanes: Lane
         sums[DRAG, k] += packed[LOSS, q]
 
 
-@compiled
+@jit
 def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     """Follow one element of every case along the line: from its highest node back to it, or undeformed from its start.
 
@@ -228,7 +228,7 @@ def _sweep(line: Nodal, moving: Moving, lanes: Lanes) -> None:
     _walk_some(height[first:], rise[first:], moving, lanes, depth.size)
 
 
-@kernel
+@jit
 def _newton(
     line: Nodal,
     cases: Cases,
@@ -274,7 +274,7 @@ def _newton(
             return
 
 
-@compiled
+@jit
 def contact(
     height: FloatArray,
     periodic: bool,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, greater, inlined, kernel, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, summit
 
 BLOCK = 16  # cells that are skipped at once where all are in contact, or none can be reached
@@ -35,7 +35,7 @@ class Blocks(NamedTuple):
     stretch: FloatArray
 
 
-@inlined
+@jit_inline
 def _four(column: FloatArray, i: int) -> float:
     """Return the sum of two cells and of those half a block after them."""
     half = BLOCK // 2
@@ -43,7 +43,7 @@ def _four(column: FloatArray, i: int) -> float:
     return float(here + (after + column[np.uintp(i + 1 + half)]))
 
 
-@kernel
+@jit
 def blocks_of(cells: Cells) -> Blocks:
     """Return the blocks of a line; the cells that do not fill the last one are in none."""
     blocks = (cells.mean.size - 1) // BLOCK
@@ -52,7 +52,7 @@ def blocks_of(cells: Cells) -> Blocks:
         i = block * BLOCK
         highest = cells.peak[i]
         for k in range(i, i + BLOCK):
-            highest = greater(highest, cells.peak[np.uintp(k)])
+            highest = max(highest, cells.peak[np.uintp(k)])
         peak[block] = highest
         for column, whole in ((cells.mean, mean), (cells.stretch, stretch)):
             whole[block] = (_four(column, i) + _four(column, i + 2)) + (_four(column, i + 4) + _four(column, i + 6))
@@ -70,7 +70,7 @@ class Barriers(NamedTuple):
     idle: FloatArray
 
 
-@kernel
+@jit
 def barriers_for(cells: int) -> Barriers:
     """Return barriers of a line of which none is known."""
     return Barriers(np.empty(cells), np.full(cells // BLOCK + 1, np.nan), np.empty(cells))
@@ -83,13 +83,13 @@ class Places(NamedTuple):
     leaves: FloatArray
 
 
-@kernel
+@jit
 def places_for(patches: int) -> Places:
     """Return arrays for the places of some patches."""
     return Places(np.empty(patches), np.empty(patches))
 
 
-@compiled
+@jit
 def write_barriers(
     height: FloatArray, enter: FloatArray, leave: FloatArray, deborah: float, block: int, barriers: Barriers
 ) -> None:
@@ -116,7 +116,7 @@ def write_barriers(
     barriers.block[block] = every
 
 
-@nested
+@jit
 def _decayed(x: float) -> float:
     """Return 1 - exp(-x) for x >= 0; its series where that is exact to rounding and quicker."""
     if x > 1 / 32:
@@ -126,7 +126,7 @@ def _decayed(x: float) -> float:
     return x * (1 - x * (1 / 2) * (1 - x * (1 / 3) * (1 - x * (1 / 4) * rest)))
 
 
-@compiled
+@jit
 def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: float) -> float:
     """Return where w + deborah w', not negative at the start, falls through 0 first from there to 1, or `NONE`."""
     # the force is a cubic itself, cut into its monotone pieces; at the start its sign may be lost in rounding
@@ -148,7 +148,7 @@ def leaving(w0: float, a: float, b: float, c: float, deborah: float, start: floa
     return NONE
 
 
-@nested
+@jit
 def _falling(p: float, q: float, r: float, c: float, low: float, high: float) -> float:
     """Return the root of a cubic that falls monotonously from low to high."""
     x = low + (high - low) * 0.5
@@ -177,7 +177,7 @@ class Flight(NamedTuple):
     start: float
 
 
-@nested
+@jit
 def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
     """Return where w rises to u exp(-(x - start) / deborah) between low and high, where it is known to be above."""
     w0, a, b, c, u, start = flight
@@ -199,7 +199,7 @@ def _touching(flight: Flight, deborah: float, low: float, high: float) -> float:
     return x
 
 
-@nested
+@jit
 def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
     """Return where from low to stop a free element touches first, or `NONE`.
 
@@ -220,7 +220,7 @@ def _touch(flight: Flight, deborah: float, low: float, stop: float) -> float:
     return NONE
 
 
-@nested
+@jit
 def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) -> tuple[float, float]:
     """Return the integrals of w and w'^2 from start to end: Gauss, exact for these polynomials."""
     half, middle = 0.5 * (end - start), 0.5 * (end + start)
@@ -235,7 +235,7 @@ def _pressed(w0: float, a: float, b: float, c: float, start: float, end: float) 
     return half * (2 * w0 + area / 9), half * stretch / 9
 
 
-@nested
+@jit
 def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float, float, float, float]:
     """Return what a flight adds to the integral of u, its derivative by the depth, the drag and its derivative.
 
@@ -247,7 +247,7 @@ def _landed(u: float, flown: float, deborah: float, slope: float) -> tuple[float
     return u * memory, memory if u > 0 else 0.0, 0.5 * u * u * lost * (2 - lost), memory * (u / deborah + slope)
 
 
-@inlined
+@jit_inline
 def _flown_over(
     peak: FloatArray, block_peak: FloatArray, depth: float, decay: float, block_decay: float, i: int, free: float
 ) -> tuple[int, float]:
@@ -265,7 +265,7 @@ def _flown_over(
     return i, free
 
 
-@compiled
+@jit
 def sweep_cells(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray, places: Places
 ) -> int:
@@ -387,7 +387,7 @@ def sweep_cells(
     return patches + 1
 
 
-@kernel
+@jit
 def patches_at(
     cells: Cells, every: Blocks, barriers: Barriers, deborah: float, depth: float, sums: FloatArray
 ) -> tuple[FloatArray, FloatArray]:

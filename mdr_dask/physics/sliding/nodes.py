@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, greater, lesser, nested, spliced
+from mdr_dask.physics.jit import jit, jit_inline
 
 BLOCK = 32  # cells
 WING = 4  # nodes to either side that a finer grid follows from
@@ -53,7 +53,7 @@ class Nodes(NamedTuple):
     rise: float
 
 
-@nested
+@jit
 def _take(given: FloatArray, first: int, stride: int, turn: FloatArray) -> None:
     """Write every stride-th number of a turn from the first one on, and those of the turns before and after."""
     n = turn.size - BEFORE - AFTER
@@ -109,7 +109,7 @@ def nodes(height: FloatArray, slope: FloatArray, first: int, stride: int, resolv
     return line
 
 
-@compiled
+@jit
 def _take_line(
     height: FloatArray,
     slope: FloatArray,
@@ -143,13 +143,13 @@ def _take_line(
         _integrals(h[before:], s[before:], of_height[before:], of_square[before:], BLOCK, mean, square)
         for k in range(BLOCK):
             i = begin + k
-            above[k] = greater(h[i], h[i + 1]) + ABOVE * (greater(s[i], 0.0) + greater(-s[i + 1], 0.0))
+            above[k] = max(h[i], h[i + 1]) + ABOVE * (max(s[i], 0.0) + max(-s[i + 1], 0.0))
         peak, lowest, steepest, heights, squares = -np.inf, h[last], s[last], 0.0, 0.0
         for k in range(BLOCK):
             peak, lowest, steepest = (
-                greater(peak, above[k]),
-                lesser(lowest, h[begin + k]),
-                lesser(steepest, s[begin + k]),
+                max(peak, above[k]),
+                min(lowest, h[begin + k]),
+                min(steepest, s[begin + k]),
             )
             heights += mean[k]
             squares += square[k]
@@ -157,7 +157,7 @@ def _take_line(
         blocks[j, HEIGHTS], blocks[j, SQUARES] = heights, squares
 
 
-@nested
+@jit
 def _integrals(
     h: FloatArray,
     s: FloatArray,
@@ -188,7 +188,7 @@ def _integrals(
         square[k] = 0.5 * (s[k + 1] * s[k + 1] + s[k + 2] * s[k + 2]) + square[k] - square[k + 1]
 
 
-@nested
+@jit
 def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
     """Write the highest point of cells, from the second node on."""
     for k in range(cells):
@@ -200,11 +200,11 @@ def _peaks(h: FloatArray, s: FloatArray, cells: int, peak: FloatArray) -> None:
         above, below = (s0, root - a) if a <= 0 else (a + root, -3 * b)  # neither cancels
         x = above / below if below > 0 else 0.0
         x = x if (x > 0) & (x < 1) else 0.0
-        top, ends = h0 + x * (s0 + x * (a + x * b)), greater(h0, h1)
+        top, ends = h0 + x * (s0 + x * (a + x * b)), max(h0, h1)
         peak[k] = top if top > ends else ends
 
 
-@spliced
+@jit_inline
 def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatArray) -> int:
     """Write a tile of a line, on the finer grid that weights make, and return the number of its cells.
 
@@ -223,8 +223,8 @@ def fill(line: Nodes, first: int, cells: int, weights: FloatArray, tile: FloatAr
     # exact ones stand at the nodes of the line only
     here = first - 1 if refinement == 1 else line.ends.shape[1]
     if refinement == 1:
-        copy_into(h, line.height[first - 1 : first + cells + 2])
-        copy_into(s, line.slope[first - 1 : first + cells + 2])
+        h[: cells + 3] = line.height[first - 1 : first + cells + 2]
+        s[: cells + 3] = line.slope[first - 1 : first + cells + 2]
     else:
         refine(line, first, cells, weights, h, s)
     cells *= refinement
@@ -262,7 +262,7 @@ def weights(refinement: int) -> FloatArray:
     return np.stack([_hermite(places, step / refinement) for step in range(refinement)], axis=1)
 
 
-@compiled
+@jit
 def refine(line: Nodes, first: int, cells: int, weights: FloatArray, height: FloatArray, slope: FloatArray) -> None:
     """Write heights and slopes of the finer grid over cells of a line, from the node before to the second one after."""
     refinement = weights.shape[1]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel, lesser, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding import backward_euler
 from mdr_dask.physics.sliding.cases import Cases, Steady, valid
@@ -43,27 +43,27 @@ TRAIL = 5  # numbers of a trail: log depth, log load, slope of these and its cha
 LATTICE_BITS = 20  # depths are tried on a lattice of 2**-LATTICE_BITS relative spacing: see `_solve`
 
 
-@nested
+@jit
 def _floor(depth: float) -> float:
     """Return the lattice depth at or below a positive depth."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.floor(math.ldexp(mantissa, LATTICE_BITS)), exponent - LATTICE_BITS)
 
 
-@nested
+@jit
 def _next(depth: float) -> float:
     """Return the lattice depth above one."""
     mantissa, exponent = math.frexp(depth)
     return math.ldexp(math.ldexp(mantissa, LATTICE_BITS) + 1, exponent - LATTICE_BITS)
 
 
-@compiled
+@jit
 def _begin(trail: FloatArray, depth: float, load: float) -> None:
     """Begin a `trail` where nothing but a depth for a load is known."""
     trail[0], trail[1], trail[2], trail[3], trail[4] = math.log(depth), math.log(load), 0.7, 0.0, 0.0
 
 
-@compiled
+@jit
 def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tuple[float, float]:
     """Return log depth at a load, and its slope over log load, of an element that the tops of blocks alone press.
 
@@ -93,7 +93,7 @@ def _outlined(peak: FloatArray, deborah: float, load: float, start: float) -> tu
     return (math.log(depth), slope) if depth > 0 else (start, 1.0)
 
 
-@compiled
+@jit
 def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -> None:
     """Note log depth, log load, their slope and its change in `trail`, from the last sweep and the one before.
 
@@ -106,7 +106,7 @@ def _follow(sums: FloatArray, depth: float, deborah: float, trail: FloatArray) -
     trail[0], trail[1], trail[2], trail[3], trail[4] = np.log(depth), load, slope, bend, deborah
 
 
-@nested
+@jit
 def _guess(trail: FloatArray, load: float) -> float:
     """Extrapolate log depth over log load to a load."""
     ahead = np.log(load) - trail[1]
@@ -161,7 +161,7 @@ def touching_for(cases: int, room: int) -> Touching:
     return Touching(np.empty((cases, room)), np.empty((cases, room)), np.zeros(cases, np.int64))
 
 
-@kernel
+@jit
 def _solve(
     line: _Swept, deborah: float, load: float, trail: FloatArray, sums: FloatArray, places: Places
 ) -> tuple[float, int]:
@@ -176,7 +176,7 @@ def _solve(
     cells, blocks, barriers, mean = line
     low, high = 0.0, np.inf
     most = load / (cells.mean.size - 1) - mean
-    depth = _floor(lesser(_guess(trail, load), most))
+    depth = _floor(min(_guess(trail, load), most))
     best = np.zeros(SUMS)
     for iteration in range(ITERATIONS):
         patches = sweep_cells(cells, blocks, barriers, deborah, depth, sums, places)
@@ -185,11 +185,11 @@ def _solve(
             return depth, 0
         tangent = depth + (load - carried) / sums[STIFFNESS]
         if tangent > low:  # sums that overflow have none
-            most = lesser(most, tangent)
+            most = min(most, tangent)
         _follow(sums, depth, deborah, trail)
         if carried <= load:
             low = depth
-            copy_into(best, sums)
+            best[:] = sums
             if tangent < _next(depth):
                 return depth, patches
         else:
@@ -197,9 +197,9 @@ def _solve(
         if low > 0 and _next(low) >= high:
             if carried > load and places.leaves.size > 0:
                 patches = sweep_cells(cells, blocks, barriers, deborah, low, sums, places)
-            copy_into(sums, best)
+            sums[:] = best
             return low, patches
-        proposal = lesser(_guess(trail, load), most)
+        proposal = min(_guess(trail, load), most)
         if iteration > PATIENCE and high < np.inf:
             proposal = 0.5 * (low + high)
         depth = _floor(proposal)
@@ -211,7 +211,7 @@ def _solve(
     return depth, 0
 
 
-@kernel
+@jit
 def _states(
     line: _Swept,
     cases: Cases,
@@ -229,7 +229,7 @@ def _states(
     (cells, blocks, barriers, _), (deborahs, loads) = line, cases
     n, (results, status, touching, rows) = cells.mean.size - 1, found
     sums, trail, starts = np.empty(SUMS), np.empty(TRAIL), True
-    copy_into(trail, first)
+    trail[:] = first
     for k in range(loads.size):
         deborah, depth, patches = deborahs[k], guesses[k], 0
         places = Places(touching.start[rows[k]], touching.end[rows[k]])
@@ -243,11 +243,11 @@ def _states(
             depth, patches = _solve(line, deborah, loads[k], trail, sums, places)
         if patches == 0:
             status[k] = Outcome.DEPTH_NOT_FOUND
-            copy_into(trail, first)
+            trail[:] = first
             continue
         touching.patches[rows[k]] = patches
         if starts:
-            copy_into(first, trail)
+            first[:] = trail
             starts = False
         shift = (loads[k] - sums[DISPLACEMENT]) / sums[STIFFNESS]
         status[k] = Outcome.OUTSIDE_LINE if sums[OUTSIDE] > 0 else Outcome.CONVERGED

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
@@ -152,7 +152,7 @@ class _Workspace(NamedTuple):
         return cls(tile, np.empty(ROWS * LANES), queue, lanes, last_step, last, now, rate)
 
 
-@compiled
+@jit
 def _solve(
     line: Nodes,
     weights: FloatArray,

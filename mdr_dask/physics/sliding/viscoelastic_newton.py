@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.sliding.viscoelastic_sweep import CLOSED, Passage, Travelling, multiply, sweep_arms
 
 DEEPEST_STEP = 0.7
@@ -35,7 +35,7 @@ class Swept(NamedTuple):
     solid: Travelling
 
 
-@compiled
+@jit
 def follow(
     direction: FloatArray, swept: Swept, periodic: bool, product: FloatArray, workspace: FloatArray
 ) -> None:  # pragma: no cover
@@ -62,7 +62,7 @@ def follow(
     depth, glass = direction[arms], 1.0 + moduli.sum()
     stretch, modes, integral = workspace[0], workspace[1], workspace[2]
     product[:] = 0.0
-    copy_into(stretch, direction[:arms])
+    stretch[:arms] = direction[:arms]
     for piece in range(pieces):
         if piece % 2 == 1:
             product[arms] += depth * lengths[piece]
@@ -85,7 +85,7 @@ def follow(
                 stretch[m] += depth - strain
 
 
-@nested
+@jit
 def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: float) -> None:  # pragma: no cover
     """Move the strain at fixed memory so that the derivative of the stress vanishes, as it does in flight."""
     if stretch.size == 0:
@@ -100,7 +100,7 @@ def _take_stress(stretch: FloatArray, depth: float, moduli: FloatArray, glass: f
     stretch[0] = -balance / moduli[0]
 
 
-@kernel
+@jit
 def _decays(lengths: FloatArray, deborah: FloatArray, times: FloatArray) -> FloatArray:  # pragma: no cover
     """Return what modes lose in every flight and arms in every contact, shape (pieces, arms)."""
     decayed = np.empty((lengths.size, deborah.size))
@@ -127,7 +127,7 @@ class Krylov(NamedTuple):
     workspace: FloatArray
 
 
-@nested
+@jit
 def newton_step(
     residual: FloatArray,
     scale: FloatArray,
@@ -183,7 +183,7 @@ def newton_step(
             step[k] += right[i] * basis[i, k]
 
 
-@nested
+@jit
 def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # pragma: no cover
     """Take the earlier rows out of row j + 1, twice against rounding, and leave the coefficients in column j."""
     column = basis[j + 1]
@@ -207,7 +207,7 @@ def _orthogonalise(basis: FloatArray, triangle: FloatArray, j: int) -> None:  # 
             column[k] /= norm
 
 
-@nested
+@jit
 def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pragma: no cover
     """Turn column j into one of a triangle, and the right side with it; its last entry is the residual left."""
     cosine, sine, right = rotations[0], rotations[1], rotations[2]
@@ -222,7 +222,7 @@ def _rotate(triangle: FloatArray, rotations: FloatArray, j: int) -> None:  # pra
     right[j] *= cosine[j]
 
 
-@compiled
+@jit
 def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: no cover
     """Return the depth at which sum max(0, depth + profile) is `strain_area` (> 0): Newton, falling from above."""
     depth = 0.0
@@ -245,7 +245,7 @@ def static_depth(profile: FloatArray, strain_area: float) -> float:  # pragma: n
     return depth
 
 
-@kernel
+@jit
 def solve_sliding(
     profile: FloatArray,
     strain_area: float,

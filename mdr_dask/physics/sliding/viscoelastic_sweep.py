@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, nested
+from mdr_dask.physics.jit import jit
 
 CLOSED, OPEN_END = 0, 1
 
@@ -41,7 +41,7 @@ SURFACE_LAYER = 1e-7
 """Beginning of a cell that is searched first: arms much shorter than a cell adapt within it."""
 
 
-@compiled
+@jit
 def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> None:  # pragma: no cover
     """Fill a matrix times a vector; the matrix is given by its columns, which the compiler can add as vectors."""
     product[:] = 0.0
@@ -51,7 +51,7 @@ def multiply(columns: FloatArray, vector: FloatArray, product: FloatArray) -> No
             product[m] += columns[k, m] * factor
 
 
-@nested
+@jit
 def step_factors(
     length: float, deborah: FloatArray, decay: FloatArray, gain: FloatArray, area: FloatArray
 ) -> None:  # pragma: no cover
@@ -69,7 +69,7 @@ def step_factors(
             area[m] = deborah[m] * (length - gain[m])
 
 
-@nested
+@jit
 def _pressure_inside(
     length: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
@@ -82,7 +82,7 @@ def _pressure_inside(
     return pressure, rate
 
 
-@nested
+@jit
 def leaving_point(
     end: float, start: float, slope: float, stretch: FloatArray, moduli: FloatArray, deborah: FloatArray
 ) -> float:  # pragma: no cover
@@ -104,7 +104,7 @@ def leaving_point(
     return point
 
 
-@nested
+@jit
 def touching_point(
     low: float, high: float, start: float, slope: float, modes: FloatArray, times: FloatArray
 ) -> float:  # pragma: no cover
@@ -127,7 +127,7 @@ def touching_point(
     return point
 
 
-@nested
+@jit
 def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[float, float]:  # pragma: no cover
     strain, rate = 0.0, 0.0
     for k in range(times.size):
@@ -137,7 +137,7 @@ def _strain_of(distance: float, modes: FloatArray, times: FloatArray) -> tuple[f
     return strain, rate
 
 
-@nested
+@jit
 def _fly(
     place: float, node: int, modes: FloatArray, times: FloatArray, penetration: FloatArray, last: int
 ) -> float:  # pragma: no cover
@@ -186,7 +186,7 @@ class Passage(NamedTuple):
     totals: FloatArray
 
 
-@nested
+@jit
 def sweep_arms(
     penetration: FloatArray,
     start: FloatArray,
@@ -256,7 +256,7 @@ def sweep_arms(
         flying = True
 
 
-@compiled
+@jit
 def _contact(
     begin: float,
     penetration: FloatArray,
@@ -314,7 +314,7 @@ def _contact(
     return place, strain, pressure, left
 
 
-@nested
+@jit
 def _stretch(
     strain: float, slope: float, e: FloatArray, following: FloatArray, moduli: FloatArray, factors: FloatArray
 ) -> float:  # pragma: no cover
@@ -326,7 +326,7 @@ def _stretch(
     return pressure
 
 
-@nested
+@jit
 def _into_flight(
     strain: float, excess: float, e: FloatArray, moduli: FloatArray, modes: FloatArray, amplitude_of: FloatArray
 ) -> None:  # pragma: no cover
@@ -341,7 +341,7 @@ def _into_flight(
         multiply(amplitude_of, e, modes)
 
 
-@nested
+@jit
 def _add_flight(
     length: float,
     modes: FloatArray,

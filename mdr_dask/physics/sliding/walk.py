@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import fused, greater, lesser, nested, spliced
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
@@ -47,7 +47,7 @@ U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
 
 
-@fused
+@jit_inline
 def _fading(time: float) -> float:
     """Return exp(-time), to 1e-4 up to 1 and small where it is small."""
     y = time * 0.125
@@ -69,7 +69,7 @@ class Cell(NamedTuple):
     s1: float
 
 
-@fused
+@jit_inline
 def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     """Return a case in cell i of a tile."""
     h0, h1, s0, s1 = tile[HEIGHT, i + 1], tile[HEIGHT, i + 2], tile[SLOPE, i + 1], tile[SLOPE, i + 2]
@@ -77,19 +77,19 @@ def _cell(tile: FloatArray, i: int, depth: float) -> Cell:
     return Cell(depth + h0, s0, 3 * rise - 2 * s0 - s1, s0 + s1 - 2 * rise, depth + h1, s1)
 
 
-@fused
+@jit_inline
 def _at(cell: Cell, x: float) -> float:
     """Return w at a place."""
     return cell.w0 + x * (cell.s0 + x * (cell.a + x * cell.b))
 
 
-@fused
+@jit_inline
 def _tilt(cell: Cell, x: float) -> float:
     """Return w' at a place."""
     return cell.s0 + x * (2 * cell.a + x * 3 * cell.b)
 
 
-@fused
+@jit_inline
 def _leaves(
     cell: Cell, r: float, begins: float, force: float, force_end: float, inverse: float
 ) -> tuple[float, float, float]:
@@ -105,12 +105,12 @@ def _leaves(
     x += (w + r * s) * tangent
     x = x if x > begins else begins
     x = x if x < 1 else 1.0
-    steepest = greater(greater(-cell.s0, -cell.s1), 0.25 * (cell.s0 + cell.s1) - 1.5 * (cell.w1 - cell.w0))
-    crest = greater(lesser(_at(cell, x), r * greater(steepest, 0.0)), 0.0)
+    steepest = max(max(-cell.s0, -cell.s1), 0.25 * (cell.s0 + cell.s1) - 1.5 * (cell.w1 - cell.w0))
+    crest = max(min(_at(cell, x), r * max(steepest, 0.0)), 0.0)
     return x, crest, _fading((1 - x) * inverse)
 
 
-@fused
+@jit_inline
 def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float) -> tuple[float, float]:
     """Return where the gap closes before a place where it is known to be, and what is left of u there.
 
@@ -127,10 +127,10 @@ def _touches(cell: Cell, u: float, inverse: float, last: float, gap_last: float)
     low, high = -0.5 * root, 0.5 * (last - root)
     step = step if step > low else low
     step = step if step < high else high
-    return root + step, waited * greater(1 - step * inverse, 0.0)
+    return root + step, waited * max(1 - step * inverse, 0.0)
 
 
-@fused
+@jit_inline
 def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple[bool, float, float, float, float]:
     """Return whether an element in flight meets the line in a cell, and where that piece of contact ends.
 
@@ -151,7 +151,7 @@ def _meets(cell: Cell, r: float, u: float, kept: float, inverse: float) -> tuple
     return gap < 0, stop, crest, held, gap
 
 
-@nested
+@jit
 def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     """Take a case over the cells of a tile."""
     d, r = workspace[DEPTH + k], workspace[DEBORAH + k]
@@ -215,7 +215,7 @@ def _walk(tile: FloatArray, cells: int, workspace: FloatArray, k: int) -> None:
     workspace[STRETCH + k] += stretch
 
 
-@nested
+@jit
 def _pass_block(
     block: FloatArray, last: float, refinement: int, workspace: FloatArray, count: int, queue: NDArray[np.int64]
 ) -> int:
@@ -252,7 +252,7 @@ def _pass_block(
     return queued
 
 
-@spliced
+@jit_inline
 def sweep(
     line: Nodes,
     weights: FloatArray,
@@ -270,7 +270,7 @@ def sweep(
     for k in range(count):
         w = workspace[DEPTH + k] + line.height[BEFORE - 1]
         force = w + workspace[DEBORAH + k] / refinement * line.slope[BEFORE - 1]
-        workspace[U + k], workspace[FADE + k] = greater(w, 0.0), 1.0
+        workspace[U + k], workspace[FADE + k] = max(w, 0.0), 1.0
         workspace[CONTACT + k] = 1.0 if w > 0 and force > 0 else 0.0
     # the summit, where every case touches, lies in the cell before the first one; then blocks, and what is left
     first, cells = BEFORE - 1, 1
@@ -295,9 +295,9 @@ def sweep(
         cells = BLOCK if rest > BLOCK else rest
 
 
-@nested
+@jit
 def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells: int) -> None:
     """Write what does not change of a case on a grid."""
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
-    workspace[INVERSE + k] = lesser(1 / deborah, LARGE)
+    workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 
 DEGREE = 3
 
@@ -81,14 +81,14 @@ class Normal(NamedTuple):
     pull: FloatArray
 
 
-@kernel
+@jit
 def workspace(splines: int, unknowns: int) -> Normal:  # pragma: no cover
     """Return arrays for normal equations of that many splines and unknowns of the border."""
     cross, border = np.empty((unknowns, splines)), np.empty((unknowns, unknowns))
     return Normal(np.empty((splines, DEGREE + 1)), np.empty(splines), cross, border, np.empty(unknowns))
 
 
-@kernel
+@jit
 def extent(points: Points, across: FloatArray, step: float) -> tuple[float, int]:  # pragma: no cover
     """Return where the spline of shifted curves begins, on cells that stay where they are, and its coefficients."""
     lowest, highest = np.inf, -np.inf
@@ -99,7 +99,7 @@ def extent(points: Points, across: FloatArray, step: float) -> tuple[float, int]
     return low, int(np.floor((highest - low) / step)) + 1 + DEGREE
 
 
-@kernel
+@jit
 def basis(x: float, low: float, step: float, splines: int, value: FloatArray) -> int:  # pragma: no cover
     """Fill the four cubic B-splines at x; return the number of the first."""
     cell = min(max(int(np.floor((x - low) / step)), 0), splines - DEGREE - 1)
@@ -111,7 +111,7 @@ def basis(x: float, low: float, step: float, splines: int, value: FloatArray) ->
     return cell
 
 
-@kernel
+@jit
 def slopes(
     points: Points, across: FloatArray, low: float, step: float, curve: FloatArray
 ) -> FloatArray:  # pragma: no cover
@@ -127,7 +127,7 @@ def slopes(
     return found
 
 
-@kernel
+@jit
 def assemble(
     points: Points, shifts: Shifts, slope: FloatArray, low: float, step: float, normal: Normal
 ) -> float:  # pragma: no cover
@@ -178,7 +178,7 @@ def assemble(
     return total
 
 
-@kernel
+@jit
 def eliminate(normal: Normal, weight: float) -> tuple[float, float]:  # pragma: no cover
     """Factorise the spline with its curvature and take it out of the border; return log determinant and squares.
 
@@ -219,7 +219,7 @@ def eliminate(normal: Normal, weight: float) -> tuple[float, float]:  # pragma: 
     return volume, explained
 
 
-@kernel
+@jit
 def solve_border(normal: Normal) -> tuple[FloatArray, float, float]:  # pragma: no cover
     """Factorise the border after `eliminate`; return its solution, its log determinant and the squares it explains."""
     border, pull = normal.border, normal.pull
@@ -245,7 +245,7 @@ def solve_border(normal: Normal) -> tuple[FloatArray, float, float]:  # pragma: 
     return steps, volume, explained
 
 
-@kernel
+@jit
 def best_curve(normal: Normal) -> FloatArray:  # pragma: no cover
     """Return the spline that fits best where the border stays as it is, after `eliminate`."""
     band, found = normal.band, normal.right.copy()
@@ -256,7 +256,7 @@ def best_curve(normal: Normal) -> FloatArray:  # pragma: no cover
     return found
 
 
-@kernel
+@jit
 def linearise(
     points: Points, shifts: Shifts, step: float, weight: float, vertical: bool
 ) -> tuple[Normal, float, float]:  # pragma: no cover
@@ -271,14 +271,14 @@ def linearise(
     return normal, total, misfit
 
 
-@kernel
+@jit
 def copied(normal: Normal) -> Normal:  # pragma: no cover
     """Return a copy, which may be overwritten."""
     border = normal.cross.copy(), normal.border.copy(), normal.pull.copy()
     return Normal(normal.band.copy(), normal.right.copy(), border[0], border[1], border[2])
 
 
-@kernel
+@jit
 def reduced(normal: Normal, weight: float) -> tuple[Normal, float, float]:  # pragma: no cover
     """Return a copy after `eliminate`, its log determinant and the squares it explains."""
     work = copied(normal)
@@ -286,7 +286,7 @@ def reduced(normal: Normal, weight: float) -> tuple[Normal, float, float]:  # pr
     return work, volume, explained
 
 
-@kernel
+@jit
 def _expect(normal: Normal, prior: Prior, shifts: Shifts, variance: float) -> float:  # pragma: no cover
     """Add rows of what is known of the shifts; return the squares that they leave."""
     size, free = normal.pull.size, shifts.across.size - 1
@@ -302,7 +302,7 @@ def _expect(normal: Normal, prior: Prior, shifts: Shifts, variance: float) -> fl
     return left
 
 
-@kernel
+@jit
 def _expected(
     points: Points, shifts: Shifts, step: float, weight: float, vertical: bool, prior: Prior, variance: float
 ) -> tuple[Normal, float, float]:  # pragma: no cover
@@ -312,7 +312,7 @@ def _expected(
     return normal, total + left, misfit + left
 
 
-@kernel
+@jit
 def restricted(
     points: int, normal: Normal, total: float, weight: float
 ) -> tuple[FloatArray, FloatArray, float, float]:  # pragma: no cover
@@ -328,7 +328,7 @@ def restricted(
     return changes, work.border, misfit / freedom, score
 
 
-@kernel
+@jit
 def likeliest(
     points: int, normal: Normal, total: float, weights: FloatArray
 ) -> tuple[float, float]:  # pragma: no cover
@@ -341,7 +341,7 @@ def likeliest(
     return best, variance
 
 
-@kernel
+@jit
 def _moved(shifts: Shifts, changes: FloatArray, share: float) -> Shifts:  # pragma: no cover
     across, along, free = shifts.across.copy(), shifts.along.copy(), shifts.across.size - 1
     for i in range(changes.size):
@@ -352,7 +352,7 @@ def _moved(shifts: Shifts, changes: FloatArray, share: float) -> Shifts:  # prag
     return Shifts(across, along)
 
 
-@kernel
+@jit
 def fit(
     points: Points,
     shifts: Shifts,
@@ -400,7 +400,7 @@ def fit(
     return shifts, weight, variance
 
 
-@kernel
+@jit
 def rows(points: Points, across: FloatArray, low: float, step: float, splines: int) -> FloatArray:  # pragma: no cover
     """Return the B-splines at shifted points, shape (points, splines)."""
     found, value = np.zeros((points.x.size, splines)), np.empty(DEGREE + 1)

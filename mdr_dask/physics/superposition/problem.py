@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.superposition.least_squares import SETTINGS, Knots, Points, Prior
 
 RATIOS = np.geomspace(0.03, 2.0, 12)
@@ -112,7 +112,7 @@ def differences(size: int) -> FloatArray:
     return np.eye(size) - np.eye(size, k=-1)
 
 
-@kernel
+@jit
 def _pair_shift(x: FloatArray, y: FloatArray, other_x: FloatArray, other_y: FloatArray) -> float:  # pragma: no cover
     """Return the shift of a curve onto its neighbour of least mean square difference over an overlap of a sixth or
     more.

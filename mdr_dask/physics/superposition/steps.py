@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.superposition.least_squares import (
     DEGREE,
     Knots,
@@ -84,7 +84,7 @@ class Steps(NamedTuple):
     common: Common
 
 
-@kernel
+@jit
 def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no cover
     """Return the trace of the squared second differences times the inverse of a factorised band.
 
@@ -104,7 +104,7 @@ def _roughness_trace(band: FloatArray, near: FloatArray) -> float:  # pragma: no
     return found
 
 
-@kernel
+@jit
 def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  # pragma: no cover
     """Return what the border adds to the trace of the penalties times the inverse, after `solve_border`.
 
@@ -137,7 +137,7 @@ def _border_trace(normal: Normal, weight: float, known: FloatArray) -> float:  #
     return found
 
 
-@kernel
+@jit
 def likelihoods(
     points: Points, ways: FloatArray, step: float, weight: float, variance: float, rises: FloatArray
 ) -> FloatArray:  # pragma: no cover
@@ -176,7 +176,7 @@ def likelihoods(
     return found
 
 
-@kernel
+@jit
 def _given(
     places: FloatArray, shares: FloatArray, window: FloatArray, means: FloatArray, scatters: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:  # pragma: no cover
@@ -236,7 +236,7 @@ def _averaged(scan: Scan, problem: ShiftProblem, powers: FloatArray) -> Steps:
     return Steps(mean, own, (apart * share.ravel()) @ apart.T, told, common)
 
 
-@kernel
+@jit
 def _smoothing(points: Points, shifts: Shifts, grid: Knots, usual: float, variance: float) -> float:  # pragma: no cover
     """Return the likeliest smoothing of a few neighbours alone, near the usual one: a plateau is smoother."""
     low, splines = extent(points, shifts.across, grid.step)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, greater, inlined, kernel, lesser
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces import shapes
 
 NONE = 2.0  # a position in a cell that is not there
@@ -119,7 +119,7 @@ class Cells(NamedTuple):
     periodic: bool
 
 
-@inlined
+@jit_inline
 def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float, float, float]:
     """Return the coefficients of the height in cell i, by rising power."""
     here, after = np.uintp(i), np.uintp(i + 1)  # an index with a sign would be looked at for it
@@ -128,7 +128,7 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     return height[here], first, 3 * rise - 2 * first - last, first + last - 2 * rise
 
 
-@compiled
+@jit
 def summit(a: float, b: float, c: float) -> float:
     """Return where between 0 and 1 a cubic has its maximum, or `NONE`."""
     discriminant = b * b - 3 * a * c
@@ -139,14 +139,14 @@ def summit(a: float, b: float, c: float) -> float:
     return place if 0 < place < 1 else NONE
 
 
-@inlined
+@jit_inline
 def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float]:
     """Return the highest point of a cell, and where in the cell it is."""
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
-    rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, greater(begin, end)
+    rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
     between = 3 * rise - first - last  # a control point of the slope: where all three agree in sign, none is inside
-    if not (lesser(lesser(first, between), last) >= 0 or greater(greater(first, between), last) <= 0):
+    if not (min(min(first, between), last) >= 0 or max(max(first, between), last) <= 0):
         b, c = 3 * rise - 2 * first - last, first + last - 2 * rise
         inside = summit(first, b, c)
         top = begin + inside * (first + inside * (b + inside * c))
@@ -155,13 +155,13 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
     return peak, place
 
 
-@compiled
+@jit
 def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
     """Return the first cell that reaches the highest point of a line, the place in it, and the height."""
     best, place, highest = 0, 0.0, -np.inf
     for i in range(enter.size):
-        rise = STEEPEST_RISE * (greater(enter[i], 0.0) + greater(-leave[i], 0.0))
-        if not greater(height[i], height[i + 1]) + rise * (1 + 1e-9) <= highest:
+        rise = STEEPEST_RISE * (max(enter[i], 0.0) + max(-leave[i], 0.0))
+        if not max(height[i], height[i + 1]) + rise * (1 + 1e-9) <= highest:
             peak, x = _peak(height, enter, leave, i)
             if i == 0 or peak > highest:
                 best, place, highest = i, x, peak
@@ -179,7 +179,7 @@ def cut(line: CubicLine) -> Cells:
     return Cells(*columns, place if line.periodic else 0.0, top, line.periodic)
 
 
-@kernel
+@jit
 def running(integrals: FloatArray) -> FloatArray:
     """Return the integral up to every node from those over the cells, shape (cells + 1,)."""
     summed, total = np.empty(integrals.size + 1), 0.0
@@ -190,7 +190,7 @@ def running(integrals: FloatArray) -> FloatArray:
     return summed
 
 
-@kernel
+@jit
 def _turned(
     line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -225,7 +225,7 @@ def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
 
-@kernel
+@jit
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     """Write the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
 
@@ -247,7 +247,7 @@ def _resum(slope: FloatArray, stretch: FloatArray) -> None:
     stretch[n] = kept
 
 
-@compiled
+@jit
 def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, float]:
     """Return the cell of the highest point of a periodic line of cubic cells, the place in it, 0..1, and the height.
 
@@ -258,17 +258,17 @@ def highest_point(height: FloatArray, slope: FloatArray) -> tuple[int, float, fl
     """
     n, node = height.size, -np.inf
     for i in range(n):
-        node = greater(node, height[i])
+        node = max(node, height[i])
     best, best_place, highest, rise = 0, 0.0, -np.inf, STEEPEST_RISE / n
     for i in range(n):
         following = i + 1 if i + 1 < n else 0
         after = height[following]
-        if greater(height[i], after) + rise * greater(slope[i] - slope[following], 0.0) < node:
+        if max(height[i], after) + rise * max(slope[i] - slope[following], 0.0) < node:
             continue
         enter, leave, place = slope[i] / n, slope[following] / n, 0.0
-        if enter > 0 > leave and greater(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
+        if enter > 0 > leave and max(height[i], after) + STEEPEST_RISE * (enter - leave) > highest:
             b, c = 3 * (after - height[i]) - 2 * enter - leave, enter + leave - 2 * (after - height[i])
-            place = lesser(greater(-enter / (b - math.sqrt(greater(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
+            place = min(max(-enter / (b - math.sqrt(max(b * b - 3 * enter * c, 0.0))), 0.0), 1.0)
             b, c = b * place * place, c * (place * place * place)
         else:
             b, c = 0.0, 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.surfaces.waves import series
 
 ComplexArray = NDArray[np.complex128]
@@ -99,7 +99,7 @@ def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
     return pairs
 
 
-@compiled
+@jit
 def _turn(share: FloatArray, factors: FloatArray) -> None:
     """Write cosine and sine of shares 0..1 of a turn, to rounding: series about the nearest quarter, vectorised."""
     for k in range(share.size):

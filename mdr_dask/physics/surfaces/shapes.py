@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, nested
+from mdr_dask.physics.jit import jit
 
 ITERATIONS = 200
 
@@ -140,7 +140,7 @@ def half_width(load: FloatArray, coefficient: float, exponent: float) -> FloatAr
     return width
 
 
-@nested
+@jit
 def _trailing(drop: float, deborah: float, exponent: float) -> float:
     """Return b >= 0 with b^n + n deborah b^(n-1) = drop, or 0 where there is none (n = 1)."""
     if exponent == 1:
@@ -158,7 +158,7 @@ def _trailing(drop: float, deborah: float, exponent: float) -> float:
     return math.exp(y)
 
 
-@nested
+@jit
 def _carried(depth: float, deborah: float, coefficient: float, exponent: float) -> tuple[float, float, float]:
     """Return F_N / (4 G) at a depth, and the leading and trailing edges."""
     drop = depth / coefficient
@@ -168,7 +168,7 @@ def _carried(depth: float, deborah: float, coefficient: float, exponent: float) 
     return load + deborah * (depth - coefficient * b**exponent), a, b
 
 
-@compiled
+@jit
 def smooth(
     loads: FloatArray, deborah: FloatArray, coefficients: FloatArray, exponents: FloatArray, results: FloatArray
 ) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.surfaces.waves import series
 
 Piece = tuple[float, float, float, float]
@@ -81,26 +81,26 @@ def _at_nodes(phase: FloatArray) -> FloatArray:
     return np.asarray((2 + np.cos(phase)) / 3)
 
 
-@compiled
+@jit
 def piece(spline: FloatArray, k: int) -> Piece:
     """Return the polynomial between the second and the third of four coefficients, the first of them at place k."""
     c0, c1, c2, c3 = spline[k], spline[k + 1], spline[k + 2], spline[k + 3]
     return (c0 + 4 * c1 + c2) / 6, (c2 - c0) / 2, (c0 - 2 * c1 + c2) / 2, (c3 - 3 * c2 + 3 * c1 - c0) / 6
 
 
-@compiled
+@jit
 def value(of: Piece, t: float) -> float:
     """Return the height of a piece at t."""
     return of[0] + t * (of[1] + t * (of[2] + t * of[3]))
 
 
-@compiled
+@jit
 def integral(of: Piece, t: float) -> float:
     """Return the integral of a piece from 0 to t."""
     return t * (of[0] + t * (of[1] / 2 + t * (of[2] / 3 + t * of[3] / 4)))
 
 
-@compiled
+@jit
 def shares(t: float) -> Piece:
     """Return what each of four coefficients adds to the integral of their piece from 0 to t."""
     square = t * t
@@ -108,7 +108,7 @@ def shares(t: float) -> Piece:
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
 
 
-@compiled
+@jit
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     """Append the places, from k to k + 1, where a piece changes between above zero and not; return the new count.
 
@@ -130,7 +130,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
     return count
 
 
-@nested
+@jit
 def _extremes(of: Piece) -> tuple[float, float]:
     """Return where a piece has its extremes, in order, 0 in place of one outside 0..1."""
     a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
@@ -145,7 +145,7 @@ def _extremes(of: Piece) -> tuple[float, float]:
     return min(one, other), max(one, other)
 
 
-@compiled
+@jit
 def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
     """Return the zero of a piece that is monotonic from `low` to `high`, where its signs differ: Newton, bracketed."""
     t = low + (high - low) * at_low / (at_low - at_high)

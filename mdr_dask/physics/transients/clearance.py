@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined
+from mdr_dask.physics.jit import jit_inline
 from mdr_dask.physics.transients.free_flight import Instant
 from mdr_dask.physics.transients.recent import WINDOWS, Recent
 
@@ -41,7 +41,7 @@ def clearance_from(until: FloatArray) -> Clearance:
     return Clearance(until, state)
 
 
-@inlined
+@jit_inline
 def approached(now: Instant, recent: Recent, state: FloatArray) -> float:
     """Return the approach at a moment, which follows that of the last search; after any other all cells are awake."""
     history, last = now.history, now.history.count - 1
@@ -58,7 +58,7 @@ def approached(now: Instant, recent: Recent, state: FloatArray) -> float:
     return float(state[APPROACH])
 
 
-@inlined
+@jit_inline
 def rests(clearance: Clearance, cell: int, gap: float) -> None:
     """Write down that the line is below all elements in a cell by a gap."""
     state = clearance.state

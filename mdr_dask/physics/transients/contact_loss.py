@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.physics.compiling import inlined, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import cubic
 from mdr_dask.physics.transients.free_flight import Instant, Wakes, left_before, wake_at, worth_keeping
 from mdr_dask.physics.transients.patches import Track, height_at
@@ -41,7 +41,7 @@ class Motion(NamedTuple):
     overflown: bool
 
 
-@inlined
+@jit_inline
 def motion_at(now: Instant, second: float) -> Motion:
     """Return how the depth has moved, with the highest point outside of the patch of the highest of all."""
     history, deborah, last = now.history, now.deborah, now.history.count - 1
@@ -67,7 +67,7 @@ def motion_at(now: Instant, second: float) -> Motion:
     return Motion(rise, fall, shallowest, deepest, highest, overflown)
 
 
-@inlined
+@jit_inline
 def _slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
     """Return slopes that bound that of the force in a cell: at its start, the control point between, at its end."""
     _, c1, c2, c3 = cubic(track.height, track.enter, track.leave, i)
@@ -75,7 +75,7 @@ def _slopes(track: Track, deborah: float, i: int) -> tuple[float, float, float]:
     return enter, enter + bend, enter + 2 * bend + turn
 
 
-@inlined
+@jit_inline
 def may_have_left(track: Track, motion: Motion, deborah: float, i: int) -> bool:
     """Return whether elements can have left in cell i or where it begins, where the force is positive now.
 
@@ -90,7 +90,7 @@ def may_have_left(track: Track, motion: Motion, deborah: float, i: int) -> bool:
     return bool(deborah * least < motion.fall)
 
 
-@inlined
+@jit_inline
 def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
     """Return a displacement that elements in flight have at x in a patch, or 0 if the line surely presses further.
 
@@ -112,7 +112,7 @@ def overtaking(now: Instant, wakes: Wakes, held: float, x: float) -> float:
     return wake_at(now, wakes, x)[0]
 
 
-@nested
+@jit
 def loss(now: Instant, wakes: Wakes, low: float, high: float) -> float:
     """Return where contact is lost between low and high, by bisection."""
     depth = now.history.depth[now.history.count - 1]
@@ -125,7 +125,7 @@ def loss(now: Instant, wakes: Wakes, low: float, high: float) -> float:
     return high
 
 
-@inlined
+@jit_inline
 def turned(now: Instant, wakes: Wakes, motion: Motion) -> int:
     """Shift places by a turn, to before the highest point, and keep those worth it; count them."""
     for k in range(wakes.count):

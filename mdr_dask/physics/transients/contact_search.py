@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, cubic
 from mdr_dask.physics.transients.clearance import APPROACH, TIME, Clearance, approached, rests
@@ -95,14 +95,14 @@ def workspace_for(patches: int, barriers: Barriers, clearance: Clearance) -> Wor
     return Workspace(start, end, np.zeros(SUMS), earliest, places, farthest, barrier, recent, clearance, barriers)
 
 
-@inlined
+@jit_inline
 def _remember(place: float, farthest: float, work: Workspace, known: int) -> int:
     """Write down where contact was left; count the places."""
     work.earliest[known], work.places[known], work.farthest[known], work.barrier[known] = place, place, farthest, np.inf
     return known + 1
 
 
-@inlined
+@jit_inline
 def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> int:
     """Write down that contact may have been left in a cell where the force is positive now; count the places."""
     last = known - 1
@@ -119,7 +119,7 @@ def _remember_cell(cell: float, barrier: float, work: Workspace, known: int) -> 
     return known + 1
 
 
-@inlined
+@jit_inline
 def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) -> float:
     """Return how far from where contact is left it can have reached, at the highest of depth and rate so far."""
     i = min(int(place), int(now.track.cells))
@@ -132,7 +132,7 @@ def _farthest(now: Instant, place: float, highest: float, barriers: Barriers) ->
     return i + 1.0
 
 
-@inlined
+@jit_inline
 def _add_edge(now: Instant, lift: float, place: float, gap: tuple[float, float, float], sums: FloatArray) -> None:
     """Add what load and drag gain by depth and time where a patch grows at an edge: the force there is not zero.
 
@@ -149,7 +149,7 @@ def _add_edge(now: Instant, lift: float, place: float, gap: tuple[float, float, 
         sums[DRAG_GROWTH] += edge * opening * slope
 
 
-@compiled
+@jit
 def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     """Find the patches in contact at a moment, at the last depth and rate of its history, and add up their forces.
 
@@ -185,7 +185,7 @@ def touch(now: Instant, reachable: Reachable, work: Workspace) -> int:
     return found
 
 
-@nested
+@jit
 def _turn(now: Instant, motion: Motion, reachable: Reachable, work: Workspace, known: int) -> tuple[int, int]:
     """Do what `touch` does on one turn of the line, with some places of leaving known; return how many are known then.
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 
 STEEPEST = 3.0  # times the lesser of the secants beside a point: a steeper cubic would overshoot
 
 
-@kernel
+@jit
 def curve_through(x: FloatArray, y: FloatArray, slope: FloatArray, places: FloatArray, values: FloatArray) -> None:
     """Write the curve of cubics through points with slopes at places, both in ascending order.
 

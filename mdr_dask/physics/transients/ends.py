@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG as SWEEP_DRAG
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
@@ -175,7 +175,7 @@ def _ends(line: PreparedLine, loads: FloatArray, deborah: FloatArray, guesses: F
     return Ends(drag[:, 0].copy(), at, drag[:, 1].copy(), rate, tilt, depth, contact, first, slower, outcome)
 
 
-@kernel
+@jit
 def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
     """Return the displacements with which elements leave patches."""
     pressed = np.empty(end.size)
@@ -184,7 +184,7 @@ def _pressed(track: Track, end: FloatArray, depth: float) -> FloatArray:
     return pressed
 
 
-@kernel
+@jit
 def _moved(track: Track, deborah: float, depth: float, start: FloatArray, end: FloatArray, pressed: FloatArray) -> bool:
     """Move the places of patches close to a depth to it, by a step of Newton; write with what elements leave them.
 
@@ -214,7 +214,7 @@ def _moved(track: Track, deborah: float, depth: float, start: FloatArray, end: F
     return True
 
 
-@kernel
+@jit
 def _release(
     track: Track, first: Patches, barriers: Barriers, deborah: float, load: float
 ) -> tuple[float, float, float, int]:

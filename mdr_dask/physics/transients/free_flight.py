@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined, last_until, nested
+from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.transients.patches import History, Patches, Track, height_at, patch_before
 from mdr_dask.physics.transients.recent import Recent, over
 
@@ -59,7 +59,7 @@ class Wakes(NamedTuple):
     count: int  # type: ignore[assignment]
 
 
-@inlined
+@jit_inline
 def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     """Return depth, rate and its derivative at time t by the cubic through values and rates."""
     last = history.count - 1
@@ -83,7 +83,7 @@ def _depth_at(history: History, t: float) -> tuple[float, float, float]:
     )
 
 
-@inlined
+@jit_inline
 def _follows(history: History, t: float) -> float:
     """Return the derivative of the depth at time t by the last depth."""
     last = history.count - 1
@@ -96,14 +96,14 @@ def _follows(history: History, t: float) -> float:
     return float(y * y * (3 - 2 * y + history.stiff * step * (y - 1)))
 
 
-@inlined
+@jit_inline
 def _in_turn(now: Instant, s: float) -> float:
     """Return the place in the turn that a line is of a place in any turn."""
     track = now.track
     return float(s - np.floor((s - track.origin) / track.cells) * track.cells)
 
 
-@inlined
+@jit_inline
 def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[float, float, float]:
     """Return displacement at x of an element that left near `place` after the jump, its slope, its derivative by depth.
 
@@ -143,7 +143,7 @@ def _left_from(now: Instant, x: float, place: float, farthest: float) -> tuple[f
     return -1.0, 0.0, 0.0
 
 
-@nested
+@jit
 def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float, float, float]:
     """Return what `_left_from` does, of an element that left somewhere in a stretch of cells: after a look at nodes."""
     most, place, s = 0.0, x, min(high, np.ceil(x) - 1)
@@ -158,7 +158,7 @@ def _left_within(now: Instant, x: float, low: float, high: float) -> tuple[float
     return _left_from(now, x, place, place + 1) if most > 0 else (-1.0, 0.0, 0.0)
 
 
-@inlined
+@jit_inline
 def left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, float]:
     """Return what `_left_from` does, of the k-th place."""
     if wakes.earliest[k] < wakes.places[k]:
@@ -168,7 +168,7 @@ def left(now: Instant, wakes: Wakes, k: int, x: float) -> tuple[float, float, fl
     return _left_from(now, x, wakes.places[k], wakes.farthest[k])
 
 
-@inlined
+@jit_inline
 def left_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     """Return what is left at x of the state before the jump, and its slope along x; 0 where that is `least` at most."""
     first, s = now.first, _in_turn(now, x - now.deborah * now.time)
@@ -183,7 +183,7 @@ def left_before(now: Instant, x: float, least: float) -> tuple[float, float]:
     return u, -u / first.deborah
 
 
-@inlined
+@jit_inline
 def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     """Return the displacement at x of elements in free flight, its slope along x, and its derivative by the depth."""
     u, slope, gain = 0.0, 0.0, 0.0
@@ -198,7 +198,7 @@ def wake_at(now: Instant, wakes: Wakes, x: float) -> tuple[float, float, float]:
     return u, slope, gain
 
 
-@inlined
+@jit_inline
 def foreseen(
     line: tuple[float, float, float, float], depth: float, wake: tuple[float, float], low: float, high: float
 ) -> float:
@@ -229,7 +229,7 @@ def foreseen(
     return y
 
 
-@inlined
+@jit_inline
 def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[float, float, float, float, float]:
     """Return how far the line is above a wake at x, its slope and curvature, its derivative by the depth, and its rate.
 
@@ -243,7 +243,7 @@ def gap_at(now: Instant, x: float, wake: tuple[float, float, float]) -> tuple[fl
     return now.history.depth[last] + h - u, h_slope - u_slope, bend, 1 - gain, opening
 
 
-@inlined
+@jit_inline
 def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tuple[float, float, float, float]:
     """Return where the line rises through the wake, the slopes of their gap by place and depth, and its rate there."""
     slope, gain, opening = 1.0, 1.0, 0.0
@@ -265,7 +265,7 @@ def meeting(now: Instant, wakes: Wakes, low: float, high: float, x: float) -> tu
     return x, slope, gain, opening
 
 
-@nested
+@jit
 def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, float]:
     """Return where the line comes nearest to the wake or above it between two places, falling back at `high`."""
     depth, x, gap = now.history.depth[now.history.count - 1], high, -1.0
@@ -281,7 +281,7 @@ def crest(now: Instant, wakes: Wakes, low: float, high: float) -> tuple[float, f
     return x, gap
 
 
-@inlined
+@jit_inline
 def worth_keeping(now: Instant, wakes: Wakes, x: float, pressed: float, deepest: float) -> int:
     """Keep the places whose wake can still come out above that of an element pressed to `pressed` at x; count them."""
     kept = 0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.transients.contact_search import Reachable, Workspace, touch
 from mdr_dask.physics.transients.free_flight import Instant
@@ -92,7 +92,7 @@ class Trajectory(NamedTuple):
     drag_rate: FloatArray
 
 
-@nested
+@jit
 def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     """Return the rate of the drag at constant load: patches grow where they begin, the lift falls to make up for it.
 
@@ -105,7 +105,7 @@ def _drag_rate(sums: FloatArray, stiff: float, step: float) -> float:
     return float(lift * sums[TILT] + drag_growth)
 
 
-@compiled
+@jit
 def _balance(
     marching: Marching, history: History, weights: tuple[float, float], close: float, work: Workspace
 ) -> tuple[int, float, float]:
@@ -149,7 +149,7 @@ def _balance(
     return Outcome.DEPTH_NOT_FOUND, 0.0, 0.0
 
 
-@nested
+@jit
 def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     """Return a and b of d_dot = a d + b at moment `now` of a march that begins with a known rate.
 
@@ -172,7 +172,7 @@ def _weights(found: Trajectory, now: int, onset: float) -> tuple[float, float]:
     return a * pace, b * pace
 
 
-@nested
+@jit
 def _foretold(found: Trajectory, now: int) -> float:
     """Extrapolate the depth to moment `now`: by a parabola over the places, as soon as there are three of them."""
     time, place, depth, rate, _, _ = found
@@ -187,7 +187,7 @@ def _foretold(found: Trajectory, now: int) -> float:
     return float(depth[now - 1] + ahead * (to_one + (ahead - one) * (to_two - to_one) / (two - one)))
 
 
-@kernel
+@jit
 def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajectory, work: Workspace) -> tuple[int, int]:
     """March the depth at constant load by backward differentiation of order three over log(1 + t / onset).
 
@@ -236,7 +236,7 @@ def march_depth(marching: Marching, pace: Stepping, aim: Finish, found: Trajecto
     return now, Outcome.CONVERGED
 
 
-@compiled
+@jit
 def retrace(marching: Marching, depths: FloatArray, found: Trajectory, work: Workspace) -> int:
     """March through given moments along depths that are nearly right, by one step of Newton for each.
 

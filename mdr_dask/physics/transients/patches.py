@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import compiled, inlined, last_until, nested
+from mdr_dask.physics.jit import jit, jit_inline, last_until
 from mdr_dask.physics.sliding.kelvin import BLOCK, Barriers, leaving, write_barriers
 from mdr_dask.physics.surfaces.cubic_line import NONE, Cells, cubic, running
 
@@ -81,7 +81,7 @@ class History(NamedTuple):
     stiff: float
 
 
-@inlined
+@jit_inline
 def height_at(track: Track, x: float) -> tuple[float, float, float]:
     """Return height, slope and curvature at x."""
     i = min(max(int(x), 0), track.enter.size - 1)
@@ -94,7 +94,7 @@ def height_at(track: Track, x: float) -> tuple[float, float, float]:
     )
 
 
-@inlined
+@jit_inline
 def patch_before(patches: Patches, s: float) -> int:
     """Return the last patch that begins at s or before, or the first one; those near the last one found come first."""
     low, high = int(patches.cursor[0]), patches.count
@@ -113,7 +113,7 @@ def patch_before(patches: Patches, s: float) -> int:
     return low
 
 
-@inlined
+@jit_inline
 def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, float, float]:
     """Return the height at y of a cubic over 0..1, and the integrals of it and of its slope squared from 0 to y."""
     height = c0 + y * (c1 + y * (c2 + y * c3))
@@ -124,7 +124,7 @@ def _part(c0: float, c1: float, c2: float, c3: float, y: float) -> tuple[float, 
     return height, area, square
 
 
-@inlined
+@jit_inline
 def add_patch(track: Track, start: float, end: float, lift: float, deborah: float, sums: FloatArray) -> None:
     """Add the forces of a patch in contact, f = lift + h + deborah h' with lift = d + d_dot, exactly.
 
@@ -150,7 +150,7 @@ def add_patch(track: Track, start: float, end: float, lift: float, deborah: floa
     sums[TILT] += rise
 
 
-@nested
+@jit
 def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     """Return where from y to 1 the cubic p + q y + r y^2 + c y^3, not negative at y, falls through zero, or `NONE`.
 
@@ -180,25 +180,25 @@ def _zero(p: float, q: float, r: float, c: float, y: float) -> float:
     return x
 
 
-@inlined
+@jit_inline
 def unloading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return where in a cell, from y on, the force lift + h + deborah h' falls through zero first, or `NONE`."""
     return _zero(lift + c0 + deborah * c1, c1 + 2 * deborah * c2, c2 + 3 * deborah * c3, c3, y)
 
 
-@inlined
+@jit_inline
 def loading(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return where in a cell, from y on, the force rises through zero first, or `NONE`."""
     return _zero(-lift - c0 - deborah * c1, -c1 - 2 * deborah * c2, -c2 - 3 * deborah * c3, -c3, y)
 
 
-@inlined
+@jit_inline
 def force_at(c0: float, c1: float, c2: float, c3: float, lift: float, deborah: float, y: float) -> float:
     """Return the force lift + h + deborah h' at y in a cell."""
     return lift + c0 + y * (c1 + y * (c2 + y * c3)) + deborah * (c1 + y * (2 * c2 + y * 3 * c3))
 
 
-@inlined
+@jit_inline
 def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift: float) -> bool:
     """Return whether the force is positive in all of cell i."""
     block = np.uintp(i) // np.uintp(BLOCK)
@@ -207,7 +207,7 @@ def keeps_pressed(track: Track, barriers: Barriers, deborah: float, i: int, lift
     return bool(barriers.cell[np.uintp(i)] < lift)
 
 
-@compiled
+@jit
 def released(track: Track, first: Patches, barriers: Barriers, deborah: float, rate: float, sums: FloatArray) -> None:
     """Add up the forces at the very moment of a jump: what touched before touches on where f > 0 at the new rates.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import inlined
+from mdr_dask.physics.jit import jit_inline
 from mdr_dask.physics.transients.patches import History, Patches
 
 WINDOW = 8.0  # cells: the shortest way
@@ -39,7 +39,7 @@ class Recent(NamedTuple):
     pull: FloatArray
 
 
-@inlined
+@jit_inline
 def write_recent(history: History, first: Patches, deborah: float, recent: Recent) -> None:
     """Write the bounds at the last moment of a history."""
     last = history.count - 1
@@ -69,7 +69,7 @@ def write_recent(history: History, first: Patches, deborah: float, recent: Recen
             recent.apart[k] += gains * (np.exp(-max(since, 0.0)) - np.exp(-min(time, 0.5 * way)))
 
 
-@inlined
+@jit_inline
 def over(distance: float) -> int:
     """Return which of the bounds holds over a distance."""
     ways = max(distance * (1 / WINDOW), 0.0)

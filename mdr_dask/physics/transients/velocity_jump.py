@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.sliding.kelvin import DRAG_RATE
 from mdr_dask.physics.sliding.kelvin import SUMS as SWEEP_SUMS
@@ -366,7 +366,7 @@ def _reachable(track: Track, slower: Patches, limits: tuple[float, float]) -> Re
     return Reachable(*_runs(track, slower, limits), float(np.max(track.peak[begin:end], initial=-np.inf)))
 
 
-@kernel
+@jit
 def _runs(track: Track, slower: Patches, limits: tuple[float, float]) -> tuple[IntArray, FloatArray]:
     """Return where elements can be in contact between two depths, and up to which depth those of a cell are not.
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.linear import Factors, factorise
 from mdr_dask.physics.mdr.half_integrals import Panels, graded_panels
 from mdr_dask.physics.outcome import Outcome
@@ -386,7 +386,7 @@ class _Newton:
         self.factors, self.theta = factorise(matrix), theta
 
 
-@kernel
+@jit
 def _backward_shares(times: FloatArray) -> FloatArray:
     """Return the weights of the derivative at times[0] of the polynomial through all the times."""
     weights = np.zeros(times.size)
@@ -399,7 +399,7 @@ def _backward_shares(times: FloatArray) -> FloatArray:
     return weights
 
 
-@kernel
+@jit
 def _lagrange(times: FloatArray, time: float) -> FloatArray:
     """Return the weights of the polynomial through the times at another time."""
     weights = np.ones(times.size)

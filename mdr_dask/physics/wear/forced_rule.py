@@ -18,7 +18,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.mdr.revolution import Profile, bisect
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.rules import THESIS_XI, limit_radius
@@ -125,21 +125,21 @@ def _depth_stages(profile: Profile, c: float, eta: float, duration: float) -> tu
     return step, stages, load
 
 
-@compiled
+@jit
 def _rate(y: float) -> float:
     if y >= 1.0:
         return 1.0 - y
     return max(y, 0.0) * (1.0 - y)
 
 
-@compiled
+@jit
 def _rate_slope(y: float) -> float:
     if y >= 1.0:
         return -1.0
     return 1.0 - 2.0 * y if y > 0.0 else 0.0
 
 
-@compiled
+@jit
 def _growth(y: FloatArray, weights: FloatArray) -> float:
     total = 0.0
     for k in range(y.size):
@@ -148,7 +148,7 @@ def _growth(y: FloatArray, weights: FloatArray) -> float:
     return total
 
 
-@kernel
+@jit
 def _advance(y: FloatArray, weights: FloatArray, step: float, stages: FloatArray) -> None:
     """Advance y at the places by the classical Runge-Kutta rule; keep the four rates of the depth of every step."""
     middle, slopes = np.empty_like(y), np.empty((4, y.size))
@@ -184,7 +184,7 @@ def _followed(stages: FloatArray, step: float) -> CubicHermiteSpline:
     return CubicHermiteSpline(places, y, steepness)
 
 
-@kernel
+@jit
 def _follow(stages: FloatArray, step: float, y: FloatArray, steepness: FloatArray) -> None:
     """Advance y at any places under the depths found, and its derivative by its first value."""
     for number in range(stages.shape[0]):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Mesh, value_at
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.slip import LogTable, log_slip
@@ -69,7 +69,7 @@ class Past(NamedTuple):
     carried: float
 
 
-@compiled
+@jit
 def remember(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: FloatArray) -> None:
     """Put what is known of s and of the worn depth at the nodes, and the load that sticks."""
     nodes, path, stands = result.size // 2, past.path, past.frozen == past.frozen
@@ -92,7 +92,7 @@ def remember(mesh: Mesh, body: VirginBody, past: Past, place: Place, result: Flo
     result[2 * nodes] = sticking_load(body, path[0, last], path[1, last], past.carried, place)
 
 
-@inlined
+@jit_inline
 def sticking_load(body: VirginBody, border: float, depth: float, carried: float, place: Place) -> float:
     """Return int_0^b (d - g) dx - int_0^c (1 - g) dx over eta, on what sticks."""
     radius = math.sqrt(body.square + body.width * border)
@@ -100,14 +100,14 @@ def sticking_load(body: VirginBody, border: float, depth: float, carried: float,
     return radius * place.depth + carried + further * (0.5 * (place.depth - depth) + 1.0)
 
 
-@compiled
+@jit
 def plateau_rise(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
     """Put (2/pi) int arccos(b / r) dd along a path of straight pieces, at places beyond it."""
     for i in range(place.size):
         result[i] = _rise(body, path, path.shape[1] - 1, place[i])
 
 
-@compiled
+@jit
 def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: FloatArray) -> None:
     """Put the worn depth over eta that the border left at places it passed, on a path on which it never returned."""
     for i in range(place.size):
@@ -124,7 +124,7 @@ def frozen_depth(body: VirginBody, path: FloatArray, place: FloatArray, result: 
         result[i] = rise - math.exp(log_slip(body.slip, body.width * max(q, SMALLEST)))
 
 
-@compiled
+@jit
 def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
     """Return the rise of the plateau along the first pieces of a path."""
     square, total = body.square + body.width * q, 0.0
@@ -136,12 +136,12 @@ def _rise(body: VirginBody, path: FloatArray, last: int, q: float) -> float:
     return 2.0 / math.pi * total
 
 
-@inlined
+@jit_inline
 def _root(q: float, border: float) -> float:
     return math.sqrt(max(q - border, 0.0))
 
 
-@inlined
+@jit_inline
 def _mean_angle(square: float, width: float, first: float, last: float) -> float:
     """Return the mean of arccos(b / r) along a straight piece, in the root of r^2 - b^2, in which it is smooth."""
     scale = math.sqrt(width / square)

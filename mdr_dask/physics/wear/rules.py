@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.revolution import Image, PowerProfile, Profile, image_rise
 from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear.worn import (
@@ -230,14 +230,14 @@ def _worn(profile: Profile, rule: Rule, radius: float, edge: float) -> Worn:
     )
 
 
-@inlined
+@jit_inline
 def _between(bracket: Bracket) -> float:
     """Return the root of the straight line through both ends."""
     low, low_value, high, high_value, _ = bracket
     return (low * high_value - high * low_value) / (high_value - low_value)
 
 
-@inlined
+@jit_inline
 def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
     """Return the bracket with one more value, by the rule of Anderson and Björck: the end that stays loses weight."""
     low, low_value, high, high_value, newer = bracket
@@ -249,7 +249,7 @@ def _narrowed(bracket: Bracket, x: float, value: float) -> Bracket:
     return Bracket(low, share * low_value if newer == 1 else low_value, x, value, 1)
 
 
-@inlined
+@jit_inline
 def _change(rule: Rule, gap: float) -> float:
     """Return g - g0 at c + gap."""
     rise = image_rise(rule.image, rule.c, rule.level, gap)
@@ -262,13 +262,13 @@ def _change(rule: Rule, gap: float) -> float:
     return rule.eta * start * (1.0 - start) * (1.0 - rule.rest) / left
 
 
-@compiled
+@jit
 def _changes(rule: Rule, places: FloatArray, result: FloatArray) -> None:
     for k in range(places.size):
         result[k] = _change(rule, max(places[k] - rule.c, 0.0))
 
 
-@nested
+@jit
 def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     """Put the ends of the pieces: a layer as thin as what is left, two wider ones, and the first contact."""
     low, high, level = 0.0, 1.0 - rule.c, rule.eta * rule.rest / (1.0 + rule.rest)
@@ -289,7 +289,7 @@ def _put_cuts(rule: Rule, cuts: FloatArray) -> None:
     cuts[4] = 1.0
 
 
-@compiled
+@jit
 def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadrature) -> float:
     """Return int_c^R (g - g0) (R^2 - x^2)^(moment - 1/2) dx in pieces between the cuts."""
     abscissa, weight, cuts = quadrature
@@ -313,20 +313,20 @@ def _scar_integral(rule: Rule, radius: float, moment: int, quadrature: Quadratur
     return total
 
 
-@inlined
+@jit_inline
 def _angle(x: float, radius: float) -> float:
     """Return arccos(x / R) without cancellation near x = R."""
     return math.atan2(math.sqrt((radius - x) * (radius + x)), x)
 
 
-@compiled
+@jit
 def _heights(rule: Rule, radii: FloatArray, quadrature: Quadrature, result: FloatArray) -> None:
     """Put f - f0 at radii beyond c."""
     for k in range(radii.size):
         result[k] = 2.0 / math.pi * _scar_integral(rule, radii[k], 0, quadrature)
 
 
-@nested
+@jit
 def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
     """Return the root of the scar's integral in a bracket, or its higher end if there is none."""
     if not bracket.high_value < 0.0 < bracket.low_value:
@@ -342,7 +342,7 @@ def _scar_radius(rule: Rule, bracket: Bracket, quadrature: Quadrature) -> float:
     return radius
 
 
-@compiled
+@jit
 def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
     """Return a(c) of a rule with nothing left, NaN if it lies beyond the largest radius."""
     _put_cuts(rule, quadrature.cuts)
@@ -356,7 +356,7 @@ def _limit_radius(rule: Rule, largest: float, quadrature: Quadrature) -> float:
     return _scar_radius(rule, Bracket(low, low_value, high, high_value, 0), quadrature)
 
 
-@compiled
+@jit
 def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, float, float]:
     """Return scar radius, volume and normal force; put the cuts."""
     abscissa, weight, cuts = quadrature
@@ -376,7 +376,7 @@ def _numbers(rule: Rule, limit: float, quadrature: Quadrature) -> tuple[float, f
     return radius, volume, 2.0 * (load + worn)
 
 
-@nested
+@jit
 def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> float:
     """Return int_0^c (1 - g0) dx."""
     if rule.image.knots.size == 0:
@@ -389,7 +389,7 @@ def _sticking_load(rule: Rule, abscissa: FloatArray, weight: FloatArray) -> floa
     return load
 
 
-@compiled
+@jit
 def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
     """Put radius, volume and force of cases (n, c)."""
     for k in range(cases.shape[1]):
@@ -398,7 +398,7 @@ def _limits(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: 
         result[0, k], result[1, k], result[2, k] = _numbers(rule, radius, quadrature)
 
 
-@compiled
+@jit
 def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: FloatArray) -> None:
     """Put radius, volume and force of cases (n, c, N, xi, a(c))."""
     for k in range(cases.shape[1]):
@@ -407,7 +407,7 @@ def _fasts(cases: FloatArray, no_table: Image, quadrature: Quadrature, result: F
         result[0, k], result[1, k], result[2, k] = _numbers(rule, limit, quadrature)
 
 
-@nested
+@jit
 def _power_rule(no_table: Image, exponent: float, c: float, rest: float) -> Rule:
     image = Image(exponent, no_table.knots, no_table.coefficients)
     return Rule(image, c, math.pow(c, exponent), -math.expm1(exponent * math.log(c)), rest)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.mdr.half_integrals import Panels, interpolate_weighted
 from mdr_dask.physics.mdr.revolution import Profile
 from mdr_dask.physics.mdr.transforms import gauss
@@ -89,7 +89,7 @@ class LogTable(NamedTuple):
         return result.reshape(squares.shape)
 
 
-@inlined
+@jit_inline
 def log_slip(table: LogTable, square: float) -> float:
     """Return ln s0 at one r^2 - c^2."""
     place = math.log(square) - table.first
@@ -98,7 +98,7 @@ def log_slip(table: LogTable, square: float) -> float:
     return float(((k[0, cell] * local + k[1, cell]) * local + k[2, cell]) * local + k[3, cell])
 
 
-@compiled
+@jit
 def _look_up(table: LogTable, squares: FloatArray, result: FloatArray) -> None:
     for i in range(squares.size):
         result[i] = log_slip(table, squares[i])
@@ -112,7 +112,7 @@ class _Step(NamedTuple):
     known: FloatArray
 
 
-@compiled
+@jit
 def _slip_rows(table: LogTable, step: _Step, stress: FloatArray, slip: FloatArray) -> None:
     """Turn the slip into the residual of `PartialSlip`, in place; in the last row s is continuous at the edge."""
     last = slip.size - 1

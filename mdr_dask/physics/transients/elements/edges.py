@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 
 
@@ -53,7 +53,7 @@ class Drive(NamedTuple):
     first: int
 
 
-@compiled
+@jit
 def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_under: FloatArray) -> int:
     """Write height and slope (over the line's length) above every element after a travel; return its whole cells."""
     n = under.size
@@ -72,7 +72,7 @@ def under_elements(line: CubicLine, travel: float, under: FloatArray, slope_unde
     return shift
 
 
-@compiled
+@jit
 def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) -> tuple[float, bool]:
     """Find the depth at which the mean displacement max(d + p, free) has its value; convex and increasing in d."""
     n = under.size
@@ -100,14 +100,14 @@ def depth_for(under: FloatArray, free: FloatArray, mean: float, depth: float) ->
     return depth, False
 
 
-@inlined
+@jit_inline
 def _whole(values: FloatArray, j: int) -> float:
     """Return the integral over the cell before node j of the cubic through four nodes."""
     n = values.size
     return float((13 * (values[j - 1] + values[j]) - values[j - 2] - values[(j + 1) % n]) / 24)
 
 
-@inlined
+@jit_inline
 def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     """Return the part of a cell up to the edge, seen from the element in contact."""
     if place < 0:
@@ -116,7 +116,7 @@ def _limit(inner: float, outer: float, place: float, gap: float) -> float:
     return place + (1 - place) * np.sqrt(max(1 - outer / gap, 0.0)) if gap < 0 else place
 
 
-@inlined
+@jit_inline
 def _cell(
     j: int, gaps: FloatArray, force: FloatArray, touching: BoolArray, edges: Edges, keep: bool
 ) -> tuple[float, float]:
@@ -143,7 +143,7 @@ def _cell(
     return low, high
 
 
-@nested
+@jit
 def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, float]:
     """Return mean load, drag and fraction in contact; there is nothing before element `first`. Note edges if `keep`."""
     force, power, slope, touching, edges = contact.force, contact.power, contact.slope, contact.touching, contact.edges
@@ -168,7 +168,7 @@ def _forces(contact: Contact, first: int, keep: bool) -> tuple[float, float, flo
     return load / n, drag / n, length / n
 
 
-@nested
+@jit
 def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
     """Return the rate from which on every element that touches presses."""
     rate = -np.inf
@@ -178,7 +178,7 @@ def _pressing_rate(contact: Contact, weight: float, deborah: float) -> float:
     return rate
 
 
-@compiled
+@jit
 def carrying_rate(contact: Contact, weight: float, rate: float, drive: Drive) -> tuple[float, float, float]:
     """Return the rate at which the load is carried, drag and fraction in contact; note the edges.
 

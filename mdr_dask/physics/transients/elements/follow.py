@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import copy_into, kernel
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.edges import Edges
@@ -164,7 +164,7 @@ def _sliding(line: CubicLine, solid: Foundation, state: State, deborah: float, d
     return (mean - without) / (mean_after(solid, state, 1.0, 1.0, step, modes) - without)
 
 
-@kernel
+@jit
 def _orbit(
     solid: Foundation, line: CubicLine, deborah: float, depth: float, state: State, turns: int
 ) -> tuple[bool, float]:
@@ -184,18 +184,18 @@ def _orbit(
     u, touching = max(w0, 0.0), w0 > 0
     free = 0.0
     for _ in range(turns if line.periodic else 1):
-        copy_into(last, arms[0])
+        last[:] = arms[0]
         before = u
         for cell in range(n):
             i = (top + cell) % n
             if not touching:
                 free = u
-                copy_into(free_arms[0], arms[0])
+                free_arms[0][:] = arms[0]
             if i % every == 0:
                 j = i // every
                 state.displacement[j], state.touching[j], state.free[j] = u, touching, free
-                copy_into(state.arms[j], arms[0])
-                copy_into(state.free_arms[j], free_arms[0])
+                state.arms[j][:] = arms[0]
+                state.free_arms[j][:] = free_arms[0]
             w0, w1 = depth + line.height[i], depth + line.height[i + 1]
             part, leaves = 0.0, u
             if touching:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.physics.compiling import compiled, inlined, kernel, nested
+from mdr_dask.physics.jit import jit, jit_inline
 from mdr_dask.physics.solids import recovery_times
 
 
@@ -85,7 +85,7 @@ class ElementWorkspace(NamedTuple):
     arms: FloatArray
 
 
-@kernel
+@jit
 def element_workspace(solid: Foundation) -> ElementWorkspace:
     """Return the workspace of one element."""
     modes, arms = solid.rates.size, solid.times.size
@@ -118,7 +118,7 @@ class Release(NamedTuple):
     after: float
 
 
-@nested
+@jit
 def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray) -> None:
     """Write how modes decay and arms fade over a time."""
     for k in range(decay.size):
@@ -127,7 +127,7 @@ def fading(solid: Foundation, step: float, decay: FloatArray, fades: FloatArray)
         fades[m] = np.exp(-step / solid.times[m])
 
 
-@compiled
+@jit
 def fly(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray, modes: FloatArray) -> float:
     """Let an element recover without force; `arms` is overwritten."""
     if solid.times.size == 0:
@@ -152,7 +152,7 @@ def fly(solid: Foundation, u: float, arms: FloatArray, i: int, decay: FloatArray
     return at_rest(solid, arms, i)
 
 
-@nested
+@jit
 def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
     """Return the displacement without force of an element that has no dashpot."""
     pull, glass = 0.0, 1.0
@@ -162,7 +162,7 @@ def at_rest(solid: Foundation, arms: FloatArray, i: int) -> float:
     return pull / glass
 
 
-@compiled
+@jit
 def press(
     solid: Foundation, u0: float, u1: float, arms: FloatArray, i: int, step: float, fades: FloatArray
 ) -> tuple[float, float]:
@@ -186,7 +186,7 @@ def press(
     return work, dissipated
 
 
-@compiled
+@jit
 def stored(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     """Return the energy stored in an element."""
     energy = 0.5 * u * u
@@ -195,7 +195,7 @@ def stored(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     return energy
 
 
-@compiled
+@jit
 def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     """Return the force of springs and arms."""
     force = 1.0 * u
@@ -204,7 +204,7 @@ def pull(solid: Foundation, u: float, arms: FloatArray, i: int) -> float:
     return float(force)
 
 
-@inlined
+@jit_inline
 def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: int) -> tuple[float, float]:
     """Return the part of a time after which an element pressed to its rise is let go, and where; 1 if it is not.
 
@@ -225,7 +225,7 @@ def release(solid: Foundation, lapse: Lapse, rise: Rise, arms: FloatArray, i: in
     return part, rise.w0 + part * change + part * (1 - part) * bend
 
 
-@inlined
+@jit_inline
 def flight(solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: float, arms: FloatArray, i: int) -> float:
     """Return where an element ends if it is pressed to `leaves` for a part of a time and free for the rest."""
     workspace = lapse.workspace
@@ -239,7 +239,7 @@ def flight(solid: Foundation, lapse: Lapse, u0: float, part: float, leaves: floa
     return fly(solid, leaves, workspace.arms, 0, workspace.decay, workspace.modes)
 
 
-@inlined
+@jit_inline
 def advance(
     solid: Foundation,
     lapse: Lapse,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdr_dask.arrays import BoolArray, FloatArray
-from mdr_dask.physics.compiling import compiled, copy_into, kernel, nested
+from mdr_dask.physics.jit import jit
 from mdr_dask.physics.outcome import Outcome
 from mdr_dask.physics.surfaces.cubic_line import CubicLine
 from mdr_dask.physics.transients.elements.edges import Contact, Drive, Edges, carrying_rate, depth_for, under_elements
@@ -58,7 +58,7 @@ class State(NamedTuple):
     edges: Edges
 
 
-@compiled
+@jit
 def mean_after(solid: Foundation, state: State, load: float, next_load: float, step: float, modes: FloatArray) -> float:
     """Return the mean displacement that the loading history decides, whatever is in contact."""
     n, extra = state.displacement.size, 1 if solid.viscosity > 0 else 0
@@ -89,7 +89,7 @@ def mean_after(solid: Foundation, state: State, load: float, next_load: float, s
     return (next_load + total) / glass
 
 
-@nested
+@jit
 def _instant(
     solid: Foundation, state: State, under: FloatArray, load: float, depth: float
 ) -> tuple[float, float, bool]:
@@ -109,7 +109,7 @@ def _instant(
     return depth, work / n, good
 
 
-@nested
+@jit
 def _forget(solid: Foundation, state: State, old: int, new: int) -> float:
     """Replace elements that have left the line by undeformed ones; return the energy that they will lose."""
     n, dissipated = state.displacement.size, 0.0
@@ -173,7 +173,7 @@ class StepWorkspace(NamedTuple):
     element: ElementWorkspace
 
 
-@kernel
+@jit
 def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     rows = np.empty((11, n))
     return StepWorkspace(
@@ -195,7 +195,7 @@ def _workspace_for(solid: Foundation, n: int) -> StepWorkspace:
     )
 
 
-@nested
+@jit
 def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> None:
     """Write which elements are let go within a step that ends at a depth, and where they end."""
     plain, damping, fall = solid.times.size == 0, solid.viscosity, (depth - step.depth) / step.time
@@ -214,7 +214,7 @@ def _let_go(solid: Foundation, state: State, workspace: StepWorkspace, step: Ste
         workspace.parts[j], workspace.leaves[j] = part, leaves
 
 
-@nested
+@jit
 def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step, depth: float) -> tuple[float, float]:
     """Move all elements through a step; return mean work and loss."""
     n, plain, damping = workspace.under.size, solid.times.size == 0, solid.viscosity
@@ -255,7 +255,7 @@ def _move(solid: Foundation, state: State, workspace: StepWorkspace, step: Step,
     return work / n, dissipated / n
 
 
-@compiled
+@jit
 def _step(
     solid: Foundation,
     state: State,
@@ -289,7 +289,7 @@ def _step(
     return depth, work, dissipated, True
 
 
-@nested
+@jit
 def _state_energy(solid: Foundation, state: State) -> float:
     energy, n = 0.0, state.displacement.size
     if solid.times.size == 0:
@@ -301,7 +301,7 @@ def _state_energy(solid: Foundation, state: State) -> float:
     return energy
 
 
-@compiled
+@jit
 def forces_now(
     solid: Foundation, state: State, workspace: StepWorkspace, depth: float, rate: float, drive: Drive
 ) -> tuple[float, float, float, float]:
@@ -332,7 +332,7 @@ def forces_now(
     return depth + more, rate, drag, length
 
 
-@kernel
+@jit
 def follow_elements(
     solid: Foundation,
     line: CubicLine,
@@ -354,8 +354,8 @@ def follow_elements(
     for now in range(moments.size):
         if now > 0:
             time = moments[now] - moments[now - 1]
-            copy_into(workspace.old_under, workspace.under)
-            copy_into(workspace.old_slope, workspace.slope)
+            workspace.old_under[:] = workspace.under
+            workspace.old_slope[:] = workspace.slope
             old_depth, old_shift = depth, shift
             shift = under_elements(line, travels[now], workspace.under, workspace.slope)
             if not line.periodic and shift != old_shift:
@@ -381,7 +381,7 @@ def follow_elements(
     return Outcome.CONVERGED
 
 
-@kernel
+@jit
 def note_edges(solid: Foundation, line: CubicLine, state: State, depth: float, deborah: float, load: float) -> None:
     """Note where the edges are in a steady state."""
     workspace = _workspace_for(solid, line.height.size - 1)

@@ -1,1 +1,0 @@
-"""Benchmarks of kernels against the roofs of the processor they run on."""

@@ -1,0 +1,77 @@
+"""Compilation of numerical kernels by numba: `jit` for kernels, `jit_inline` for small functions inside them.
+
+Numba recompiles a kernel when its own file changes. After a change of a function that kernels of other files call,
+empty the cache or set NUMBA_CACHE_DIR to a new folder; the tests do so by themselves.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from functools import cache
+from typing import Any, TypeVar, cast
+
+import numba
+
+Kernel = TypeVar("Kernel", bound=Callable[..., object])
+
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
+
+def jit(function: Kernel) -> Kernel:
+    """Compile a function of numbers and arrays, and keep its machine code in numba's cache.
+
+    A cache that cannot be written or read costs compile time only: the function is then compiled in this process.
+    """
+    kernel: Any = numba.njit(**OPTIONS)(function)
+    if hasattr(kernel, "enable_caching"):  # not so where NUMBA_DISABLE_JIT is set
+        try:
+            kernel.enable_caching()
+        except RuntimeError:  # neither the package's folder nor the home folder can be written
+            _warn_once("numba finds no folder for compiled kernels")
+        else:
+            _survive_faults(kernel._cache)
+    return cast(Kernel, kernel)
+
+
+def jit_inline(function: Kernel) -> Kernel:
+    """Compile a function into each kernel that calls it."""
+    return cast(Kernel, numba.njit(forceinline=True, **OPTIONS)(function))
+
+
+def _survive_faults(stored: Any) -> None:
+    """Compile again if a file of the cache is torn, unreadable or cannot be written."""
+    load, save = stored.load_overload, stored.save_overload
+
+    def load_overload(signature: Any, context: Any) -> Any:
+        try:
+            return load(signature, context)
+        except Exception as fault:  # a torn pickle raises almost anything
+            _warn_once(f"numba's cache of compiled kernels cannot be read ({type(fault).__name__})")
+            return None
+
+    def save_overload(signature: Any, compiled: Any) -> None:
+        try:
+            save(signature, compiled)
+        except Exception as fault:
+            _warn_once(f"numba's cache of compiled kernels cannot be written ({type(fault).__name__})")
+
+    stored.load_overload, stored.save_overload = load_overload, save_overload
+
+
+@cache
+def _warn_once(problem: str) -> None:
+    remedy = "set NUMBA_CACHE_DIR to a folder that can be written, otherwise kernels are compiled in every process"
+    warnings.warn(f"{problem}; {remedy}", RuntimeWarning, stacklevel=2)
+
+
+@jit_inline
+def last_until(values: Any, x: float, low: int, high: int) -> int:
+    """Return the index of the last of the ascending values from `low` to before `high` that is x at most, or `low`."""
+    while high - low > 1:
+        middle = (low + high) // 2
+        if values[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
