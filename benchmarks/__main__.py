@@ -1,10 +1,8 @@
 """Every benchmark by subject and kind.
 
-    python -m benchmarks                              what there is
-    python -m benchmarks friction                     all kinds of a subject, one after the other
-    python -m benchmarks friction honesty 500 89      one kind, with its own arguments
-
-Files called ``bench_*.py`` time single kernels: ``pytest benchmarks/wear/bench_wear.py --benchmark-enable``.
+python -m benchmarks                              what there is
+python -m benchmarks friction                     all kinds of a subject, one after the other
+python -m benchmarks friction honesty 500 89      one kind, with its own arguments
 """
 
 import os

@@ -1,6 +1,5 @@
 """What every change has to keep: formatting, types, imports, light start-up, current reference pages."""
 
-import ast
 import json
 import re
 import subprocess
@@ -81,14 +80,3 @@ def test_the_first_two_shell_blocks_of_the_readme_are_one_command_line_each():
     assert all(len(block.strip().splitlines()) == 1 for block in blocks[:2])
     assert "quickstart" in blocks[0]
     assert "pytest" in blocks[1]
-
-
-@pytest.mark.parametrize(
-    "room", sorted((ROOT / "mdr_dask/physics").glob("**/__init__.py")), ids=lambda path: path.parent.name
-)
-def test_a_room_says_what_is_inside(room):
-    inside = {path.stem for path in room.parent.glob("*.py")} | {
-        path.parent.name for path in room.parent.glob("*/__init__.py")
-    }
-    said = re.findall(r"`(\w+)`", ast.get_docstring(ast.parse(room.read_text())))
-    assert inside - {"__init__"} <= set(said)
