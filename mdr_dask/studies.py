@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from mdr_dask import aggregation, campaign, fits, plots, store
+from mdr_dask.bars import reporter
 from mdr_dask.campaign import Campaign
 from mdr_dask.campaign.keys import of_keys
-from mdr_dask.cli.checked import Understood, understood
 from mdr_dask.errors import DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
@@ -29,6 +29,7 @@ from mdr_dask.questions.columns import Columns, numbers, states
 from mdr_dask.questions.labelled import labelled
 from mdr_dask.questions.table import MEANS, Question
 from mdr_dask.questions.table import table as rows_of
+from mdr_dask.summary import Summary, summary
 from mdr_dask.tables import is_table
 
 if TYPE_CHECKING:
@@ -66,12 +67,12 @@ def read(source: Source) -> Campaign:
     return campaign.load(source)
 
 
-def check(source: Source) -> Understood:
+def check(source: Source) -> Summary:
     """Check a campaign, and say what was understood and what it will cost.
 
     Returns
     -------
-    Understood
+    Summary
         Counts, bytes and seconds; printed, or at the end of a cell, it is the lines of ``mdr-dask check``.
 
     Raises
@@ -86,7 +87,7 @@ def check(source: Source) -> Understood:
     >>> costs.cases
     2
     """
-    return understood(read(source))
+    return summary(read(source))
 
 
 def run(
@@ -132,8 +133,6 @@ def run(
     >>> study.central_film.sizes["load_parameter"]
     2
     """
-    from mdr_dask.cli.progress import reporter
-
     found = read(source)
     for question in found.remarks:
         warnings.warn(question, stacklevel=2)

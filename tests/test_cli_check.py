@@ -12,8 +12,8 @@ import pytest
 from mdr_dask.campaign import load
 from mdr_dask.campaign.measured import read_measured
 from mdr_dask.cli import main
-from mdr_dask.cli.understood import LISTED, axis_range, human_bytes, spacing
 from mdr_dask.errors import DataError
+from mdr_dask.summary import LISTED, axis_range, human_bytes, spacing
 
 CAMPAIGN = """\
 name: tyre

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import pytest
 from test_execute import run
 
+from mdr_dask import bars as shown
 from mdr_dask import compile_clock as clocks
 from mdr_dask import execute
-from mdr_dask.cli import progress as shown
-from mdr_dask.cli.progress import at_work, describe, reporter
+from mdr_dask.bars import at_work, describe, reporter
 from mdr_dask.execute import Progress
 from mdr_dask.models.base import Status
 from mdr_dask.task import Outcome

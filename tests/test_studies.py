@@ -14,8 +14,8 @@ import xarray as xr
 from planted import SLIDING, make
 
 import mdr_dask
-from mdr_dask import studies
-from mdr_dask.cli import main, progress
+from mdr_dask import bars, studies
+from mdr_dask.cli import main
 from mdr_dask.errors import CampaignError, DataError, StoreError
 
 SMALL = {
@@ -156,10 +156,10 @@ def test_an_interrupted_cell_goes_on_where_it_stopped(tmp_path, monkeypatch):
     def watching(quiet):
         yield lambda state: kept.append(state.kept)
 
-    monkeypatch.setattr(progress, "reporter", interrupting)
+    monkeypatch.setattr(studies, "reporter", interrupting)
     with pytest.raises(KeyboardInterrupt):
         mdr_dask.run(asked)
-    monkeypatch.setattr(progress, "reporter", watching)
+    monkeypatch.setattr(studies, "reporter", watching)
     resumed = mdr_dask.run(asked)
     assert 0 < kept[0] < resumed.status.size
     assert (resumed.status == 1).all()
@@ -253,7 +253,7 @@ def test_a_notebook_has_a_bar_below_its_cell(monkeypatch):
     room.display = lambda html, display_id: shown.append(html) or SimpleNamespace(update=shown.append)
     monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
     monkeypatch.setitem(sys.modules, "IPython.display", room)
-    with progress._in_notebook() as draw:
+    with bars._in_notebook() as draw:
         draw(studies.execute.__globals__["Progress"](total=10, done=4), 2.0)
     assert "preparing" in shown[0]
     assert 'value="4" max="10"' in shown[1]
@@ -267,8 +267,8 @@ def test_a_run_in_a_notebook_moves_its_bar(monkeypatch):
     room.display = lambda html, display_id: SimpleNamespace(update=shown.append)
     monkeypatch.setitem(sys.modules, "ipykernel", ModuleType("ipykernel"))
     monkeypatch.setitem(sys.modules, "IPython.display", room)
-    monkeypatch.setattr(progress, "LIVE_PAUSE", 0.02)
-    with progress.reporter(quiet=False) as report:
+    monkeypatch.setattr(bars, "LIVE_PAUSE", 0.02)
+    with bars.reporter(quiet=False) as report:
         report(studies.execute.__globals__["Progress"](total=10, done=4))
         end = time.monotonic() + 20
         while not shown and time.monotonic() < end:

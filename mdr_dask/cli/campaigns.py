@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdr_dask.bars import at_work
 from mdr_dask.cli.printing import print_json, printable
-from mdr_dask.cli.progress import at_work
-from mdr_dask.cli.understood import axes_rows, costs_row, study_lines
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
@@ -139,6 +138,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
     from mdr_dask.campaign import load
     from mdr_dask.errors import CampaignError
     from mdr_dask.plan import estimate
+    from mdr_dask.summary import axes_rows, costs_row, require_answers, study_lines
 
     rows, problems = [], []
     for path in campaigns:
@@ -160,14 +160,6 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         print_json({"units": units, "rows": rows})
     if problems:
         raise CampaignError(*problems)
-
-
-def require_answers(campaign: Campaign) -> None:
-    """Refuse realisations until constants are known that no fit finds; fits are imported for such campaigns only."""
-    if campaign.replication.answers:
-        from mdr_dask.fits.answers import require_known
-
-        require_known(campaign)
 
 
 def ask(campaign: Campaign) -> None:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdr_dask.cli.campaigns import CAMPAIGN, ask, require_answers
+from mdr_dask.bars import reporter
+from mdr_dask.cli.campaigns import CAMPAIGN, ask
 from mdr_dask.cli.log import telling
 from mdr_dask.cli.printing import print_json
-from mdr_dask.cli.progress import reporter
-from mdr_dask.cli.understood import costs_row, study_lines
 from mdr_dask.units import seconds
 
 if TYPE_CHECKING:
@@ -53,6 +52,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
     mdr-dask run campaigns/friction_force.yaml --part 3/8
     """
     from mdr_dask.campaign import load
+    from mdr_dask.summary import require_answers
 
     study = load(campaign)
     url = options["url"] or study.store
@@ -76,6 +76,7 @@ def run(campaign: Path, dry_run: bool, log: Path | None, quiet: bool, form: str 
 def _print_plan(study: Campaign, url: str, form: str | None) -> None:
     from mdr_dask import store
     from mdr_dask.plan import estimate
+    from mdr_dask.summary import costs_row, study_lines
 
     kept, to_do = 0, None
     if store.exists(url):

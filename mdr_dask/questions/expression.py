@@ -1,7 +1,8 @@
 """Conditions and formulas as a user types them: ``velocity > 3 km/h and contact_fraction < 50 %``.
 
-A small part of Python's grammar, walked node by node: numbers, quantities, names, words, arithmetic, comparisons,
-``and``, ``or``, ``not``, ``in`` and the functions in `FUNCTIONS`. No text is ever run.
+Read by Python's own parser and evaluated node by node with numpy: numbers, quantities, names, words, arithmetic,
+comparisons, ``and``, ``or``, ``not``, ``in`` and the functions in `FUNCTIONS`. Nothing else is evaluated, and no text
+is ever executed.
 """
 
 from __future__ import annotations
@@ -9,8 +10,9 @@ from __future__ import annotations
 import ast
 import operator
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,19 +27,18 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     "log": np.log,
     "log10": np.log10,
 }
-#: Numbers that agree to this part are equal, as in a selection.
+#: Relative difference up to which numbers count as equal, here and in selections: six digits copied from a screen.
 SAME = 1e-5
 _LONGEST = 500
 _NUMBER = re.compile(r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<![\w.])\d+\.?\d*(?=[^\W\d_])")
 _PIECE = re.compile(r"\s*(\*\*|[*/^]|-?\d+|[^\W\d]\w*|[%°]\w*)")
 _KEYWORDS = {"and", "or", "not", "in", "is", "if", "else"}
-_ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+_OPERATORS: Mapping[type[ast.AST], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-}
-_ORDER: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Pow: np.power,
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
     ast.Gt: operator.gt,
@@ -46,31 +47,30 @@ _ORDER: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
 
 
 class Column(NamedTuple):
-    """Values that a name stands for: numbers with their coherent SI unit, or words and truths with None."""
+    """The values of a name: numbers with their coherent SI unit, or words and truth values with None."""
 
     array: Any
     unit: str | None
 
 
-@dataclass(frozen=True)
-class Value:
-    """Numbers in SI with their dimension, words, or truths.
+class Value(NamedTuple):
+    """Numbers in SI with their dimension (of pint), words, or truth values.
 
-    `dimension` is pint's, None for a bare number, which is SI of anything, and for words and truths.
+    The dimension is None for words, for truth values, and for a bare number, which is in the SI unit of its neighbour.
     """
 
     array: Any
     dimension: Any = None
 
     @property
-    def is_words(self) -> bool:
-        """Whether these are words."""
-        return _kind(self.array) in "OUT"
+    def kind(self) -> str:
+        """Numpy's letter for the type, found without loading a lazy array."""
+        return str((self.array if hasattr(self.array, "dtype") else np.asarray(self.array)).dtype.kind)
 
 
 @dataclass(frozen=True)
 class Expression:
-    """A text that has been read: its tree, and the quantities in it by the names that stand for them there."""
+    """A parsed text: its syntax tree, and its quantities by the names that replace them in the tree."""
 
     text: str
     tree: ast.expr
@@ -78,7 +78,7 @@ class Expression:
 
     @property
     def names(self) -> set[str]:
-        """Names that stand in it, words without quotation marks among them."""
+        """All names in it, including words without quotation marks."""
         found = {_name(node) for node in ast.walk(self.tree) if isinstance(node, ast.Name | ast.Attribute)}
         return found - self.quantities.keys() - FUNCTIONS.keys()
 
@@ -89,7 +89,7 @@ def parse(text: str) -> Expression:
     Raises
     ------
     DataError
-        If it is none.
+        If it is neither.
     """
     wanted = "expected a condition such as 'velocity > 1 mm/s and hurst < 0.7'"
     if len(text) > _LONGEST:
@@ -103,16 +103,16 @@ def parse(text: str) -> Expression:
 
 
 def evaluate(expression: Expression, find: Callable[[str], Column | None], known: Sequence[str] = ()) -> Value:
-    """Return what an expression comes to.
+    """Return the value of an expression.
 
     Parameters
     ----------
     expression : Expression
         As `parse` returns it.
     find : callable, str -> Column or None
-        Gives the values that a name stands for; None if there is no such name.
+        Gives the values of a name; None if there is no such name.
     known : sequence of str
-        Names for a hint, where one is unknown.
+        All names, for the hint in the message about an unknown one.
 
     Raises
     ------
@@ -120,25 +120,27 @@ def evaluate(expression: Expression, find: Callable[[str], Column | None], known
         If a name is unknown, or numbers of different dimensions are added or compared.
     """
     with np.errstate(all="ignore"):
-        return _Walk(expression, find, known).value(expression.tree)
+        return _Evaluation(expression, find, known).value(expression.tree)
 
 
 def _without_units(text: str) -> tuple[str, dict[str, Value]]:
-    """Put a name in place of every number with a unit, which is no Python."""
+    """Replace every number with a unit, which Python cannot parse, by a name."""
     quantities: dict[str, Value] = {}
     parts, end = [], 0
     for match in _NUMBER.finditer(text):
         unit = "" if match.start() < end else _unit_at(text, match.end())
         if unit.strip():
+            dimension, coherent = dimension_of(unit.strip())
+            factor, zero = conversion(unit.strip(), coherent)
             name = f"_quantity_{len(quantities)}"
-            quantities[name] = _quantity(float(match[0]), unit.strip())
+            quantities[name] = Value(float(match[0]) * factor + zero, dimension)
             parts += [text[end : match.start()], f" {name} "]
             end = match.end() + len(unit)
     return "".join([*parts, text[end:]]), quantities
 
 
 def _unit_at(text: str, start: int) -> str:
-    """Return the longest unit that begins there."""
+    """Return the longest unit that begins at a position."""
     longest, end = start, start
     while piece := _PIECE.match(text, end):
         if piece[1] in _KEYWORDS or (end == start and not re.match(r"[^\W\d]|[%°]", piece[1])):
@@ -156,177 +158,134 @@ def _likely_mistake(text: str) -> str:
     return "; == compares" if re.search(r"[^<>=!]=[^=]", text) else ""
 
 
-def _quantity(number: float, unit: str) -> Value:
-    dimension, coherent = dimension_of(unit)
-    factor, zero = conversion(unit, coherent)
-    return Value(number * factor + zero, dimension)
-
-
 def _name(node: ast.expr) -> str:
-    """Return a name; dots of nested parameters become ``_``."""
+    """Return the name in a node; dots of nested parameters become ``_``."""
     if isinstance(node, ast.Attribute):
         return f"{_name(node.value)}_{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
 
 
-class _Walk:
-    """One evaluation of an expression."""
+class _Evaluation:
+    """Evaluates the nodes of one expression."""
 
     def __init__(self, expression: Expression, find: Callable[[str], Column | None], known: Sequence[str]) -> None:
-        self._expression, self._find, self._known = expression, find, known
+        self.text, self.quantities, self.find, self.known = expression.text, expression.quantities, find, known
 
     def value(self, node: ast.expr) -> Value:
-        """Return what a node comes to."""
         match node:
-            case ast.Constant(value=bool()) | ast.Constant(value=None):
-                raise self._refused(node)
-            case ast.Constant(value=int() | float() | str() as constant):
-                return Value(constant if isinstance(constant, str) else float(constant))
+            case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+                return Value(float(number))
+            case ast.Constant(value=str() as word):
+                return Value(word)
             case ast.Name() | ast.Attribute():
-                return self._named(node)
-            case ast.UnaryOp(op=ast.Not()):
-                return Value(np.logical_not(self._truth(node.operand)))
-            case ast.UnaryOp(op=ast.USub()):
-                value = self._number(node.operand)
+                return self._named(_name(node))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return Value(np.logical_not(self._truth(operand)))
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                value = self._number(operand)
                 return Value(-value.array, value.dimension)
-            case ast.BoolOp():
-                join = operator.and_ if isinstance(node.op, ast.And) else operator.or_
-                truths = [self._truth(each) for each in node.values]
-                return Value(_joined(truths, join))
-            case ast.Compare():
-                return Value(_joined(list(self._comparisons(node)), operator.and_))
-            case ast.BinOp():
-                return self._arithmetic(node)
+            case ast.BoolOp(op=op, values=values):
+                join = operator.and_ if isinstance(op, ast.And) else operator.or_
+                return Value(reduce(join, map(self._truth, values)))
+            case ast.Compare(left=left, ops=ops, comparators=rights):
+                pairs = zip([left, *rights], ops, rights, strict=False)
+                return Value(reduce(operator.and_, (self._compared(node, *pair) for pair in pairs)))
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return self._combined(node, self._number(left), op, self._number(right))
             case ast.Call(func=ast.Name(id=name), args=[argument], keywords=[]) if name in FUNCTIONS:
-                return self._function(name, argument)
+                return self._function(name, self._number(argument))
         raise self._refused(node)
 
     def _refused(self, node: ast.AST) -> DataError:
-        shown = ast.unparse(node)
-        for name in self._expression.quantities:
-            shown = shown.replace(name, "a quantity")
+        got = ast.unparse(node)
+        for name in self.quantities:
+            got = got.replace(name, "a quantity")
         allowed = f"+ - * / **, comparisons, and, or, not, in, and {', '.join(FUNCTIONS)}"
-        return DataError(f"{self._expression.text!r}: expected {allowed}, got {shown!r}")
+        return DataError(f"{self.text!r}: expected {allowed}, got {got!r}")
 
-    def _named(self, node: ast.expr) -> Value:
-        name = _name(node)
-        if name in self._expression.quantities:
-            return self._expression.quantities[name]
-        found = self._find(name)
+    def _named(self, name: str) -> Value:
+        if name in self.quantities:
+            return self.quantities[name]
+        found = self.find(name)
         if found is None:
-            raise DataError(f"{self._expression.text!r}: no column {name!r}{did_you_mean(name, self._known)}")
+            raise DataError(f"{self.text!r}: no column {name!r}{did_you_mean(name, self.known)}")
         try:
             return Value(found.array, None if found.unit is None else dimension_of(found.unit)[0])
-        except ValueError:  # a unit of a user's own model, of which pint knows nothing
+        except ValueError:  # a unit of a user's own model that pint does not have
             return Value(found.array)
 
     def _truth(self, node: ast.expr) -> Any:
-        value = self.value(node).array
-        if _kind(value) != "b":
-            raise DataError(f"{self._expression.text!r}: expected a comparison such as 'hurst < 0.7'")
-        return value
+        value = self.value(node)
+        if value.kind != "b":
+            raise DataError(f"{self.text!r}: expected a comparison such as 'hurst < 0.7'")
+        return value.array
 
     def _number(self, node: ast.expr) -> Value:
         value = self.value(node)
-        if _kind(value.array) not in "fiu":
-            raise DataError(f"{self._expression.text!r}: expected numbers, got {ast.unparse(node)!r}")
+        if value.kind not in "fiu":
+            raise DataError(f"{self.text!r}: expected numbers, got {ast.unparse(node)!r}")
         return value
 
-    def _comparisons(self, node: ast.Compare) -> Iterator[Any]:
-        left = node.left
-        for comparison, right in zip(node.ops, node.comparators, strict=True):
-            if isinstance(comparison, ast.In | ast.NotIn):
-                if not isinstance(right, ast.Tuple | ast.List | ast.Set):
-                    raise self._refused(node)
-                found = _joined([self._equal(left, each) for each in right.elts], operator.or_)
-                yield found if isinstance(comparison, ast.In) else np.logical_not(found)
-            elif isinstance(comparison, ast.Eq | ast.NotEq):
-                found = self._equal(left, right)
-                yield found if isinstance(comparison, ast.Eq) else np.logical_not(found)
-            elif type(comparison) in _ORDER:
-                first, second = self._alike(self._number(left), self._number(right))
-                yield _ORDER[type(comparison)](first, second)
-            else:
-                raise self._refused(node)
-            left = right
+    def _compared(self, node: ast.AST, left: ast.expr, op: ast.cmpop, right: ast.expr) -> Any:
+        if isinstance(op, ast.In | ast.NotIn) and isinstance(right, ast.Tuple | ast.List | ast.Set):
+            found = reduce(operator.or_, (self._equal(left, each) for each in right.elts))
+            return found if isinstance(op, ast.In) else np.logical_not(found)
+        if isinstance(op, ast.Eq | ast.NotEq):
+            found = self._equal(left, right)
+            return found if isinstance(op, ast.Eq) else np.logical_not(found)
+        if type(op) not in _OPERATORS:
+            raise self._refused(node)
+        first, second = self._number(left), self._number(right)
+        self._require_alike(first, second)
+        return _OPERATORS[type(op)](first.array, second.array)
 
     def _equal(self, left: ast.expr, right: ast.expr) -> Any:
-        first, second = self._sides(left, right)
-        if first.is_words != second.is_words:
-            raise DataError(f"{self._expression.text!r}: expected words beside words, and numbers beside numbers")
-        if first.is_words:
-            return first.array == second.array
-        one, other = self._alike(first, second)
-        return np.abs(one - other) <= SAME * np.abs(other)
-
-    def _sides(self, left: ast.expr, right: ast.expr) -> tuple[Value, Value]:
-        """Return what is compared; beside words, a name without a meaning is a word itself."""
+        """Compare numbers up to rounding, or words; next to words, a name without a meaning is a word itself."""
         sides = [None if self._is_unknown(node) else self.value(node) for node in (left, right)]
-        if not any(side is not None and side.is_words for side in sides):
-            return self._number(left), self._number(right)
-        first, second = (
-            Value(_name(node)) if side is None else side for node, side in zip((left, right), sides, strict=True)
-        )
-        return first, second
+        if any(side is not None and side.kind in "OUT" for side in sides):
+            names = (_name(left), _name(right))
+            first, second = (side or Value(name) for side, name in zip(sides, names, strict=True))
+            if not (first.kind in "OUT" and second.kind in "OUT"):
+                raise DataError(f"{self.text!r}: expected words beside words, and numbers beside numbers")
+            return first.array == second.array
+        first, second = self._number(left), self._number(right)
+        self._require_alike(first, second)
+        return np.abs(first.array - second.array) <= SAME * np.abs(second.array)
 
     def _is_unknown(self, node: ast.expr) -> bool:
         name = _name(node)
-        return bool(name) and name not in self._expression.quantities and self._find(name) is None
+        return bool(name) and name not in self.quantities and self.find(name) is None
 
-    def _alike(self, first: Value, second: Value) -> tuple[Any, Any]:
-        """Return numbers that may be added and compared."""
-        if first.dimension is not None and second.dimension is not None and first.dimension != second.dimension:
-            raise DataError(
-                f"{self._expression.text!r}: expected quantities of one dimension, "
-                f"got {_shown(first.dimension)} and {_shown(second.dimension)}"
-            )
-        return first.array, second.array
+    def _require_alike(self, first: Value, second: Value) -> None:
+        if None not in (first.dimension, second.dimension) and first.dimension != second.dimension:
+            got = f"{_shown(first.dimension)} and {_shown(second.dimension)}"
+            raise DataError(f"{self.text!r}: expected quantities of one dimension, got {got}")
 
-    def _arithmetic(self, node: ast.BinOp) -> Value:
-        left, right = self._number(node.left), self._number(node.right)
-        if isinstance(node.op, ast.Pow):
-            return self._power(node, left, right)
-        if type(node.op) not in _ARITHMETIC:
-            raise self._refused(node)
-        result = _ARITHMETIC[type(node.op)](left.array, right.array)
-        if isinstance(node.op, ast.Add | ast.Sub):
-            self._alike(left, right)
-            return Value(result, left.dimension if left.dimension is not None else right.dimension)
-        if left.dimension is None or right.dimension is None:
-            sign = -1 if right.dimension is not None and isinstance(node.op, ast.Div) else 1
-            known = left.dimension if left.dimension is not None else right.dimension
-            return Value(result, known if known is None else known**sign)
-        times = isinstance(node.op, ast.Mult)
-        return Value(result, left.dimension * right.dimension if times else left.dimension / right.dimension)
+    def _combined(self, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
+        result = _OPERATORS[type(op)](left.array, right.array)
+        first, second = left.dimension, right.dimension
+        if isinstance(op, ast.Pow):
+            if not first:
+                return Value(result, first)
+            if np.ndim(right.array):
+                raise self._refused(node)
+            return Value(result, first ** float(right.array))
+        if isinstance(op, ast.Add | ast.Sub):
+            self._require_alike(left, right)
+            return Value(result, second if first is None else first)
+        if None in (first, second):
+            known = second if first is None else first
+            inverse = first is None and known is not None and isinstance(op, ast.Div)
+            return Value(result, known**-1 if inverse else known)
+        return Value(result, first * second if isinstance(op, ast.Mult) else first / second)
 
-    def _power(self, node: ast.BinOp, base: Value, exponent: Value) -> Value:
-        result = np.power(base.array, exponent.array)
-        if not base.dimension:
-            return Value(result, base.dimension)
-        if np.ndim(exponent.array):
-            raise self._refused(node)
-        return Value(result, base.dimension ** float(exponent.array))
-
-    def _function(self, name: str, argument: ast.expr) -> Value:
-        value = self._number(argument)
+    def _function(self, name: str, value: Value) -> Value:
         result = FUNCTIONS[name](value.array)
         if name == "abs" or not value.dimension:
             return Value(result, value.dimension)
         if name == "sqrt":
             return Value(result, value.dimension**0.5)
-        raise DataError(f"{self._expression.text!r}: expected a pure number in {name}, got {_shown(value.dimension)}")
-
-
-def _kind(array: Any) -> str:
-    """Return the kind of a type as numpy abbreviates it, without loading an array to know it."""
-    return str((array if hasattr(array, "dtype") else np.asarray(array)).dtype.kind)
-
-
-def _joined(values: Sequence[Any], join: Callable[[Any, Any], Any]) -> Any:
-    result = values[0]
-    for value in values[1:]:
-        result = join(result, value)
-    return result
+        raise DataError(f"{self.text!r}: expected a pure number in {name}, got {_shown(value.dimension)}")
 
 
 def _shown(dimension: Any) -> str:

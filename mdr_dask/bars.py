@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import click
-
 from mdr_dask.units import seconds
 
 if TYPE_CHECKING:
@@ -43,7 +41,7 @@ def at_work(what: str) -> Iterator[None]:
     """Tell a terminal now and then that something takes long, and why."""
 
     def draw(_: Progress | None, elapsed: float) -> None:
-        click.echo(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]), err=True)
+        _write(", ".join([what, seconds(round(elapsed)), *(["compiling ..."] if _compiles() else [])]))
 
     if not sys.stderr.isatty():
         yield
@@ -110,7 +108,12 @@ def _html(progress: Progress | None, elapsed: float) -> str:
 
 
 def _print_line(progress: Progress | None, elapsed: float) -> None:
-    click.echo(describe(progress, elapsed), err=True)
+    _write(describe(progress, elapsed))
+
+
+def _write(line: str) -> None:
+    sys.stderr.write(line + "\n")
+    sys.stderr.flush()
 
 
 def describe(progress: Progress | None, elapsed: float) -> str:

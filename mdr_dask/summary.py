@@ -1,27 +1,66 @@
-"""What a campaign was understood to be: axes, tables, sizes and times, for a reader or as JSON."""
+"""What a campaign will compute and what it will cost, as text and as JSON: the answer of ``mdr-dask check``."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
+from mdr_dask import models
+from mdr_dask.campaign import Axis, Campaign, Refinement
+from mdr_dask.campaign.written import written_units
+from mdr_dask.plan import Estimate, estimate
 from mdr_dask.units import seconds, shown
 
-if TYPE_CHECKING:
-    from mdr_dask.campaign import Axis, Campaign, Refinement
-    from mdr_dask.plan import Estimate
-
-#: Longest list of values that is shown in full.
+#: Longest list of values that is printed in full.
 LISTED = 6
-#: Seconds that a run takes to start and to end, whatever is in it.
+#: Seconds that a run takes to start and to end.
 START = 2.0
 
 
-def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
-    """Yield what a campaign was understood to be: the axes of each series, what its data hold, what it costs."""
-    from mdr_dask import models
-    from mdr_dask.campaign.written import written_units
+@dataclass(frozen=True, repr=False)
+class Summary(Estimate):
+    """What a campaign will compute and cost; printed, it is the output of ``mdr-dask check``.
 
+    Attributes
+    ----------
+    lines : tuple of str
+        The axes of each series, notes about its data, its costs.
+    questions : tuple of str
+        Questions about bare numbers far from the usual values.
+    """
+
+    lines: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return "\n".join((*self.lines, *self.questions))
+
+
+def summary(campaign: Campaign) -> Summary:
+    """Summarise a campaign without running it.
+
+    Raises
+    ------
+    CampaignError
+        If it is too large, or a tolerance names a constant that no fit gives.
+    """
+    require_answers(campaign)
+    costs = estimate(campaign)
+    lines = (f"{campaign.name}: {campaign.model}", *study_lines(campaign, costs))
+    return Summary(**vars(costs), lines=lines, questions=campaign.remarks)
+
+
+def require_answers(campaign: Campaign) -> None:
+    """Raise CampaignError if the realisations continue until a constant is known that no fit gives."""
+    if campaign.replication.answers:
+        from mdr_dask.fits.answers import require_known
+
+        require_known(campaign)
+
+
+def study_lines(campaign: Campaign, costs: Estimate) -> Iterator[str]:
+    """Yield the lines about a study: the axes of each series, notes about its data, its costs."""
     written = written_units(campaign.text)
     for series in campaign.series:
         units = models.load(campaign.model).units(series.parameters)
@@ -52,7 +91,6 @@ def axis_range(axis: Axis, unit: str, written: str = "") -> str:
 
 
 def _adaptive(refinement: Refinement, first: int) -> str:
-    """Say how a study chooses the values of an axis."""
     wanted = []
     for name, tolerance in refinement.until.items():
         parts = [f"{100 * tolerance.relative:.3g} % of its largest value"] * bool(tolerance.relative)
@@ -63,7 +101,7 @@ def _adaptive(refinement: Refinement, first: int) -> str:
 
 
 def spacing(values: tuple[float, ...]) -> str:
-    """Return how values are spaced, if all alike."""
+    """Return ``, linear`` or ``, geometric`` for values at equal distances or ratios."""
     import numpy as np
 
     numbers = np.asarray(values, dtype=np.float64)
@@ -76,7 +114,7 @@ def spacing(values: tuple[float, ...]) -> str:
 
 
 def cost_lines(costs: Estimate) -> Iterator[str]:
-    """Yield counts, size and time of a study, from the first round to the last one that there may be."""
+    """Yield counts, size and time of a study, from the first round to the largest number of rounds."""
     more = costs.rounds
     cases, results = _counted("case", costs.cases, costs.growth), _counted("result", costs.results, more)
     yield f"{cases} x {_counted('realisation', costs.realisations, costs.at_most / costs.realisations)} = {results}"
@@ -92,7 +130,7 @@ def cost_lines(costs: Estimate) -> Iterator[str]:
 
 
 def human_bytes(size: float) -> str:
-    """Return a number of bytes as a person says it."""
+    """Return a number of bytes with two or three digits and a unit: ``1.5 MB``."""
     for unit in ("B", "kB", "MB", "GB", "TB"):
         if size < 999.5 or unit == "TB":
             break
@@ -101,7 +139,7 @@ def human_bytes(size: float) -> str:
 
 
 def costs_row(costs: Estimate) -> dict[str, Any]:
-    """Return counts, bytes and seconds of a study under stable keys: of the first round, and of all there may be."""
+    """Return counts, bytes and seconds of a study under stable keys: of the first round, and of all rounds."""
     first = {name: getattr(costs, name) for name in ("results", "solves", "blocks", "bytes", "files")}
     return {
         "cases": costs.cases,
@@ -135,6 +173,6 @@ def axes_rows(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _counted(what: str, first: int, more: float) -> str:
-    """Return a count of the first round, and what it comes to at most, with its noun."""
+    """Return the count of the first round, and the count of all rounds if there may be more, with its noun."""
     last = round(first * more)
     return f"{first if more == 1 else f'{first} to {last}'} {what}{'s' if last != 1 else ''}"
