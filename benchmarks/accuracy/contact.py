@@ -19,7 +19,6 @@ from mdr_dask.physics.mdr import transforms
 from mdr_dask.physics.mdr.revolution import PowerProfile
 from mdr_dask.physics.mdr.uniform_grid import uniform_grid
 from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced_rule import fast_forced
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.rules import fast, limit
 from mdr_dask.physics.wear.worn import virgin_load
@@ -60,8 +59,9 @@ class Worn(NamedTuple):
             yield "blocks of load", f"{cells} cells", partial(_last, profile, block, cells)
         if border == 0:
             return
-        fast_rule, limit_rule = (fast_forced, limit_under_force) if self.held else (fast, limit)
-        yield "fast rule, ξ = 0.8", "", partial(fast_rule, profile, border, amount, 0.8)
+        if not self.held:
+            yield "fast rule, ξ = 0.8", "", partial(fast, profile, border, amount, 0.8)
+        limit_rule = limit_under_force if self.held else limit
         yield "limit rule", "", partial(limit_rule, profile, border)
         for cells in () if amount > FEW else (40,) if short else (50, 100, 200):
             simulated = partial(literal, profile, border, amount, cells=cells, constant_force=self.held)

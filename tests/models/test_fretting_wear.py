@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -143,20 +141,25 @@ def test_gross_slip_is_a_message_and_nothing_else_fails():
 
 
 def test_constant_force():
-    """Every rule keeps the force; depth and border grow; the limit comes last."""
+    """The force stays, depth and border grow, and the limit comes last; the fast rule is refused."""
     names = ("contact_force", "block_depth", "stick_border", "wear_volume", "worn_profile", "worn_image", "pressure")
     found = {}
-    for rule in ("fast", "exact", "limit"):
+    for rule in ("exact", "limit"):
         parameters = FrettingWear(stick_radius=0.5, cycles=0.3, wear_rule=rule, hold="force", cells=60, points=21)
         result = run(parameters, outputs=names)
         assert result.status[0, 0] == Status.DONE
         assert result.values["contact_force"][0, 0] == pytest.approx(4 / 3, rel=1e-3)
         assert np.all(np.isfinite(result.values["worn_profile"]))
         found[rule] = {name: float(np.ravel(result.values[name][0, 0])[0]) for name in names}
-    for name, tolerance in (("block_depth", 2e-3), ("stick_border", 5e-3)):
-        assert found["fast"][name] == pytest.approx(found["exact"][name], abs=tolerance)
+    for name in ("block_depth", "stick_border"):
         assert found["limit"][name] > found["exact"][name]
     assert found["limit"]["wear_volume"] > 10 * found["exact"]["wear_volume"]
+    with pytest.raises(ValidationError, match="wear_rule fast is for constant depth only"):
+        FrettingWear(stick_radius=0.5, cycles=0.3, wear_rule="fast", hold="force")
+    columns = {"wear_rule": np.array(["fast", "exact"]), "hold": np.array(["force", "force"])}
+    mixed = run(FrettingWear(stick_radius=0.5, cycles=0.3), columns)
+    assert mixed.status[:, 0].tolist() == [Status.FAILED, Status.DONE]
+    assert "constant depth only" in mixed.messages[0, 0]
 
 
 def test_history_of_amplitudes():
@@ -291,16 +294,6 @@ def test_distinct_and_seconds_are_cheap_estimates():
     assert 0 < MODEL.seconds(block) < 0.1
 
 
-def test_the_time_of_worn_volumes_is_not_that_of_all_outputs():
-    """They begin at a coarser accuracy, which the estimate left out: 1e-4 was told as 2.5 times what it took."""
-
-    def seconds(outputs):
-        block = Block(FrettingWear(stick_radius=0.5), {"stick_radius": np.array([0.3, 0.55, 0.8])}, 3, (0,), 1, outputs)
-        return MODEL.seconds(replace(block, accuracy=1e-4))
-
-    assert seconds(("wear_volume",)) < 0.75 * seconds(("wear_volume", "contact_radius"))
-
-
 @pytest.mark.parametrize("hold", ["depth", "force"])
 @pytest.mark.parametrize("c", [0.9999, 1 - 1e-6, 1 - 1e-9])
 def test_next_to_full_stick_little_is_worn_and_nothing_fails(hold, c):
@@ -340,18 +333,12 @@ def test_a_relative_accuracy_is_met_or_the_output_that_misses_it_is_named():
     ("hold", "accuracy", "finer"),
     [("depth", 1e-2, 1e-3), ("depth", 1e-3, 3e-5), ("depth", 1e-4, 1e-5), ("force", 2e-4, 3e-5)],
 )
-def test_an_accuracy_is_met_by_the_first_solution_and_its_two_rougher_ones(monkeypatch, hold, accuracy, finer):
-    """It took six marches at constant depth and nine under constant force: volumes stated ten times their error."""
-    marches = []
-    monkeypatch.setattr(
-        "mdr_dask.physics.wear.exact._first_of", lambda solve, ways: marches.append(1) or solve(ways[0])
-    )
+def test_volumes_meet_their_accuracy_and_their_stated_errors_hold(hold, accuracy, finer):
     parameters, columns = FrettingWear(stick_radius=0.8, hold=hold), {"cycles": np.array([0.5, 2.0, 8.0])}
     names = ("wear_volume", "wear_volume_error")
     result = MODEL.compute(Block(parameters, columns, 3, (0,), 1, names, accuracy))
     truth = exact(PowerProfile(2.0), 0.8, columns["cycles"], finer, constant_force=hold == "force", errors=False)
     volumes, errors = (result.values[name][:, 0] for name in names)
-    assert len(marches) == 3 + 1  # one of the truth
     assert np.all(errors <= accuracy * volumes)
     assert np.all(np.abs(volumes - [worn.wear_volume for worn in truth]) <= errors)
 
@@ -371,7 +358,7 @@ LISTED = {"indenter", "amplitude", "cycles"}
     ],
 )
 def test_an_axis_over_any_number_gives_what_single_cases_give(indenter, path, values):
-    given = FrettingWear(**STEEL | {"indenter": indenter, "amplitude": 2e-7, "wear_rule": "fast", "hold": "force"})
+    given = FrettingWear(**STEEL | {"indenter": indenter, "amplitude": 2e-7, "wear_rule": "fast"})
     together = run(given, {path: np.array(values)})
     assert np.all(together.status == Status.DONE)
     assert np.ptp(together.values["wear_volume"]) > 1e-3 * np.max(together.values["wear_volume"])

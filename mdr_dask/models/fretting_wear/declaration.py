@@ -100,6 +100,8 @@ class LoadStep(Parameters):
     load_factor: float = quantity("1", "depth or force over its first value", gt=0, default=1.0)
 
 
+#: The fast rule under constant force.
+FAST_AT_DEPTH = "wear_rule fast is for constant depth only: write wear_rule: exact for hold: force"
 _OSCILLATION = ("effective_shear_modulus", "friction", "amplitude")
 
 
@@ -226,6 +228,12 @@ class FrettingWear(Parameters):
         for other, name in self.inactive.items():
             if getattr(self, other) != type(self).model_fields[other].default:
                 raise ValueError(f"{name} takes the place of {other}: leave out one or the other")
+        return self
+
+    @model_validator(mode="after")
+    def _fast_rule(self) -> FrettingWear:
+        if self.wear_rule == "fast" and self.hold == "force":
+            raise ValueError(FAST_AT_DEPTH)
         return self
 
     def notes(self) -> tuple[str, ...]:

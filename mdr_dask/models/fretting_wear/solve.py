@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.fretting_wear.declaration import MODEL, FrettingWear, Indenter, Pressed, axis
+from mdr_dask.models.fretting_wear.declaration import FAST_AT_DEPTH, MODEL, FrettingWear, Indenter, Pressed, axis
 from mdr_dask.models.fretting_wear.reduction import (
     Numbers,
     has_tables,
@@ -26,7 +26,6 @@ from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import rules
 from mdr_dask.physics.wear.exact import exact, limit_under_force
 from mdr_dask.physics.wear.forced import SETTINGS as FORCED
-from mdr_dask.physics.wear.forced_rule import fast_forced
 from mdr_dask.physics.wear.history import LoadBlock, history
 from mdr_dask.physics.wear.worn import Worn
 
@@ -39,10 +38,6 @@ _RENAMED = {"contact_force": "normal_force"}
 _USUAL, _FINEST, _FINER, _ENOUGH = 1e-3, 1e-5, 0.5, 0.7
 #: The accuracy that cases begin at over that of the campaign: to begin again costs more than to begin finer.
 _BEGIN = {"depth": 0.2, "force": 0.6}
-#: The same over 1 - c where only volumes are wanted: `python -m benchmarks accuracy measure campaigns_of_wear`.
-_VOLUME = 0.9
-#: 1 - c where time is estimated.
-_TYPICAL_ANNULUS = 0.5
 
 #: Positions of cases in a block.
 Places = list[tuple[int, int]]
@@ -96,10 +91,9 @@ def seconds(block: Block[FrettingWear]) -> float:
         return 0.01 + 1e-5 * size
     if parameters.history:
         return 0.01 + 1.2e-7 * parameters.cells**3 * size
-    thickness = _TYPICAL_ANNULUS if _only_volumes(parameters.wear_rule, parameters.hold, _judged(block)) else None
-    accuracy = _first_accuracy(parameters.accuracy, block.accuracy, _beginning(parameters.hold, thickness))
+    accuracy = _first_accuracy(parameters.accuracy, block.accuracy, _BEGIN[parameters.hold])
     followed, forced = _followed(parameters.hold, accuracy), parameters.hold == "force"
-    rules_take = {"limit": followed if forced else 1e-3, "fast": 0.03 if forced else 1e-3, "exact": followed}
+    rules_take = {"limit": followed if forced else 1e-3, "fast": 1e-3, "exact": followed}
     each = rules_take[parameters.wear_rule]
     numbers, _ = reduce_block(block)
     moments = _count(numbers.exponent, numbers.level, numbers.cycles, numbers.xi)
@@ -324,24 +318,12 @@ def _first_accuracy(given: float | None, asked: float | None, share: float) -> f
     return max(min(needed, np.inf if given is None else given), _FINEST)
 
 
-def _only_volumes(rule: str, hold: str, outputs: Sequence[str]) -> bool:
-    """Tell whether nothing is judged but volumes worn at constant depth: thin annuli wear faster."""
-    return list(outputs) == ["wear_volume"] and (rule, hold) == ("exact", "depth")
-
-
-def _beginning(hold: str, thickness: float | None) -> float:
-    """Return the accuracy that a case begins at over that asked, by the annulus's thickness if only volumes count."""
-    return _BEGIN[hold] if thickness is None else min(_VOLUME * thickness, 1.0)
-
-
 def _contacts(task: Task, wanted: Sequence[tuple[float, float]], demand: _Demand) -> list[tuple[Sequence[Worn], str]]:
     """Solve a task for all its (N, xi), each more finely until it meets the accuracy asked; say which still miss it.
 
     How finely depends on the case alone; those that want the same are solved together.
     """
-    volumes = _only_volumes(task.rule, task.hold, demand.outputs)
-    share = _beginning(task.hold, 1.0 - task.profile.inside(task.level) if volumes else None)
-    first = _first_accuracy(task.accuracy, demand.accuracy, share)
+    first = _first_accuracy(task.accuracy, demand.accuracy, _BEGIN[task.hold])
     left = dict.fromkeys(range(len(wanted)), first)
     found: dict[int, tuple[Sequence[Worn], str]] = {}
     while left:
@@ -375,9 +357,10 @@ def _solved(
         if force:
             end = partial(limit_under_force, profile, stick, accuracy, errors=errors)
         contacts = [end()] * len(wanted)
+    elif force:
+        raise ValueError(FAST_AT_DEPTH)
     else:
-        rule = fast_forced if force else rules.fast
-        contacts = [rule(profile, stick, cycles, xi) for cycles, xi in wanted]
+        contacts = [rules.fast(profile, stick, cycles, xi) for cycles, xi in wanted]
     return [(contact,) for contact in contacts]
 
 

@@ -15,7 +15,6 @@ from mdr_dask.physics.mdr.transforms import gauss
 from mdr_dask.physics.wear import evolution
 from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced_rule import fast_forced
 from mdr_dask.physics.wear.forced_slip import BEYOND, forced_slip
 
 PARABOLA = PowerProfile(2.0)
@@ -193,32 +192,6 @@ def test_the_literal_simulation_tends_to_the_exact_evolution():
     assert simulated.normal_force == pytest.approx(4.0 / 3.0, rel=1e-3)
 
 
-def test_fast_rule_keeps_the_force_and_its_error_is_as_documented(worn):
-    """The rule itself: docs/wear.md."""
-    abscissa, weight = gauss(64)
-    for contact, followed in zip((fast_forced(PARABOLA, 0.455, n) for n in (0.0, 0.5, 2.0, 8.0)), worn, strict=False):
-        pieces = [
-            0.0,
-            0.455,
-            contact.stick_border,
-            *(contact.stick_border + (1 - contact.stick_border) * 0.3**k for k in (6, 4, 2, 1, 0)),
-        ]
-        load = sum(
-            (high - low) * weight @ (contact.depth - contact.image(low + (high - low) * abscissa))
-            for low, high in pairwise(pieces)
-        )
-        assert 2.0 * load == pytest.approx(4.0 / 3.0, rel=1e-3)
-        assert contact.depth == pytest.approx(followed.depth, abs=0.01)
-        assert contact.wear_volume == pytest.approx(followed.wear_volume, rel=0.06, abs=1e-9)
-
-
-def test_fast_rule_reaches_a_plateau_like_the_limit():
-    early, late = fast_forced(PARABOLA, 0.455, 200.0), fast_forced(PARABOLA, 0.455, 400.0)
-    assert early.wear_volume == pytest.approx(late.wear_volume, rel=1e-4)
-    force = 2.0 * (late.depth * late.stick_border - 0.455**3 / 3)
-    assert force > 4.0 / 3.0  # less what the annulus has frozen
-
-
 def test_table_of_a_parabola(worn):
     r = np.linspace(0, 3, 301)
     table = exact_forced(from_table(r, r**2 / 2, 1.0), 0.455, [2.0], accuracy=1e-3)[0]
@@ -303,21 +276,3 @@ def count_steps(monkeypatch):
 
     monkeypatch.setattr(evolution, "_try_step", counted)
     return tried
-
-
-@pytest.mark.parametrize(
-    ("exponent", "stick_radius", "cycles"),
-    [(6.0, 0.1, 30.0), (2.0, 0.1, 30.0), (1.0, 0.1, 30.0), (6.0, 0.5, 30.0), (6.0, 0.1, 0.3), (2.0, 0.455, 2.0)],
-)
-def test_the_volume_of_the_fast_rule_is_that_of_its_image_to_its_error(exponent, stick_radius, cycles):
-    """V = 4 int_c^a (g - g0) sqrt(a^2 - x^2) dx, on pieces that crowd at the borders."""
-    profile = PowerProfile(exponent)
-    contact = fast_forced(profile, stick_radius, cycles)
-    border, edge, crowd = contact.stick_border, contact.contact_radius, 0.5 ** np.arange(40)
-    ends = [(stick_radius, border), (border, stick_radius), (border, edge), (edge, border)]
-    cuts = np.unique(np.concatenate([begin + (end - begin) * crowd for begin, end in ends]))
-    abscissa, weight = gauss(40)
-    x = cuts[:-1, None] + np.diff(cuts)[:, None] * abscissa
-    worn_away = 4 * (contact.image(x.ravel()) - profile.image(x.ravel())) * np.sqrt((edge - x) * (edge + x)).ravel()
-    volume = worn_away @ (np.diff(cuts)[:, None] * weight).ravel()
-    assert contact.wear_volume == pytest.approx(volume, rel=contact.relative_error)

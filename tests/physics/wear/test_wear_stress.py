@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from mdr_dask.physics.mdr.revolution import PowerProfile, from_table
 from mdr_dask.physics.wear import rules as wear
 from mdr_dask.physics.wear.exact import exact, limit_under_force
-from mdr_dask.physics.wear.forced_rule import fast_forced
 
 EXPONENTS = st.floats(0.3, 20.0)
 #: Stick radii, to a millionth beside 0 and 1.
@@ -115,16 +114,3 @@ def test_constant_force(exponent, c):
         assert worn.wear_volume <= limit.wear_volume * 1.003
         r = np.linspace(0.0, 1.2 * limit.contact_radius, 60)
         assert np.all(worn.height(r) >= profile.height(r) - 1e-3 * eta)
-
-
-@settings(max_examples=10, deadline=None)
-@given(st.floats(0.3, 20.0), st.floats(0.01, 0.999), CYCLES, st.floats(0.3, 1.5))
-@example(20.0, 0.1, 1e4, 0.8)
-@example(0.3, 0.01, 1e4, 0.8)
-def test_fast_rule_under_constant_force(exponent, c, cycles, xi):
-    """Finite and ordered everywhere: the border moves outwards, the depth grows, the body loses material."""
-    worn = fast_forced(PowerProfile(exponent), c, cycles, xi)
-    assert np.isfinite(worn.wear_volume)
-    assert worn.wear_volume >= -1e-12
-    assert worn.depth >= 1.0
-    assert c <= worn.stick_border <= 1.0 <= worn.contact_radius
