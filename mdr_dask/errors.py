@@ -33,6 +33,10 @@ class ClusterError(MdrDaskError):
     """A Dask cluster that does not answer, goes away, or runs another version of the program."""
 
 
+class MachineError(MdrDaskError):
+    """A fault of the machine, such as a full disk: no case has failed, and the run can be repeated elsewhere."""
+
+
 class DataError(MdrDaskError):
     """A table, profile or selection that does not hold what was asked of it."""
 

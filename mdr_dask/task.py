@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import pickle
 import platform
 import time
 from collections.abc import Mapping
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from mdr_dask import models, store
 from mdr_dask.campaign import Replication
 from mdr_dask.compile_clock import compile_clock
-from mdr_dask.errors import ClusterError
+from mdr_dask.errors import ClusterError, MachineError, MdrDaskError
 from mdr_dask.models.base import Block, Model, Result, Status
 from mdr_dask.replication import growth_needed, known_scatter, next_round
 from mdr_dask.store import Place
@@ -144,7 +145,7 @@ def run_block(work: Work) -> Outcome:
     compiled = clock.seconds if clock else 0.0
     started = time.perf_counter()
     if work.wanted.all():
-        result = _compute(model, work.block)
+        result = _compute(model, work.block, models.is_own(work.model))
         shape = work.wanted.shape
         values = {name: array.reshape(shape + array.shape[2:]) for name, array in result.values.items()}
         status = result.status.reshape(shape)
@@ -152,7 +153,9 @@ def run_block(work: Work) -> Outcome:
         kept = not (work.wanted | work.spared).all()
         values, status = store.read_block(work.place, work.block.outputs) if kept else _nothing(model, work)
         status[work.spared] = Status.NOT_NEEDED
-        result = _compute_part(model, work.block, work.wanted.reshape(work.block.cases, -1), values, status)
+        result = _compute_part(
+            model, models.is_own(work.model), work.block, work.wanted.reshape(work.block.cases, -1), values, status
+        )
     asked, settled = work, False
     if work.rounds:
         work, values, status, result, settled = _go_on(model, work, values, status, result)
@@ -200,28 +203,74 @@ def _warned(record: Mapping[str, Any]) -> int:
     return sum(message["status"] == Status.DONE.name.lower() for message in record["messages"])
 
 
-def _compute(model: Model[Any], block: Block[Any]) -> Result:
-    """Call the model; should it raise in spite of its promise, find the case to blame by taking each alone."""
+#: Faults of the machine rather than of a case: the files of the compiler's cache, a full disk, a missing library.
+MACHINE_FAULTS = (OSError, EOFError, ImportError, pickle.UnpicklingError)
+#: Longest message that is kept of a case.
+LONGEST_MESSAGE = 1000
+
+
+def _compute(model: Model[Any], block: Block[Any], is_own: bool) -> Result:
+    """Call the model. If it raises for the block, compute every result by itself: only those that raise have failed.
+
+    `is_own` says that the model is the user's own. Then any exception is a failed case, and results are checked.
+    """
+    is_single = block.cases == len(block.realisations) == 1
     try:
-        return model.compute(block)
-    except Exception as error:
-        if block.cases == len(block.realisations) == 1:
+        result = model.compute(block)
+        return _checked(model, block, result) if is_own else result
+    except (Exception, SystemExit) as error:
+        is_fault = isinstance(error, MACHINE_FAULTS) or (is_single and isinstance(error, MemoryError))
+        if is_fault and not is_own and not isinstance(error, MdrDaskError):
+            raise MachineError(
+                f"{platform.node()} cannot compute {model.name}: {type(error).__name__}: {error}"
+            ) from None
+        if is_single:
             return _failed(model, block, f"{type(error).__name__}: {error}")
-        parts = [
-            _compute(model, block.part(case, number)) for case in range(block.cases) for number in block.realisations
-        ]
-        return _join(block, parts)
+    parts = [
+        _compute(model, block.part(case, number), is_own)
+        for case in range(block.cases)
+        for number in block.realisations
+    ]
+    return _join(block, parts)
+
+
+def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
+    """Return the result of a user's own model if it has the declared shapes; a value that is not finite has failed."""
+    if not isinstance(result, Result):
+        raise TypeError(f"expected a Result, got {type(result).__name__}")
+    shape = block.cases, len(block.realisations)
+    values, status, messages = {}, np.array(result.status, dtype=np.int8), dict(result.messages)
+    if status.shape != shape:
+        raise ValueError(f"status: expected shape {shape}, got {status.shape}")
+    for name, unknown in _unknown(model, block, shape).items():
+        if name not in result.values:
+            raise ValueError(f"the output {name} is missing")
+        values[name] = np.array(result.values[name], dtype=np.float64)
+        if values[name].shape != unknown.shape:
+            expected, got = unknown.shape[2:], values[name].shape[2:]
+            what = f"shape {expected}" if expected else "a number"
+            raise ValueError(f"{name}: expected {what} for each case, got shape {got or values[name].shape}")
+    for output in model.outputs:
+        if output.name in values and not output.allow_nan:
+            finite = np.isfinite(values[output.name]).reshape(*shape, -1).all(axis=-1)
+            for at in map(tuple, np.argwhere(~finite & (status == Status.DONE)).tolist()):
+                what = values[output.name][at]
+                messages[at] = f"{output.name} is {what}" if what.ndim == 0 else f"{output.name} holds NaN or infinity"
+                status[at] = Status.FAILED
+    for array in values.values():
+        array[status == Status.FAILED] = np.nan
+    return replace(result, values=values, status=status, messages=messages)
 
 
 def _unknown(model: Model[Any], block: Block[Any], shape: tuple[int, ...]) -> dict[str, NDArray[np.float64]]:
-    """Return the outputs of cases of which nothing is known."""
+    """Return the outputs of cases without results: NaN in the declared shapes."""
     extra = model.coordinates(block.parameters)
     sizes = {name: tuple(extra[dim].values.size for dim in model.output(name).dims) for name in block.outputs}
     return {name: np.full((*shape, *size), np.nan) for name, size in sizes.items()}
 
 
 def _nothing(model: Model[Any], work: Work) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int8]]:
-    """Return what stands in a block of which nothing is kept, without reading it."""
+    """Return a block without results."""
     shape = work.wanted.shape
     return _unknown(model, work.block, shape), np.full(shape, Status.MISSING, dtype=np.int8)
 
@@ -249,6 +298,7 @@ def _join(block: Block[Any], parts: list[Result]) -> Result:
 
 def _compute_part(
     model: Model[Any],
+    is_own: bool,
     block: Block[Any],
     wanted: NDArray[np.bool_],
     values: dict[str, NDArray[np.float64]],
@@ -265,7 +315,7 @@ def _compute_part(
         cases=cases.size,
         realisations=tuple(block.realisations[number] for number in numbers),
     )
-    result = _compute(model, part)
+    result = _compute(model, part, is_own)
     inside = np.ix_(cases, numbers)
     chosen = wanted[inside]
     flat_status[inside] = np.where(chosen, result.status, flat_status[inside])
@@ -302,7 +352,9 @@ def _go_on(
         status = _longer(status, status.ndim - 1, further, Status.NOT_NEEDED)
         wanted = np.zeros(status.shape, dtype=bool)
         wanted[..., count:] = needed[..., None]
-        more = _compute_part(model, work.block, wanted.reshape(work.block.cases, -1), values, status)
+        more = _compute_part(
+            model, models.is_own(work.model), work.block, wanted.reshape(work.block.cases, -1), values, status
+        )
         messages = {**result.messages, **more.messages}
         result = replace(result, messages=messages, solves=result.solves + more.solves)
 
@@ -321,7 +373,7 @@ def _record(work: Work, result: Result, status: NDArray[np.int8], seconds: float
             "case": _describe(work.block, case),
             "realisation": work.block.realisations[number],
             "status": Status(states[case, number]).name.lower(),
-            "message": text,
+            "message": text[:LONGEST_MESSAGE],
         }
         for (case, number), text in result.messages.items()
     ]

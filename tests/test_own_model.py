@@ -134,3 +134,42 @@ def test_where_every_case_fails_outputs_with_dimensions_of_their_own_are_written
     assert xr.open_zarr("results/pin.zarr").trace.shape == (5, 2, 20, 3)
     assert main(["status", "results/pin.zarr", "--failures"]) == 0
     assert "200 x failed: ValueError: no pin" in capsys.readouterr().out
+
+
+MISBEHAVIOUR = {
+    "NaN": ('volume = float("nan")', "wear_volume is nan"),
+    "infinity": ('volume = float("inf")', "wear_volume is inf"),
+    "None": ('return {"wear_volume": None, "wear_volume_error": 0.0}', "wear_volume is None"),
+    "masked": ("import numpy; volume = numpy.ma.masked", "wear_volume is masked"),
+    "a vector": ("import numpy; volume = numpy.zeros(3)", "wear_volume: expected a number for each case"),
+    "text": ('return {"wear_volume": "large", "wear_volume_error": 0.0}', "could not convert string to float"),
+    "no output": ("return {}", "the output wear_volume is missing"),
+    "exit": ("import sys; sys.exit(0)", "SystemExit: 0"),
+    "a long message": ('raise ValueError("x" * 10**6)', "ValueError: xxx"),
+}
+
+
+@pytest.mark.parametrize("kind", MISBEHAVIOUR)
+def test_a_case_without_a_proper_result_has_failed_and_the_others_go_on(example, capsys, kind):
+    line, reason = MISBEHAVIOUR[kind]
+    place = "    volume = coefficient * case.normal_force * case.sliding_distance / case.hardness\n"
+    bad = f"{place}    if case.normal_force > 50:\n        {line}\n"
+    (example / "wear_rate.py").write_text(MODULE.replace(place, bad))
+    assert main(["run", "pin.yaml", "--quiet"]) == 1
+    assert "160 done, 40 failed" in capsys.readouterr().out
+    assert main(["status", "results/pin.zarr", "--failures"]) == 0
+    told = capsys.readouterr().out
+    assert "40 x failed" in told
+    assert reason in told
+    assert len(told) < 5000
+    (example / "wear_rate.py").write_text(MODULE)
+    sys.modules.pop("wear_rate")
+    assert main(["run", "pin.yaml", "--quiet", "--retry-failed"]) == 0
+    assert "160 kept, 40 done, 0 failed" in capsys.readouterr().out
+
+
+def test_an_output_may_declare_that_nan_is_normal(example, capsys):
+    declared = MODULE.replace("has_error=True", "has_error=True, allow_nan=True")
+    (example / "wear_rate.py").write_text(declared.replace("return {", 'volume = float("nan")\n    return {'))
+    assert main(["run", "pin.yaml", "--quiet"]) == 0
+    assert "200 done, 0 failed" in capsys.readouterr().out

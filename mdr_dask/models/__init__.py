@@ -55,6 +55,11 @@ def load(name: str) -> Model[Any]:
     raise ModelError(f"unknown model {name!r}")
 
 
+def is_own(name: str) -> bool:
+    """Return whether a model is the user's own, not one of this package."""
+    return name not in NAMES
+
+
 @lru_cache(maxsize=1)
 def _offered() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}

@@ -213,6 +213,8 @@ class Output:
     floor : float
         Size, in `unit`, below which errors are relative to `floor` instead of the value: for outputs that are
         normally zero. An accuracy a allows the error ``a * max(abs(value), floor)``.
+    allow_nan : bool
+        Whether NaN and infinity are normal values. Otherwise a case of a user's own model with such a value has failed.
     """
 
     name: str
@@ -224,6 +226,7 @@ class Output:
     comment: str = ""
     scatter: str = ""
     floor: float = 0.0
+    allow_nan: bool = False
 
     @property
     def error(self) -> Output:
