@@ -1,9 +1,8 @@
-"""Which values an axis needs that a study refines itself: whole rounds, until interpolation meets every tolerance.
+"""Which values an adaptive axis needs: in whole stages, until interpolation meets every tolerance.
 
-Interpolation is by monotone cubics on the natural scale of the axis. Its error in a space between two values is seen in
-two ways: by how much it differs from a cubic spline, and by how much it misses the values at the ends of the space when
-it is made without them. Where that is more than the tolerance, the space is halved. All values lie on one lattice, each
-halfway between two others, so that the cases beside each other need the same ones.
+Interpolation is by monotone cubics on the natural scale of the axis. The values form one lattice, each halfway between
+two earlier ones, so that neighbouring cases need the same values. An interval is good enough when the value that was
+added last at one of its ends was predicted, from earlier values alone, within the tolerance. Otherwise it is halved.
 """
 
 from __future__ import annotations
@@ -11,30 +10,30 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import BoolArray, FloatArray
+from mdr_dask.arrays import BoolArray, FloatArray, IntArray
 from mdr_dask.campaign import Campaign, Refinement, Series, Tolerance
 
-#: Groups of realisations that are left out one after the other, to know the scatter of what is interpolated.
+#: Number of groups of realisations that are left out one after the other, to estimate the scatter of a mean.
 GROUPS = 20
-#: Probability that scatter alone is chased in a space, if it hides all else.
+#: Probability that an interval is halved because of scatter alone.
 CHASED = 0.05
-#: Places within each space between two values where interpolations are compared.
-INSIDE = np.array([0.25, 0.5, 0.75])
-#: Order at which a value that is left out is missed less in a smaller space; benchmarks in docs/adaptive.md.
-ORDER = 2.5
-#: Spaces wait for those of the same case, as wide or wider, that are so many times as bad.
-WORSE = 3.0
-#: Least part of an interval that a space is halved to: what jumps or bends there stays as it is.
+#: Smallest part of the axis: jumps are not resolved beyond it.
 FINEST = 2.0**-10
-#: Fewest values that are interpolated.
+#: Fewest values for an interpolation.
 FEWEST = 3
-#: Spaces beside the top on each side that are no wider than the narrowest of them, or than this part of the interval.
-BESIDE, NARROW = 2, 2.0**-4
+#: Level of the first values whose prediction tests an interval: eighths of the axis. Quarters are predicted from three
+#: values, which agree with a curve of another shape by chance.
+TESTED = 3
+#: Where predictions are compared in an interval, from its later end on.
+COMPARED = (0.0, 0.25, 0.5, 0.75)
+#: For `departure`: places within an interval where interpolations are compared, and the order at which they converge.
+INSIDE, ORDER = np.array([0.25, 0.5, 0.75]), 2.5
 
 
 @dataclass(frozen=True)
@@ -164,8 +163,8 @@ def _beyond(cases: BoolArray, before: BoolArray) -> BoolArray:
 
 
 @dataclass(frozen=True)
-class _Space:
-    """A space between two values that misses its tolerance, of one of the cases of the other axes."""
+class _Interval:
+    """An interval between two values that misses its tolerance, in one of the cases of the other axes."""
 
     case: tuple[int, ...]
     share: float
@@ -174,7 +173,7 @@ class _Space:
 
 
 def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]]:
-    """Add values where interpolation is worst.
+    """Add values in the intervals whose interpolation is not known to be good enough.
 
     Parameters
     ----------
@@ -186,98 +185,68 @@ def refined(mesh: Mesh, means: Mapping[str, Mean]) -> tuple[Mesh, dict[str, int]
     Returns
     -------
     Mesh
-        With more values; the same where none is wanted, or allowed.
+        With more values; the same if none is wanted, or allowed.
     dict of str to int
         For each adaptive axis, the number of cases of the other axes that miss a tolerance and cannot be refined.
     """
     found, short = mesh, {}
     for number in mesh.used:
         axis = mesh.series.axes[number]
-        spaces = list(_spaces(mesh, number, means))
-        wide = [space for space in spaces if space.width > FINEST and _is_new(mesh, number, space)]
+        intervals = list(_intervals(mesh, number, means))
+        wide = [interval for interval in intervals if interval.width > FINEST]
         chosen = _chosen(mesh.shares[number], wide, mesh.refinement(number).at_most)
-        found = _halved(found, number, [space for space in wide if space.share in chosen])
-        left = {space.case for space in spaces} - {space.case for space in wide if space.share in chosen}
+        found = _halved(found, number, [interval for interval in wide if interval.share in chosen])
+        left = {interval.case for interval in intervals} - {i.case for i in wide if i.share in chosen}
         short[axis.name] = len(left)
     return found, short
 
 
-def _is_new(mesh: Mesh, number: int, space: _Space) -> bool:
-    """Say whether there is a value within a space: not between two whole numbers that follow each other."""
-    spread = mesh.refinement(number).spread
-    if not spread.whole:
-        return True
-    used = mesh.used[number][space.case]
-    values = mesh.series.axes[number].values
-    return spread.at(np.array([space.share]))[0] not in {values[k] for k in np.flatnonzero(used)}
-
-
-def _chosen(shares: FloatArray, spaces: list[_Space], at_most: int) -> set[float]:
-    """Return the places that an axis may have: new ones in the widest spaces first: no jump starves the rest."""
+def _chosen(shares: FloatArray, intervals: list[_Interval], at_most: int) -> set[float]:
+    """Return the places that an axis may have: the widest intervals first, so that one jump does not use up all."""
     known = set(shares.tolist())
-    ordered = sorted(spaces, key=lambda space: (-space.width, -space.excess, space.share))
-    new = dict.fromkeys(space.share for space in ordered if space.share not in known)
-    room = max(at_most - len(known), 0)
-    return known | set(list(new)[:room])
+    ordered = sorted(intervals, key=lambda interval: (-interval.width, -interval.excess, interval.share))
+    new = dict.fromkeys(interval.share for interval in ordered if interval.share not in known)
+    return known | set(list(new)[: max(at_most - len(known), 0)])
 
 
-def _halved(mesh: Mesh, number: int, spaces: list[_Space]) -> Mesh:
-    """Return a mesh with a value in the middle of some spaces."""
+def _halved(mesh: Mesh, number: int, intervals: list[_Interval]) -> Mesh:
+    """Return a mesh with a value in the middle of some intervals."""
     axis, shares, used = mesh.series.axes[number], mesh.shares[number], mesh.used[number]
-    new = sorted({space.share for space in spaces} - set(shares.tolist()))
+    new = sorted({interval.share for interval in intervals} - set(shares.tolist()))
     shares = np.array([*shares, *new])
     used = np.concatenate([used, np.zeros((*used.shape[:-1], len(new)), dtype=bool)], axis=-1)
     position = {share: k for k, share in enumerate(shares.tolist())}
-    for space in spaces:
-        used[(*space.case, position[space.share])] = True
+    for interval in intervals:
+        used[(*interval.case, position[interval.share])] = True
     values = (*axis.values, *mesh.refinement(number).spread.at(np.array(new)))
     axes = tuple(replace(axis, values=values) if k == number else one for k, one in enumerate(mesh.series.axes))
     return Mesh(replace(mesh.series, axes=axes), {**mesh.shares, number: shares}, {**mesh.used, number: used})
 
 
-def _spaces(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Space]:
-    """Yield the spaces of an adaptive axis that miss a tolerance."""
+def _intervals(mesh: Mesh, number: int, means: Mapping[str, Mean]) -> Iterator[_Interval]:
+    """Yield the intervals of an adaptive axis that are not known to meet every tolerance."""
     refinement = mesh.refinement(number)
     for case in np.ndindex(mesh.used[number].shape[:-1]):
         used = {k: np.flatnonzero(mask[case]) for k, mask in mesh.used.items()}
         order = used[number][np.argsort(mesh.shares[number][used[number]])]
         used[number] = order
         left = iter(case)
-        place = np.ix_(*(used[k] if k in used else [next(left)] for k in range(len(mesh.series.axes))))
+        cases = np.ix_(*(used[k] if k in used else [next(left)] for k in range(len(mesh.series.axes))))
         shares = mesh.shares[number][order]
-        excess = np.zeros(shares.size - 1)
+        levels = np.array([Fraction(share).denominator.bit_length() - 1 for share in shares.tolist()])
+        places = refinement.spread.shares(refinement.spread.at(shares)) if refinement.spread.whole else shares
+        excess = np.full(shares.size - 1, -np.inf)
         for name, tolerance in refinement.until.items():
-            lines = means[name].at(place)
-            missed = _missed(_places(refinement, shares), _lines(lines, number), tolerance)
-            excess = np.maximum(excess, missed)
-        if excess.max(initial=0.0) <= 1.0:
-            tops = (_beside_tops(shares, _lines(means[name].at(place), number)) for name in refinement.until)
-            excess = 2.0 * np.logical_or.reduce(list(tops))
-        width = np.diff(shares)
-        for k in np.flatnonzero(excess > 1.0):
-            if not np.any((width >= width[k]) & (width > FINEST) & (excess > WORSE * excess[k])):
-                yield _Space(case, float(shares[k] + shares[k + 1]) / 2, float(width[k]), float(excess[k]))
-
-
-def _beside_tops(shares: FloatArray, lines: Mean) -> BoolArray:
-    """Return which spaces are halved for the sake of where the largest value lies, once interpolation is good enough.
-
-    It is known as well as the widest space beside it allows. A top at an end of the axis lies beyond it.
-    """
-    width = np.diff(shares)
-    wide = np.zeros(width.size, dtype=bool)
-    for line in np.nan_to_num(lines.groups[0], nan=-np.inf):
-        top = int(np.argmax(line))
-        if 0 < top < line.size - 1:
-            near = np.arange(max(top - BESIDE, 0), min(top + BESIDE, width.size))
-            wide[near] |= width[near] > max(width[near].min(), NARROW)
-    return wide
-
-
-def _places(refinement: Refinement, shares: FloatArray) -> FloatArray:
-    """Return where values lie on the scale on which they are interpolated: whole numbers beside their shares."""
-    spread = refinement.spread
-    return spread.shares(spread.at(shares)) if spread.whole else shares
+            lines = _lines(means[name].at(cases), number)
+            excess = np.maximum(excess, _excess(places, levels, lines, tolerance))
+        middles = (shares[:-1] + shares[1:]) / 2
+        ends = refinement.spread.at(shares)
+        for k, middle in enumerate(middles.tolist()):
+            if refinement.spread.whole and refinement.spread.at(np.array([middle]))[0] in (ends[k], ends[k + 1]):
+                continue  # no whole number lies between
+            is_untested = max(levels[k], levels[k + 1]) < TESTED and not np.isneginf(excess[k])
+            if is_untested or excess[k] > 1.0:
+                yield _Interval(case, middle, float(shares[k + 1] - shares[k]), float(max(excess[k], 1.0)))
 
 
 def _lines(mean: Mean, number: int) -> Mean:
@@ -288,25 +257,69 @@ def _lines(mean: Mean, number: int) -> Mean:
     return Mean(groups.reshape(len(groups), rows, -1), error.reshape(rows, -1))
 
 
-def _missed(places: FloatArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
-    """Return the error of interpolation in each space over the tolerance, scatter and grid taken out: the worst line.
+def _excess(places: FloatArray, levels: IntArray, lines: Mean, tolerance: Tolerance) -> FloatArray:
+    """Return the error of interpolation in each interval over the tolerance: that of the worst line.
 
-    Values that are not known are left out of their line, and the spaces beside them are known to miss nothing.
+    Cases that failed are left out of their line. Beside them, and where no line has a value, it is minus infinity.
     """
-    worst = np.zeros(places.size - 1)
+    worst = np.full(places.size - 1, -np.inf)
     known = np.isfinite(lines.groups[0])
     for pattern in np.unique(known, axis=0):
-        if pattern.sum() < FEWEST:
+        rows, columns = np.flatnonzero((known == pattern).all(axis=1)), np.flatnonzero(pattern)
+        if columns.size < 2:
             continue
-        rows = np.flatnonzero((known == pattern).all(axis=1))
-        columns = np.flatnonzero(pattern)
+        groups, error = lines.groups[:, rows][..., columns], lines.error[rows][:, columns]
+        missed = interpolation_error(places[columns], levels[columns], groups, error)
+        allowed = np.maximum(tolerance.absolute, tolerance.relative * np.abs(groups[0]).max(axis=-1, keepdims=True))
+        ratio = np.divide(missed, allowed, out=np.zeros_like(missed), where=allowed > 0).max(axis=0)
         whole = np.flatnonzero(np.diff(columns) == 1)
-        found = departure(places[columns], lines.groups[:, rows][..., columns], lines.error[rows][:, columns])
-        size = np.abs(lines.groups[0, rows][:, columns]).max(axis=-1, keepdims=True)
-        allowed = np.maximum(tolerance.absolute, tolerance.relative * size)
-        ratio = np.divide(found, allowed, out=np.zeros_like(found), where=allowed > 0).max(axis=0)
         worst[columns[whole]] = np.maximum(worst[columns[whole]], ratio[whole])
     return worst
+
+
+def interpolation_error(places: FloatArray, levels: IntArray, groups: FloatArray, error: FloatArray) -> FloatArray:
+    """Return by how much each interval was mispredicted before the later of its two ends was there.
+
+    A value of level n lies halfway between two values of lower levels. The interval beside it is predicted from all
+    values of lower levels, by a monotone cubic and by a cubic spline. Predictions are compared with the monotone cubic
+    through all values at the later end, and at the quarters of the interval because one value may agree by chance.
+
+    Parameters
+    ----------
+    places : array, shape (values,)
+        Ascending.
+    levels : int array, shape (values,)
+        The ends of the axis have level 0, its middle 1, the quarters 2, ...
+    groups : array, shape (1 + groups, lines, values)
+        As `Mean` has them.
+    error : array, shape (lines, values)
+        Discretisation errors.
+
+    Returns
+    -------
+    array, shape (lines, values - 1)
+        The largest difference, less what the scatter of the realisations and the error of the grid explain.
+    """
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+    from scipy.special import ndtri
+
+    last = np.arange(places.size - 1) + (np.diff(levels) > 0)
+    ends = places[last], places[:-1] + places[1:] - places[last]
+    at = np.stack([(1 - t) * ends[0] + t * ends[1] for t in COMPARED])
+    now = PchipInterpolator(places, groups, axis=-1)(at)
+    missed = np.zeros((2, *now.shape))
+    for level in range(1, int(levels.max()) + 1):
+        here, before = levels[last] == level, levels < level
+        if here.any() and before.sum() >= FEWEST:
+            for kind, interpolate in enumerate((PchipInterpolator, CubicSpline)):
+                predicted = interpolate(places[before], groups[..., before], axis=-1)(at[:, here])
+                missed[kind][..., here] = predicted - now[..., here]
+    count = max(len(groups) - 1, 1)
+    around = missed[:, 1:] - missed[:, :1]
+    scatter = np.sqrt((count - 1) / count * (around**2).sum(axis=1))  # jackknife; none for one realisation
+    widely = ndtri(1 - CHASED / (2 * groups.shape[1]))
+    largest = (np.abs(missed[:, 0]) - widely * scatter).max(axis=(0, 2))
+    return np.asarray(largest - error[:, last])
 
 
 def departure(places: FloatArray, groups: FloatArray, error: FloatArray) -> FloatArray:

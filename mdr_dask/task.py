@@ -253,8 +253,8 @@ def _checked(model: Model[Any], block: Block[Any], result: Result) -> Result:
     for output in model.outputs:
         if output.name in values and not output.allow_nan:
             finite = np.isfinite(values[output.name]).reshape(*shape, -1).all(axis=-1)
-            for at in map(tuple, np.argwhere(~finite & (status == Status.DONE)).tolist()):
-                what = values[output.name][at]
+            for case, number in np.argwhere(~finite & (status == Status.DONE)).tolist():
+                at, what = (case, number), values[output.name][case, number]
                 messages[at] = f"{output.name} is {what}" if what.ndim == 0 else f"{output.name} holds NaN or infinity"
                 status[at] = Status.FAILED
     for array in values.values():

@@ -11,13 +11,14 @@ import numpy as np
 from mdr_dask import models
 from mdr_dask.models.base import Block, Model, Output, Parameters, Result, Status, quantity
 
-Shape = Literal["smooth", "kink", "jump", "flat", "gap", "bump"]
+Shape = Literal["smooth", "kink", "jump", "flat", "gap", "bump", "knee"]
 FUNCTIONS = {
     "smooth": lambda x, shift: np.tanh(np.log10(x) - shift),
     "kink": lambda x, shift: np.abs(np.log10(x) - shift),
     "jump": lambda x, shift: np.where(np.log10(x) < shift, 1.0, 2.0),
     "flat": lambda x, shift: np.ones_like(x),
     "gap": lambda x, shift: np.tanh(np.log10(x) - shift),
+    "knee": lambda x, shift: 1 / np.sqrt(1 + 10 ** (2 * (shift - np.log10(x)))),
     "bump": lambda x, shift: np.exp(-0.5 * ((np.log10(x) - shift) / 0.8) ** 2),
 }
 
