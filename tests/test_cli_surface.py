@@ -33,7 +33,7 @@ def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
     assert main(["surface", *MAPS, "--json", "-o", "c2d.csv", "--plot", "road.png"]) == 0
     out, err = capsys.readouterr()
     told = json.loads(out)
-    assert told["units"]["rms_height"] == "m"
+    assert told["units"]["Sq"] == "m"
     for row in told["rows"]:
         assert row["rms_gradient"] == pytest.approx(SPECTRUM.rms_gradient(), rel=0.1)
         assert row["rms_gradient"] == pytest.approx(np.hypot(row["slope_x"], row["slope_y"]), rel=1e-9)
@@ -65,7 +65,7 @@ def test_maps_to_numbers_figure_and_spectrum(folder, capsys):
     gradients = [row["rms_gradient"] for row in told["rows"]]
     assert spectrum.rms_gradient() == pytest.approx(np.sqrt(np.mean(np.square(gradients))), rel=0.01)
     assert main(["surface", "c2d.csv", "--csv"]) == 0
-    assert capsys.readouterr().out.startswith("file,rms_height [m]")
+    assert capsys.readouterr().out.startswith("file,Sq [m]")
 
 
 def test_a_scan_is_told_by_its_two_columns(folder, capsys):
@@ -79,7 +79,7 @@ def test_a_scan_is_told_by_its_two_columns(folder, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["road0.npy"], "road0.npy: does not say its spacing: give `spacing`, such as 1 um"),
+        (["road0.npy"], "road0.npy: does not say its spacing: give --spacing, such as 1 um"),
         (["road0.npy", "--spacing", "2 s"], "expected a length"),
         ([*MAPS, "--shortest-wavelength", "1um"], "expected shortest_wavelength of at least"),
         ([*MAPS, "--plot", "road.gif"], "expected a file that ends in"),

@@ -1,7 +1,8 @@
-"""The command surface: maps, scans and tables of a measured surface to statistics, a figure and a spectrum."""
+"""The command surface: height parameters, spectrum and figure of measured maps, scans and tables."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,22 +21,25 @@ KINDS = ("map", "scan", "spectrum")
 
 @click.command()
 @click.argument("files", nargs=-1, required=True, type=click.Path(exists=True, dir_okay=False))
-@click.option("--as", "kind", type=click.Choice(KINDS), help="What the files are; else told by their content.")
-@click.option("--spacing", help="Distance of points of a map in text or npy, such as 2um.")
-@click.option("--spacing-y", help="Distance of its lines, where it is another.")
-@click.option("--unit", help="Unit of the heights, where a file does not say.")
+@click.option("--as", "kind", type=click.Choice(KINDS), help="What the files are.  [from their content]")
+@click.option("--spacing", help="Distance between points of a map in text or npy, such as 2um.")
+@click.option("--spacing-y", help="Distance between rows, if different from --spacing.")
+@click.option("--unit", help="Unit of the heights, if the file does not say.")
+@click.option("--x-unit", help="Unit of positions in the file, if the file does not say.")
 @click.option("--detrend", help="none, mean, plane (of a map), line (of a scan) or parabola.")
 @click.option("--window", type=click.Choice(("hann", "none")), help="none only of a periodic surface.  [hann]")
-@click.option("--outliers", type=click.Choice(("keep", "fill")), help="Points that stick out of a map.  [keep]")
-@click.option("--direction", type=click.Choice(("x", "y")), help="Direction of sliding over an anisotropic map.")
-@click.option("--longest-wavelength", help="Leave out longer waves.")
-@click.option("--shortest-wavelength", help="Leave out shorter waves; else those that are noise.")
-@click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D into FILE.csv, for a campaign.")
+@click.option(
+    "--outliers", type=click.Choice(("keep", "fill")), help="Keep or replace points far from their neighbours.  [keep]"
+)
+@click.option("--direction", type=click.Choice(("x", "y")), help="Sliding direction over an anisotropic map.")
+@click.option("--longest-wavelength", help="Leave out longer wavelengths.")
+@click.option("--shortest-wavelength", help="Leave out shorter wavelengths.  [those that are noise]")
+@click.option("--spectrum", "-o", type=click.Path(path_type=Path), help="Write C2D to FILE.csv, for a campaign.")
 @click.option(
     "--plot",
     "figure",
     type=click.Path(path_type=Path),
-    help="Draw the spectra into FILE.png, .pdf or .svg, their table beside it.",
+    help="Draw the spectra to FILE.png, .pdf or .svg, with their table beside it.",
 )
 @json_option
 @csv_option
@@ -47,10 +51,11 @@ def surface(
     form: str | None,
     **options: Any,
 ) -> None:
-    """Tell rms height, slopes, spectrum, Hurst exponent and resolution of a measured surface.
+    """Print height parameters, slopes, Hurst exponent and resolution of a measured surface.
 
-    FILES are maps, scans, or tables of a spectrum, of one surface. Intervals are 95 %. Rolloff and cutoff are the
-    wavelengths at which the power law ends, empty if it does not within the data.
+    FILES are maps, scans, or tables of a spectrum, all of one surface. Sq and Sa (maps) and Pq (scans) are those of the
+    levelled heights; gradient, slopes and Hurst exponent come from the windowed spectrum. Intervals are 95 %. Rolloff
+    and cutoff are the wavelengths at which the power law ends, empty if it does not end within the data.
 
     \b
     mdr-dask surface road.npy --spacing 2um --unit um --plot road.png -o c2d.csv
@@ -60,11 +65,15 @@ def surface(
     require_suffix(figure, FIGURES)
     if figure is not None and spectrum is not None and figure.with_suffix(".csv") == spectrum:
         raise click.UsageError(f"{spectrum} is the table of the figure {figure}: give the spectrum another name")
+    from mdr_dask.errors import DataError
     from mdr_dask.models.parts.surface import spectra_of
     from mdr_dask.models.parts.surface_report import UNITS, reports
 
     read = _read(files, kind, options)
-    told = reports(read)
+    found = reports(read)
+    anisotropic = read.without_spectrum()
+    if anisotropic and spectrum is not None:
+        raise DataError(_as_options("\n".join(anisotropic)))
     if spectrum is not None:
         with writing(spectrum):
             _write(read, spectrum)
@@ -74,16 +83,16 @@ def surface(
 
         sources = ", ".join(Path(file.name).name for file in read.measured.files)
         origin = {"mdr_dask": f"{__version__}, surface", "files": sources, "method": _method(read)}
-        save(draw_surface(told, spectra_of(read)), figure, origin)
-    rows, units = [report.row for report in told], dict(UNITS)
+        save(draw_surface(found, spectra_of(read)), figure, origin)
+    rows, units = [report.row for report in found], dict(UNITS)
     if form is None:
         known = [name for name in units if any(row[name] == row[name] for row in rows)]
         rows, units = with_intervals(
             [{name: row[name] for name in known} for row in rows], {n: units[n] for n in known}
         )
     print_rows(rows, units, form or "table")
-    for note in read.notes():
-        click.echo(note, err=True)
+    for note in (*(read.notes() if not anisotropic else ()), *anisotropic):
+        click.echo(_as_options(note), err=True)
     click.echo(_method(read), err=True)
 
 
@@ -101,29 +110,36 @@ def _read(files: tuple[str, ...], kind: str | None, options: dict[str, Any]) -> 
     try:
         return Surface.model_validate(
             {kind: {"files": list(files), **given}, **ends},
-            context={"to_si": to_si, "directory": "."},
+            context={"to_si": to_si, "directory": ".", "describe": True},
         )
     except ValidationError as error:
         problems = [problem["msg"].removeprefix("Value error, ") for problem in error.errors()]
-        raise DataError("\n".join(dict.fromkeys(problems))) from None
+        raise DataError(_as_options("\n".join(dict.fromkeys(problems)))) from None
+
+
+def _as_options(message: str) -> str:
+    """Write the parameters of a campaign that a message names as the options of this command."""
+    message = re.sub(r"`(map|scan|spectrum)` instead of `\w+`", r"--as \1", message)
+    names = "|".join(option.name or "" for option in surface.params)
+    return re.sub(rf"`({names})(?:: (\w+))?`", lambda m: " ".join(filter(None, (_option(m[1]), m[2]))), message)
+
+
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def _kind(file: str, options: dict[str, Any]) -> str:
-    """Return what a file is: a map by its spacing or format, else a table by its columns."""
-    from mdr_dask.errors import DataError
-    from mdr_dask.models.parts.topography import TEXT
-    from mdr_dask.tables import read_sheet
+    """Return what a file is: a map or a scan by its content, or a table of a spectrum by the names of its columns."""
+    from mdr_dask.models.data_file import DataFile
+    from mdr_dask.models.parts.height_file import TEXT, dimensions
 
-    if "spacing" in options or "direction" in options or not file.lower().endswith(TEXT):
+    if "spacing" in options or "direction" in options:
         return "map"
-    try:
-        sheet = read_sheet(Path(file).read_text(errors="replace"), file)
-    except DataError:
-        return "map"
-    names = {cell.text.strip().lower() for cell in sheet.names}
-    if names & {"c2d", "c1d", "c cut", "c_cut", "c_iso"}:
-        return "spectrum"
-    return "scan" if len(sheet.rows[0]) == 2 else "map"
+    if file.lower().endswith(TEXT):
+        head = Path(file).read_text(errors="replace")[:2000].lower()
+        if re.search(r"c_?(2d|1d|cut|iso)|psd|c\(q\)|wave ?(number|vector)", head):
+            return "spectrum"
+    return "map" if dimensions(DataFile.of(Path(file))) == 2 else "scan"
 
 
 def _write(read: Surface, path: Path) -> None:
@@ -139,7 +155,7 @@ def _write(read: Surface, path: Path) -> None:
 
 
 def _method(read: Surface) -> str:
-    """Say how the spectrum was made."""
+    """Return how the spectrum was made."""
     if read.map is not None:
         window = "Hann's window of the distance from the middle" if read.map.window == "hann" else "no window"
         return f"{read.map.detrend} subtracted, {window}, C2D in rings of the wave vector"

@@ -24,6 +24,11 @@ class DataFile(BaseModel):
     path: str
     sha256: str
 
+    @classmethod
+    def of(cls, path: Path) -> DataFile:
+        """Return the file at a path as it is now."""
+        return cls(name=path.name, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+
     def read_bytes(self) -> bytes:
         """Return the file's content; DataError if it has changed since the campaign was read."""
         content = Path(self.path).read_bytes()
@@ -63,7 +68,7 @@ def _find_file(value: Any, info: ValidationInfo) -> Any:
         hint = did_you_mean(path.name, [each.name for each in Path(directory).iterdir() if each.is_file()])
         near = hint if "mean" in hint else " (names begin at the folder of the campaign file)"
         raise ValueError(f"no such file: {path}{near}")
-    return DataFile(name=value, path=str(path), sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+    return DataFile.of(path).model_copy(update={"name": value})
 
 
 #: A parameter that names a file, relative to the campaign file.

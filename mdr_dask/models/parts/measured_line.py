@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, ValidationInfo, model_validator
 
-from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import quantity
-from mdr_dask.models.data_file import DataFile, NamedFile
+from mdr_dask.models.data_file import NamedFile
+from mdr_dask.models.parts.height_file import Units, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
-from mdr_dask.models.parts.topography import TEXT, topography
-from mdr_dask.tables import Column, read_table
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -26,7 +24,8 @@ class ProfileFile(NamedByFile):
     file: NamedFile = Field(
         description="two columns x, z; other formats are read by SurfaceTopography if it is installed"
     )
-    unit: str = Field(default="", description="unit of both columns, where the file does not say")
+    unit: str = Field(default="", description="unit of the heights, where the file does not say")
+    x_unit: str = Field(default="", description="unit of the positions, where the file does not say")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="mean", description="polynomial subtracted")
     taper: float = quantity("1", "part of the line brought to its mean so that it closes", default=0.0, ge=0, le=1)
     shortest_wavelength: float | None = quantity(
@@ -72,42 +71,6 @@ def line_of(profile: ProfileFile) -> MeasuredLine:
     """
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    x, z = recorded(profile.file, profile.unit)
+    x, z = read_scan(profile.file, Units(profile.unit, profile.x_unit))
     band = profile.shortest_wavelength or 0.0, profile.longest_wavelength or 0.0
     return measured_line(x, z, profile.detrend, profile.taper, *band)
-
-
-def recorded(file: DataFile, unit: str) -> tuple[FloatArray, FloatArray]:
-    """Return positions and heights of a line, m, as they were recorded.
-
-    Parameters
-    ----------
-    file : DataFile
-        Table of x and z, or a file that SurfaceTopography reads.
-    unit : str
-        Unit of both, where the file does not say.
-
-    Raises
-    ------
-    DataError
-        If the file does not hold a line.
-    """
-    if file.name.lower().endswith(".npy"):
-        raise DataError(
-            f"{file.name}: expected a table of x and z, got an array: a map is named by surface: {{map: ...}}"
-        )
-    if not file.name.lower().endswith(TEXT):
-        line, metre = topography(file, unit)
-        if line.dim != 1:
-            raise DataError(
-                f"{file.name}: expected a line scan, got a map of {' x '.join(map(str, line.nb_grid_pts))} points: "
-                "name it by surface: {map: ...}"
-            )
-        x, z = line.positions_and_heights()
-        return x * metre, z * metre
-    columns = (
-        Column("x", "m", ("position", "distance", "length", "X"), given_unit=unit),
-        Column("z", "m", ("height", "h", "y", "profile"), given_unit=unit),
-    )
-    table = read_table(file.read_text(), file.name, columns)
-    return table["x"], table["z"]

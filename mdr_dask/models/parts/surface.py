@@ -12,7 +12,7 @@ from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.models.base import Alternatives, Parameters, quantity
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.measured_line import ProfileFile
-from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables
+from mdr_dask.models.parts.surface_files import Files, Found, MapFiles, ScanFiles, SpectrumTables, anisotropic
 from mdr_dask.units import shown
 
 if TYPE_CHECKING:
@@ -55,7 +55,15 @@ class Surface(Parameters):
                 spectra_of(self)
             except DataError as problem:
                 raise ValueError(str(problem)) from None
+            if "describe" not in info.context and (reasons := self.without_spectrum()):
+                raise ValueError("\n".join(reasons))
         return self
+
+    def without_spectrum(self) -> tuple[str, ...]:
+        """Return why files have no isotropic spectrum, one sentence each."""
+        if self.map is None:
+            return ()
+        return tuple(reason for file in self.map.files if (reason := anisotropic(self.map, file)))
 
     def notes(self) -> tuple[str, ...]:
         """Return range, rms height and rms gradient of the spectra."""
@@ -75,13 +83,23 @@ class Surface(Parameters):
 def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -> tuple[str, ...]:
     longest, shortest = spectrum.wavelengths
     statistics = (
-        f"waves of {shown(shortest, 'm')} to {shown(longest, 'm')}, "
+        f"spectrum of the line: wavelengths {shown(shortest, 'm')} to {shown(longest, 'm')}, "
         f"rms height {shown(spectrum.rms_height(), 'm')}, rms gradient {spectrum.rms_gradient():.3g}"
     )
-    noise = f"waves shorter than {shown(found.resolution, 'm')} are noise"
-    known = surface.shortest_wavelength is not None and surface.shortest_wavelength >= found.resolution
-    noisy = () if not found.resolution or known else (noise if surface.shortest_wavelength else f"{noise}, left out",)
-    return tuple(f"surface {file.name}: {told}" for told in (statistics, *noisy, *found.remarks))
+    notes = [statistics, *found.remarks]
+    if found.resolution:
+        noise = f"wavelengths below {shown(found.resolution, 'm')} are noise"
+        if surface.shortest_wavelength is None:
+            whole = found.spectrum
+            height = 1 - (spectrum.rms_height() / whole.rms_height()) ** 2
+            gradient = 1 - (spectrum.rms_gradient() / whole.rms_gradient()) ** 2
+            parts = (
+                f"{100 * height:.2g} % of the mean square height and {100 * gradient:.2g} % of the mean square gradient"
+            )
+            notes.insert(1, f"{noise}: leaving them out removes {parts}")
+        elif surface.shortest_wavelength < found.resolution:
+            notes.insert(1, noise)
+    return tuple(f"surface {file.name}: {note}" for note in notes)
 
 
 def without_exponent(value: Any, surface: str) -> Any:

@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from pydantic import Field
 
 from mdr_dask.errors import DataError
 from mdr_dask.models.base import quantity
 from mdr_dask.models.data_file import DataFile, NamedFile
-from mdr_dask.models.parts.measured_line import recorded
+from mdr_dask.models.parts.height_file import Units, read_map, read_scan
 from mdr_dask.models.parts.named_by_file import NamedByFile
-from mdr_dask.models.parts.topography import TEXT, topography
 from mdr_dask.tables import Column, read_table
-from mdr_dask.units import to_si
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.surfaces.maps import MapSpectrum, SurfaceMap
+    from mdr_dask.physics.surfaces.maps import MapSpectrum
     from mdr_dask.physics.surfaces.measured import MeasuredLine
     from mdr_dask.physics.surfaces.scans import Cut
     from mdr_dask.physics.surfaces.spectrum import Spectrum
 
 CUT_ERROR = 0.05  # relative, of every point of a tabulated cut
-MOST_ANISOTROPY = 0.25  # slopes in two directions that differ by more than a fifth
+MOST_ANISOTROPY = 0.25  # the slopes in two directions then differ by more than a fifth
 STRIPES = 10.0  # times the power of an isotropic surface, in waves along an axis
+MOST_OUTLIERS = 0.05  # share of the points; more are part of the surface
 
 Window = Literal["hann", "none"]
 
@@ -70,7 +69,8 @@ class SpectrumTables(Files):
 class ScanFiles(Files):
     """Scans of an isotropic surface, as a stylus records them: straight cuts."""
 
-    unit: str = Field(default="", description="unit of both columns, where the file does not say")
+    unit: str = Field(default="", description="unit of the heights, where the file does not say")
+    x_unit: str = Field(default="", description="unit of the positions, where the file does not say")
     detrend: Literal["none", "mean", "line", "parabola"] = Field(default="line", description="polynomial subtracted")
     window: Window = Field(default="hann", description="window of each scan; none only if it closes")
 
@@ -85,10 +85,11 @@ class MapFiles(Files):
     spacing: float | None = quantity("m", "distance of points, of text and npy", default=None, gt=0)
     spacing_y: float | None = quantity("m", "distance of lines where it is another", default=None, gt=0)
     unit: str = Field(default="", description="unit of the heights, where the file does not say")
+    x_unit: str = Field(default="", description="unit of positions in the file, where the file does not say")
     detrend: Literal["none", "mean", "plane", "parabola"] = Field(default="plane", description="polynomial subtracted")
     window: Window = Field(default="hann", description="window of the map; none only if it is periodic")
     outliers: Literal["keep", "fill"] = Field(
-        default="keep", description="what becomes of points that stick out of their neighbours"
+        default="keep", description="whether points far from their neighbours are kept or replaced"
     )
     direction: Literal["x", "y"] | None = Field(
         default=None, description="of sliding over an anisotropic surface: the line is the cut along it"
@@ -141,7 +142,7 @@ def line_of_scan(scans: ScanFiles, file: DataFile) -> MeasuredLine:
     """Return a scan without its trend."""
     from mdr_dask.physics.surfaces.measured import measured_line
 
-    x, z = recorded(file, scans.unit)
+    x, z = read_scan(file, Units(scans.unit, scans.x_unit))
     try:
         return measured_line(x, z, scans.detrend)
     except DataError as problem:
@@ -173,127 +174,92 @@ def of_surface_cut(cut: Cut) -> Found:
 
 @lru_cache(maxsize=16)
 def mapped(maps: MapFiles, file: DataFile) -> Found:
-    """Return the spectrum of one map.
-
-    Raises
-    ------
-    DataError
-        If the file holds no map, or an anisotropic one and no direction is named.
-    """
+    """Return the spectrum of one map: in rings, or of the cut along the direction that is named."""
     import numpy as np
 
     from mdr_dask.physics.surfaces.scans import NOISE_SLOPE, averaged
     from mdr_dask.physics.surfaces.self_affine import noise_limit
 
-    found, remarks = rings_of(maps, file)
-    stripes = [name for name, power in zip("xy", found.axes, strict=True) if power > STRIPES]
-    told = f", and waves along {' and '.join(stripes)} stick out: steps or scan lines?" if stripes else ""
-    if maps.direction is None and found.anisotropy() > MOST_ANISOTROPY:
-        slopes = " and ".join(f"{np.sqrt(square):.3g}" for square in found.slopes[:2])
-        raise DataError(
-            f"{file.name}: expected an isotropic surface, got an anisotropy of {found.anisotropy():.2f} "
-            f"(slopes along x and y {slopes}){told}: name the `direction` of sliding, x or y"
-        )
+    levelled = levelled_map(maps, file)
+    rings = levelled.spectrum
     if maps.direction is None:
-        spectrum, limit = found.spectrum(), noise_limit(found.binned())
+        spectrum, limit = rings.spectrum(), noise_limit(rings.binned())
     else:
-        spectrum = found.along("xy".index(maps.direction))
+        spectrum = rings.along("xy".index(maps.direction))
         limit = noise_limit(averaged(spectrum.wavenumber, spectrum.density, 1.0), NOISE_SLOPE - 1)
-    resolution = 0.0 if np.isinf(limit) else 2 * np.pi / limit
-    return Found(spectrum, resolution, (*remarks, told.removeprefix(", and ")) if told else remarks)
+    return Found(spectrum, 0.0 if np.isinf(limit) else 2 * np.pi / limit, levelled.remarks)
+
+
+def anisotropic(maps: MapFiles, file: DataFile) -> str:
+    """Return why a map has no isotropic spectrum, or nothing if it has one or if a direction of sliding is named."""
+    import numpy as np
+
+    rings = levelled_map(maps, file).spectrum
+    if maps.direction is not None or rings.anisotropy() <= MOST_ANISOTROPY:
+        return ""
+    slopes = " and ".join(f"{np.sqrt(square):.3g}" for square in rings.slopes[:2])
+    return (
+        f"{file.name}: expected an isotropic surface, got an anisotropy of {rings.anisotropy():.2f} "
+        f"(slopes along x and y {slopes}): give the `direction` of sliding, x or y"
+    )
+
+
+class LevelledMap(NamedTuple):
+    """A map after its trend is subtracted.
+
+    Parameters
+    ----------
+    height_rms, height_mean : float
+        Sq and Sa of the points that were measured, m: the rms and the mean absolute height.
+    spectrum : MapSpectrum
+        Of the windowed map, missing points filled.
+    remarks : tuple of str
+        What was done to the points.
+    """
+
+    height_rms: float
+    height_mean: float
+    spectrum: MapSpectrum
+    remarks: tuple[str, ...]
 
 
 @lru_cache(maxsize=16)
-def rings_of(maps: MapFiles, file: DataFile) -> tuple[MapSpectrum, tuple[str, ...]]:
-    """Return the spectrum of one map in rings, and what was done with its points."""
-    import numpy as np
+def levelled_map(maps: MapFiles, file: DataFile) -> LevelledMap:
+    """Return height parameters and spectrum of one map.
 
-    from mdr_dask.physics.surfaces.maps import filled, outliers, spectrum_of_map, without_trend
-
-    surface = read_map(file, maps)
-    remarks = []
-    far = int(np.count_nonzero(stick_out := outliers(surface)))
-    if far and maps.outliers == "fill":
-        surface.height[stick_out] = np.nan
-        told = "1 point stuck out of its" if far == 1 else f"{far} points stuck out of their"
-        remarks.append(f"{told} neighbours and {'was' if far == 1 else 'were'} filled")
-    elif far:
-        told = "1 point sticks out of its" if far == 1 else f"{far} points stick out of their"
-        remarks.append(f"{told} neighbours: `outliers: fill` takes {'it' if far == 1 else 'them'} out")
-    missing = int(np.count_nonzero(~np.isfinite(surface.height)))
-    if missing and not (far and maps.outliers == "fill"):
-        remarks.append("1 missing point was filled" if missing == 1 else f"{missing} missing points were filled")
-    try:
-        surface = without_trend(filled(surface), maps.detrend)
-        return spectrum_of_map(surface, maps.window == "hann"), tuple(remarks)
-    except DataError as problem:
-        raise DataError(f"{file.name}: {problem}") from None
-
-
-def read_map(file: DataFile, maps: MapFiles) -> SurfaceMap:
-    """Return the heights of a map in m, NaN where points are missing.
-
-    Rows of text and npy run along x, one below the other along y. Other formats, and text without a spacing, are read
-    by SurfaceTopography.
+    Raises
+    ------
+    DataError
+        If the file holds no map, or too many points are missing.
     """
     import numpy as np
 
-    from mdr_dask.physics.surfaces.maps import SurfaceMap
+    from mdr_dask.physics.surfaces.maps import filled, outliers, require_points, spectrum_of_map, without_trend
 
-    name = file.name.lower()
-    if not name.endswith(".npy") and (maps.spacing is None or not name.endswith(TEXT)):
-        surface, metre = topography(file, maps.unit)
-        if surface.dim != 2:
-            raise DataError(f"{file.name}: expected a map, got a line scan: name it by surface: {{scan: ...}}")
-        height = np.ma.filled(surface.heights(), np.nan) * metre
-        return SurfaceMap(
-            np.asarray(height, dtype=np.float64), tuple(length * metre for length in surface.physical_sizes)
-        )
-    if maps.spacing is None:
-        raise DataError(f"{file.name}: does not say its spacing: give `spacing`, such as 1 um")
-    if not maps.unit:
-        raise DataError(f"{file.name}: does not say the unit of its heights: give `unit`, such as um")
+    surface, remarks = read_map(file, Units(maps.unit, maps.x_unit, maps.spacing, maps.spacing_y))
     try:
-        metre = to_si(f"1 {maps.unit}", "m")
-    except ValueError as error:
-        raise DataError(f"{file.name}: unit: {error}") from None
-    rows = _array(file) if name.endswith(".npy") else _matrix(file)
-    if rows.ndim != 2:
-        raise DataError(f"{file.name}: expected rows and columns of heights, got {rows.ndim} dimensions")
-    size = rows.shape[1] * maps.spacing, rows.shape[0] * (maps.spacing_y or maps.spacing)
-    return SurfaceMap(np.ascontiguousarray(rows.T, dtype=np.float64) * metre, size)
-
-
-def _array(file: DataFile) -> Any:
-    """Return the heights of a file of numpy; masked and missing points are NaN."""
-    import io
-
-    import numpy as np
-
-    try:
-        array = np.load(io.BytesIO(file.read_bytes()), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as problem:
-        raise DataError(f"{file.name}: expected an array of numpy: {problem}") from None
-    if array.dtype.kind not in "iuf":
-        raise DataError(f"{file.name}: expected heights, got numbers of the type {array.dtype}")
-    return array
-
-
-def _matrix(file: DataFile) -> Any:
-    """Return the heights of a text: rows of numbers; decimal commas, remarks and missing entries are understood."""
-    import io
-
-    import numpy as np
-
-    text = file.read_text()
-    first = next((line for line in text.splitlines() if line.strip() and line.lstrip()[0] not in "#%"), "")
-    separator = next((mark for mark in ("\t", ";") if mark in first), None)
-    words = first.split()
-    if separator is None and "," in first and (len(words) == 1 or words[0].endswith(",")):
-        separator = ","
-    elif "," in first:
-        text = text.replace(",", ".")
-    try:
-        return np.loadtxt(io.StringIO(text), delimiter=separator, comments=("#", "%"), ndmin=2)
-    except ValueError as problem:
-        raise DataError(f"{file.name}: expected rows of heights of one length: {problem}") from None
+        require_points(surface)
+        missing = int(np.count_nonzero(~np.isfinite(surface.height)))
+        if missing:
+            remarks = (*remarks, f"missing points filled: {missing}")
+        far = outliers(surface)
+        count = int(np.count_nonzero(far))
+        if count > MOST_OUTLIERS * far.size:
+            share = 100 * count / far.size
+            remarks = (*remarks, f"far from their neighbours: {share:.2g} % of the points, too many to be outliers")
+        elif count and maps.outliers == "fill":
+            surface.height[far] = np.nan
+            remarks = (*remarks, f"outliers replaced: {count}")
+        elif count:
+            remarks = (*remarks, f"outliers, far from their neighbours: {count} (`outliers: fill` replaces them)")
+        surface = without_trend(surface, maps.detrend)
+        height = surface.height - np.nanmean(surface.height)
+        spectrum = spectrum_of_map(filled(surface), maps.window == "hann")
+    except DataError as problem:
+        raise DataError(f"{file.name}: {problem}") from None
+    stripes = [name for name, power in zip("xy", spectrum.axes, strict=True) if power > STRIPES]
+    if stripes:
+        along = " and ".join(stripes)
+        remarks = (*remarks, f"waves along {along} have more than {STRIPES:.0f} times the usual power: scan lines?")
+    rms, mean = np.sqrt(np.nanmean(height**2)), np.nanmean(np.abs(height))
+    return LevelledMap(float(rms), float(mean), spectrum, remarks)

@@ -1,4 +1,4 @@
-"""What files of a measured surface say: heights, slopes, spectra, the power law with its cut-offs, the resolution."""
+"""Report on the files of a measured surface: heights, slopes, spectra, the power law with its cut-offs, resolution."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.surface import Surface
-from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, line_of_scan, rings_of
+from mdr_dask.models.parts.surface_files import Found, MapFiles, ScanFiles, anisotropic, levelled_map, line_of_scan
 from mdr_dask.physics.surfaces.measured import rms_slope
 from mdr_dask.physics.surfaces.scans import averaged, cut_of_lines, hann_window
 from mdr_dask.physics.surfaces.self_affine import SelfAffine, fit_self_affine, steep_limit
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 UNITS = {
     "file": "",
-    "rms_height": "m",
+    "Sq": "m",
+    "Sa": "m",
+    "Pq": "m",
     "rms_gradient": "1",
     "slope_x": "1",
     "slope_y": "1",
@@ -37,11 +39,15 @@ UNITS = {
     "resolution": "m",
     "length": "m",
 }
-"""Columns of a report and their units; NaN where a file does not tell."""
+"""Columns of a report and their units; NaN where a file does not determine them.
+
+Sq and Sa are the rms and the mean absolute height of the levelled map, Pq the rms height of the levelled profile, all
+without a window. Gradient, slopes and anisotropy are those of the windowed heights.
+"""
 
 
 class FileReport(NamedTuple):
-    """What one file says.
+    """Report on one file.
 
     Parameters
     ----------
@@ -66,12 +72,12 @@ class FileReport(NamedTuple):
 
 
 def reports(surface: Surface) -> tuple[FileReport, ...]:
-    """Return what every file of a surface says.
+    """Return a report on each file of a surface.
 
     Raises
     ------
     DataError
-        If a file cannot be read, or is anisotropic and no direction is named.
+        If a file cannot be read.
     """
     measured = surface.measured
     return tuple(_report(surface, file, found) for file, found in zip(measured.files, measured.found(), strict=True))
@@ -79,7 +85,7 @@ def reports(surface: Surface) -> tuple[FileReport, ...]:
 
 def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
     row: dict[str, float | str] = {name: float("nan") for name in UNITS} | {"file": file.name}
-    row |= {"rms_height": found.spectrum.rms_height(), "rms_gradient": found.spectrum.rms_gradient()}
+    row |= {"rms_gradient": found.spectrum.rms_gradient()}
     cuts: dict[str, tuple[FloatArray, FloatArray]] = {}
     bins = averaged(found.spectrum.wavenumber, found.spectrum.density, 100.0)
     if surface.map is not None:
@@ -87,7 +93,8 @@ def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
     elif surface.scan is not None:
         bins, cuts = _of_scan(surface.scan, file, row, found)
     end = 2 * np.pi / found.resolution if found.resolution else np.inf
-    law = fit_self_affine(bins.until(min(end, steep_limit(bins))))
+    isotropic = surface.map is None or not anisotropic(surface.map, file)
+    law = fit_self_affine(bins.until(min(end, steep_limit(bins)))) if isotropic else None
     row["resolution"] = found.resolution or found.spectrum.wavelengths[1]
     if law is not None:
         for name, interval in (("hurst", law.hurst), ("rolloff", law.longest), ("cutoff", law.shortest)):
@@ -99,9 +106,10 @@ def _report(surface: Surface, file: DataFile, found: Found) -> FileReport:
 def _of_map(
     maps: MapFiles, file: DataFile, row: dict[str, float | str], bins: Cut
 ) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
-    rings, _ = rings_of(maps, file)
+    levelled = levelled_map(maps, file)
+    rings = levelled.spectrum
     slopes = np.sqrt(rings.slopes[:2])
-    row |= {"rms_height": rings.rms_height, "rms_gradient": rings.rms_gradient}
+    row |= {"Sq": levelled.height_rms, "Sa": levelled.height_mean, "rms_gradient": rings.rms_gradient}
     row |= {"slope_x": float(slopes[0]), "slope_y": float(slopes[1]), "anisotropy": rings.anisotropy()}
     row |= {"length": 2 * np.pi / float(rings.wavenumber[0])}
     return rings.binned() if maps.direction is None else bins, dict(zip("xy", rings.cuts, strict=True))
@@ -112,6 +120,7 @@ def _of_scan(
 ) -> tuple[Cut, dict[str, tuple[FloatArray, FloatArray]]]:
     line = line_of_scan(scans, file)
     cut = cut_of_lines([line], scans.window == "hann")
+    row |= {"Pq": float(line.height.std())}
     row |= {"slope_x": rms_slope(line.height * hann_window(line.height.size), line.length), "length": line.length}
     known = cut.wavenumber <= found.spectrum.wavenumber[-1]
     kept = cut.until(float(cut.wavenumber[known][-1]))

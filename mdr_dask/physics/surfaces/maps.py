@@ -74,26 +74,31 @@ def _off_neighbours(height: FloatArray) -> FloatArray:
     return np.asarray(np.minimum(along, across, out=along), dtype=np.float64)
 
 
+def require_points(surface: SurfaceMap) -> None:
+    """Raise DataError for fewer than `LEAST_POINTS` along an axis, or more than `MOST_MISSING` missing points."""
+    height = surface.height
+    if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
+        raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
+    count = int(np.count_nonzero(~np.isfinite(height)))
+    if count > MOST_MISSING * height.size:
+        share, most = distinguishable(100 * count / height.size, 100 * MOST_MISSING)
+        raise DataError(f"expected at most {most} % of missing points, which are filled, got {share} %")
+
+
 def filled(surface: SurfaceMap) -> SurfaceMap:
-    """Return a map whose missing points hang between those around them as a soap film does (Laplace).
+    """Return a map whose missing points are filled by Laplace's equation: each is the mean of its four neighbours.
 
     Raises
     ------
     DataError
         If there are too few points, or more than `MOST_MISSING` of them are missing.
     """
-    height = np.asarray(surface.height, dtype=np.float64)
-    if height.ndim != 2 or min(height.shape) < LEAST_POINTS:
-        raise DataError(f"expected a map of {LEAST_POINTS} x {LEAST_POINTS} points or more, got {height.shape}")
-    missing = ~np.isfinite(height)
-    count = int(np.count_nonzero(missing))
-    if count > MOST_MISSING * height.size:
-        share, most = distinguishable(100 * count / height.size, 100 * MOST_MISSING)
-        raise DataError(f"expected at most {most} % of missing points, which are filled, got {share} %")
-    return SurfaceMap(_hung(height, missing) if count else height, surface.size)
+    require_points(surface)
+    missing = ~np.isfinite(surface.height)
+    return SurfaceMap(_harmonic(surface.height, missing), surface.size) if missing.any() else surface
 
 
-def _hung(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
+def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
     """Return heights whose missing ones are the mean of their neighbours."""
     number = np.full(height.shape, -1)
     number[missing] = np.arange(np.count_nonzero(missing))
@@ -117,14 +122,19 @@ def _hung(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
 
 
 def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
-    """Return a map without its best polynomial: the mean, a plane, or a paraboloid with its mixed term."""
+    """Return a map without its least-squares polynomial: the mean, a plane, or a paraboloid with its mixed term.
+
+    Missing points (NaN) do not count, and stay missing.
+    """
     if order == "none":
         return surface
     x, y = (np.linspace(-1, 1, points) for points in surface.height.shape)
     powers = {"mean": ((0, 0),), "plane": ((0, 0), (1, 0), (0, 1))}
     wanted = powers.get(order, (*powers["plane"], (2, 0), (1, 1), (0, 2)))
-    gram = np.array([[np.mean(x ** (a + c)) * np.mean(y ** (b + d)) for c, d in wanted] for a, b in wanted])
-    right = [x**a @ surface.height @ y**b / surface.height.size for a, b in wanted]
+    known = np.isfinite(surface.height)
+    height = np.where(known, surface.height, 0.0)
+    gram = np.array([[x ** (a + c) @ known @ y ** (b + d) for c, d in wanted] for a, b in wanted])
+    right = [x**a @ height @ y**b for a, b in wanted]
     height = surface.height.copy()
     terms = [(factor * x**a, y**b) for factor, (a, b) in zip(np.linalg.solve(gram, right), wanted, strict=True)]
     for first in range(0, x.size, BAND):

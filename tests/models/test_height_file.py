@@ -1,0 +1,171 @@
+"""Maps and scans as instruments and people write them are read as they stand, or refused with a remedy."""
+
+import numpy as np
+import pytest
+from references.areal import areal_surface
+
+from mdr_dask.errors import DataError
+from mdr_dask.models.data_file import DataFile
+from mdr_dask.models.parts.height_file import Units, dimensions, read_map, read_scan
+from mdr_dask.models.parts.surface_files import MapFiles, levelled_map
+from mdr_dask.physics.surfaces.spectrum import self_affine
+
+LENGTH, NX, NY = 1e-4, 40, 32
+STEP = LENGTH / NX
+SPECTRUM = self_affine(0.7, LENGTH / 2, LENGTH / 16, 1e-6)
+#: Rows along x, in um, and positions in um.
+ROWS = 1e6 * areal_surface(SPECTRUM, (NX, NY), (LENGTH, LENGTH * NY / NX), 1, 0).T
+X, Y = 1e6 * STEP * np.arange(NX), 1e6 * STEP * np.arange(NY)
+UNITS = Units("um", "", STEP)
+
+
+def joined(rows, separator="\t", write="{:.9g}"):
+    return "\n".join(separator.join(write.format(cell) for cell in row) for row in rows) + "\n"
+
+
+def xyz(rows=ROWS, order=slice(None)):
+    x, y = np.meshgrid(X, Y)
+    return np.column_stack([x.ravel(), y.ravel(), rows.ravel()])[order]
+
+
+def damaged(word, separator="\t"):
+    """The map with two points as a word."""
+    rows = [[f"{cell:.9g}" for cell in row] for row in ROWS]
+    rows[3][5] = rows[20][7] = word
+    return "\n".join(separator.join(row) for row in rows) + "\n"
+
+
+def holed(code):
+    rows = ROWS.copy()
+    rows[3, 5] = rows[20, 7] = code
+    return rows
+
+
+GAPS = np.delete(np.arange(NX * NY), [3 * NX + 5, 20 * NX + 7])
+SHUFFLED = np.random.default_rng(1).permutation(GAPS)
+XYZ = Units("um", "um")
+#: Text, units, and whether two points are missing.
+LAYOUTS = {
+    "tabs": (joined(ROWS), UNITS, False),
+    "blanks": (joined(ROWS, "  "), UNITS, False),
+    "commas": (joined(ROWS, ","), UNITS, False),
+    "commas and blanks": (joined(ROWS, ", "), UNITS, False),
+    "semicolons, decimal commas": (joined(ROWS, ";").replace(".", ","), UNITS, False),
+    "tabs, decimal commas": (joined(ROWS).replace(".", ","), UNITS, False),
+    "comma at the end of rows": (joined(ROWS, ",").replace("\n", ",\n"), UNITS, False),
+    "windows": (joined(ROWS).replace("\n", "\r\n"), UNITS, False),
+    "remarks": ("# made by an instrument\n% 2026\n" + joined(ROWS), UNITS, False),
+    "preamble": ("Measurement data\nLens,50x\nDate,2026-01-01\nUnit,um\n\n" + joined(ROWS, ","), UNITS, False),
+    "preamble with numbers": (f"Rows {NY}\n{NX} {NY}\n" + joined(ROWS, " "), UNITS, False),
+    "a line of words": ("heights of a seal\n" + joined(ROWS), UNITS, False),
+    "axes": (joined(np.vstack([np.r_[0, X], np.c_[Y, ROWS]])), UNITS, False),
+    "axes without a corner": ("\t" + joined([X]) + joined(np.c_[Y, ROWS]), UNITS, False),
+    "row numbers": (joined(np.c_[np.arange(NY), ROWS], ","), UNITS, False),
+    "pandas": ("," + joined([range(NX)], ",") + joined(np.c_[np.arange(NY), ROWS], ","), UNITS, False),
+    "column numbers": (joined([range(NX)], ",") + joined(ROWS, ","), UNITS, False),
+    **{f"missing as {word!r}": (damaged(word), UNITS, True) for word in ("BAD", "Bad", "***", "NA", "-", "nan", "--")},
+    "missing as words": (damaged("No Data"), UNITS, True),
+    "missing as nothing": (damaged("", ";"), UNITS, True),
+    **{f"missing as {code:g}": (joined(holed(code)), UNITS, True) for code in (9999, -9999, 99999, -32767, 1.70141e38)},
+    "missing as zero": (joined(np.where(holed(np.nan) > -1e9, ROWS + 500, 0) - 0), UNITS, True),
+    "xyz": (joined(xyz()), XYZ, False),
+    "xyz with names": ("X,Y,Z\n" + joined(xyz(), ","), XYZ, False),
+    "xyz with gaps": (joined(xyz(order=GAPS)), XYZ, True),
+    "xyz in any order": (joined(xyz(order=SHUFFLED)), XYZ, True),
+    "surfer": (
+        f"DSAA\n{NX} {NY}\n{X[0]} {X[-1]}\n{Y[0]} {Y[-1]}\n{ROWS.min()} {ROWS.max()}\n" + joined(ROWS, " "),
+        XYZ,
+        False,
+    ),
+    "esri": (
+        f"ncols {NX}\nnrows {NY}\nxllcorner 0\nyllcorner 0\ncellsize {1e6 * STEP}\nNODATA_value -9999\n"
+        + joined(holed(-9999)[::-1], " "),
+        XYZ,
+        True,
+    ),
+}
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_a_text_map_is_read_as_it_stands(layout, tmp_path):
+    text, units, missing = LAYOUTS[layout]
+    path = tmp_path / "map.txt"
+    path.write_bytes(text.encode())
+    surface, remarks = read_map(DataFile.of(path), units)
+    expected = (ROWS + 500 if "zero" in layout else ROWS).T * 1e-6
+    assert surface.height.shape == expected.shape
+    holes = ~np.isfinite(surface.height)
+    assert np.count_nonzero(holes) == (2 if missing else 0)
+    np.testing.assert_allclose(surface.height[~holes], expected[~holes], atol=1e-13)
+    assert surface.size == pytest.approx((LENGTH, LENGTH * NY / NX))
+    if any(word in layout for word in ("axes", "pandas", "column numbers")):
+        assert "was left out" in " ".join(remarks) or "were left out" in " ".join(remarks)
+    if "preamble" in layout:
+        assert "lines before the heights, not used" in " ".join(remarks)
+    assert dimensions(DataFile.of(path)) == 2
+
+
+def test_encodings_of_windows_are_read(tmp_path):
+    for encoding in ("utf-8-sig", "cp1252"):
+        path = tmp_path / f"{encoding}.txt"
+        path.write_bytes(("# Höhe in µm\n" + joined(ROWS)).encode(encoding))
+        np.testing.assert_allclose(read_map(DataFile.of(path), UNITS)[0].height, ROWS.T * 1e-6, atol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "message"),
+    [
+        (joined(ROWS), Units("um"), "does not say its spacing: give `spacing`"),
+        (joined(ROWS), Units("", "", STEP), "does not say the unit of its heights: give `unit`"),
+        (joined(xyz()), Units("um"), "does not say the unit of its positions: give `x_unit`"),
+        (joined(xyz()), Units("um", "um", 2 * STEP), "leave out `spacing`"),
+        (joined(ROWS) + "1\t2\n", UNITS, "line 33 has 2, others 40"),
+        ("no numbers at all\n", UNITS, "expected rows of heights"),
+        ("", UNITS, "expected rows of heights"),
+    ],
+)
+def test_what_cannot_be_read_says_what_to_give(text, units, message, tmp_path):
+    path = tmp_path / "map.txt"
+    path.write_text(text)
+    with pytest.raises(DataError, match=message) as caught:
+        read_map(DataFile.of(path), units)
+    assert str(caught.value).startswith("map.txt: ")
+
+
+def test_the_unit_of_heights_is_not_that_of_positions(tmp_path):
+    path = tmp_path / "line.txt"
+    place = np.linspace(0, 9.4, 200)
+    path.write_text(joined(np.c_[place, np.sin(3 * place)]))
+    x, z = read_scan(DataFile.of(path), Units("um", "mm"))
+    assert (x[-1], z.max()) == pytest.approx((9.4e-3, 1e-6), rel=1e-3)
+    for units in (Units("um"), Units("", "mm")):
+        with pytest.raises(DataError):
+            read_scan(DataFile.of(path), units)
+
+
+def test_what_a_file_says_of_itself_is_used_or_a_contradiction(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    path = tmp_path / "gwyddion.txt"
+    height = LENGTH * NY / NX * 1e6
+    head = f"# Channel: Height\n# Width: {1e6 * LENGTH:g} µm\n# Height: {height:g} µm\n# Value units: nm\n"
+    path.write_text(head + joined(ROWS * 1e3))
+    file = DataFile.of(path)
+    surface, _ = read_map(file, Units())
+    np.testing.assert_allclose(surface.height, ROWS.T * 1e-6, atol=1e-13)
+    assert surface.size == pytest.approx((LENGTH, height * 1e-6))
+    for units, message in ((Units("mm"), "leave out `unit`"), (Units("", "", 5e-6), "leave out `spacing`")):
+        with pytest.raises(DataError, match=message):
+            read_map(file, units)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.3])
+def test_sq_is_the_rms_height_of_surface_topography(tilt, tmp_path):
+    topography = pytest.importorskip("SurfaceTopography")
+    rows = holed(np.nan) + tilt * X + 0.1 * tilt * Y[:, None]
+    path = tmp_path / "map.npy"
+    np.save(path, rows)
+    masked = np.ma.masked_invalid(rows.T)
+    theirs = topography.Topography(masked, (LENGTH, LENGTH * NY / NX)).detrend("height")
+    maps = MapFiles(files=(DataFile.of(path),), unit="um", spacing=STEP)
+    ours = levelled_map(maps, maps.files[0])
+    assert ours.height_rms == pytest.approx(1e-6 * float(np.sqrt(np.mean(theirs.heights() ** 2))), rel=1e-6)
