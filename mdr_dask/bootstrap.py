@@ -76,6 +76,14 @@ def moved(values: FloatArray, errors: FloatArray) -> FloatArray:
     return rows
 
 
+def difference(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the stack of the difference of two stacks that were resampled alike; the errors of both are kept."""
+    plain = 1 + RESAMPLES
+    rows = [one[:plain] - other[:plain], one[plain:] - other[0], one[0] - other[plain:]]
+    both: FloatArray = np.concatenate(rows)
+    return both
+
+
 def logarithms(stack: FloatArray) -> FloatArray:
     """Return logarithms of what is positive by nature: scatter and errors that take it to zero or below lie lowest."""
     with np.errstate(invalid="ignore", divide="ignore"):

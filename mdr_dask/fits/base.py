@@ -1,8 +1,9 @@
-"""What a fit is: data about a law, one function from the series of a store to its constants, and whether the law holds.
+"""What a fit is: a law, a function from the series of a store to the constants of the law, and whether the law holds.
 
-Every result has a variable ``law_holds``, a sentence that begins with *yes*, *no* or *not tested*. A law that does not
-hold gets no narrow interval: what it misses goes into the interval as an error of every case (`fitted`), or the ends
-are NaN and the sentence is the reason.
+Every result has a variable ``law_holds``: a sentence about the law as its source states it, with the constants that the
+source states. It begins with *yes*, *approximately*, *no* or *not tested*. Where constants are fitted,
+``fitted_law_holds`` says the same of the law with the fitted constants. If the fitted law does not hold either, its
+departures enter the intervals as an error of every case (`fitted`), or the ends of the intervals are NaN.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign import Campaign
 from mdr_dask.errors import FitError, distinguishable
 
-#: Departure of a law, rms and half of the largest, that counts as none: laws of friction are not meant to hold better.
+#: A law holds up to this relative departure, rms; the largest departure may be twice as large.
 WITHIN = 0.05
-#: Probability of the departure by scatter and errors alone, below which the law is doubted.
+#: A law holds approximately up to this relative departure, rms; the largest departure may be twice as large.
+APPROXIMATE = 0.15
+#: A departure that scatter and errors alone would cause with a smaller probability counts against the law.
 DOUBTFUL = 0.05
 
 
@@ -32,20 +35,20 @@ class Fit:
     Parameters
     ----------
     name : str
-        As in ``mdr-dask fit STORE NAME``.
+        Name on the command line: ``mdr-dask fit STORE NAME``.
     models : tuple of str
-        Models whose stores it understands; none stands for all models.
+        Models to whose stores the law can be fitted; an empty tuple means all models.
     summary : str
-        One line with the law itself.
+        The law, in one line.
     compute : callable, mapping of str to Dataset -> Dataset
-        Takes the groups of a store by series name (``""`` without series), each with dimensions (axes..., realisation,
-        ...) and every scalar parameter as a coordinate, varied or not. Returns one variable for every constant, over
-        whatever it varies with, beside ``<name>_low`` and ``<name>_high`` (95 % interval), measures of the goodness
-        of fit, and ``law_holds``; units in attrs.
+        Takes the groups of a store by the name of the series (``""`` without series). Each group has the dimensions
+        (axes..., realisation, ...) and all scalar parameters as coordinates, varied or not. Returns every constant
+        with ``<name>_low`` and ``<name>_high`` (95 % interval), measures of the goodness of fit, and ``law_holds``;
+        units in attrs.
     apart : bool
-        Whether each series of a store is fitted for itself, with a mapping of that one series only.
+        Whether each series of a store is fitted separately. ``compute`` then gets a mapping with one series.
     constants : tuple of str, or callable, Campaign -> tuple of str
-        Constants with an interval that realisations may go on for (``until: {name.constant: 1 %}``).
+        Constants with an interval that may decide on the number of realisations (``until: {name.constant: 1 %}``).
     """
 
     name: str
@@ -56,16 +59,16 @@ class Fit:
     constants: tuple[str, ...] | Callable[[Campaign], tuple[str, ...]] = ()
 
     def constants_of(self, campaign: Campaign) -> tuple[str, ...]:
-        """Return the constants that realisations of a campaign may go on for."""
+        """Return the constants that may decide on the number of realisations of a campaign."""
         return self.constants(campaign) if callable(self.constants) else self.constants
 
     def results(self, groups: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
-        """Fit a store: one result for each series that has the data for it, or one for all series together.
+        """Fit a store: one result for each series that has the necessary data, or one for all series together.
 
         Raises
         ------
         FitError
-            If no series has the data; each one's reason is given.
+            If no series has the data. The message gives the reason for each series.
         """
         if not self.apart:
             return {"": _judged(self.compute(groups))}
@@ -81,7 +84,7 @@ class Fit:
 
 
 def require(data: xr.Dataset, *names: str) -> None:
-    """Raise FitError where a study lacks parameters of a Kelvin body on a generated line that a law is written in."""
+    """Raise FitError if the study has no such parameters, as laws of a Kelvin body on a generated line need them."""
     missing = [name for name in names if name not in data.variables]
     if missing:
         raise FitError(
@@ -91,30 +94,40 @@ def require(data: xr.Dataset, *names: str) -> None:
 
 
 LAW_HOLDS = {"units": "1", "long_name": "whether the law holds"}
+FITTED_LAW_HOLDS = {"units": "1", "long_name": "whether the law holds with the fitted constants"}
 
 
 def _judged(result: xr.Dataset) -> xr.Dataset:
-    """Return a result that says whether its law holds, at the end of its variables."""
+    """Return a result whose last variable is ``law_holds``."""
     sentence = result.get("law_holds", xr.DataArray("not tested: this fit compares no law with its data"))
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
 
 class Fitted(NamedTuple):
-    """A law fitted to a stack.
+    """A law fitted to a stack of data.
 
     Attributes
     ----------
     constants : array, shape (1 + RESAMPLES + 2 groups, p)
         Stack of the constants, for `mdr_dask.bootstrap.interval`.
-    departures : array, shape (...)
-        Data less law.
-    chance : float
-        How often scatter and errors alone leave as much; NaN where too few realisations know the scatter.
+    residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
+        Stack of data minus law.
+    count : int
+        Realisations that were resampled.
     """
 
     constants: FloatArray
-    departures: FloatArray
-    chance: float
+    residuals: FloatArray
+    count: int
+
+    @property
+    def rms(self) -> float:
+        """Return the root mean square of the residuals of the data."""
+        return float(np.sqrt(np.mean(self.residuals[0] ** 2)))
+
+    def holds(self, where: Callable[[int], str] | None = None) -> str:
+        """Say whether the law with the fitted constants holds; arguments as in `verdict`."""
+        return verdict(self.residuals, self.count, self.constants.shape[1], where)
 
 
 def fitted(
@@ -123,58 +136,78 @@ def fitted(
     data: FloatArray,
     count: int,
 ) -> Fitted:
-    """Fit a law; where scatter and errors do not explain its departures, they become an error of every case.
+    """Fit a law; where scatter and errors do not explain its residuals, these become an error of every case.
 
     Parameters
     ----------
     fit : callable
-        From data, shape (rows, ...), to constants, shape (rows, p).
+        From data, shape (rows, cases), to constants, shape (rows, p).
     left : callable
-        From data and constants to what the law leaves of the data.
-    data : array, shape (1 + RESAMPLES + 2 groups, ...)
+        From data and constants to data minus law, shape (rows, cases).
+    data : array, shape (1 + RESAMPLES + 2 groups, cases)
         Stack of the data.
     count : int
         Realisations that were resampled.
     """
     constants = fit(data)
     residuals = left(data, constants)
-    probability = bootstrap.chance(residuals, count)
-    if not probability >= DOUBTFUL:
+    if not bootstrap.chance(residuals, count) >= DOUBTFUL:
         constants = np.concatenate([constants, fit(bootstrap.moved(data[0], residuals[0]))])
-    return Fitted(constants, residuals[0], probability)
+    return Fitted(constants, residuals, count)
 
 
-def law_holds(
-    departures: FloatArray, chance: float, constants: int = 0, where: str = "", within: float = WITHIN
-) -> str:
-    """Say in words whether a law holds.
+def verdict(residuals: FloatArray, count: int, constants: int = 0, where: Callable[[int], str] | None = None) -> str:
+    """Say whether a law holds.
+
+    Parameters
+    ----------
+    residuals : array, shape (1 + RESAMPLES + 2 groups, cases)
+        Stack of the relative departures of the data from the law.
+    count : int
+        Realisations that were resampled.
+    constants : int
+        Number of constants fitted to these data.
+    where : callable, int -> str, optional
+        Returns a description of a case, for that of the largest departure.
+    """
+    if residuals.shape[1] <= constants:
+        return law_holds(residuals[0], np.nan, constants)
+    place = where(int(np.argmax(np.abs(residuals[0])))) if where else ""
+    return law_holds(residuals[0], bootstrap.chance(residuals, count), constants, place)
+
+
+def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: str = "") -> str:
+    """Say whether a law holds.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
     chance : float
-        As in `Fitted`.
+        Probability that scatter and errors alone cause as large departures; NaN if unknown.
     constants : int
         Number of constants fitted to these data.
     where : str
-        Where the largest departure lies.
-    within : float
-        Departure that counts as none: rms, and half of the largest.
+        Description of the case with the largest departure.
     """
     if departures.size <= constants:
         return f"not tested: {departures.size} cases for {constants} constants leave nothing to compare"
-    rms, largest = np.sqrt(np.mean(departures**2)), np.max(np.abs(departures))
-    (mean, of_mean), (most, of_most) = (
-        distinguishable(rms, within, digits=2),
-        distinguishable(largest, 2 * within, digits=2),
-    )
-    departs = f"departs by {mean} rms, at most {most}{f' at {where}' if where else ''}"
-    if max(rms, largest / 2) <= within:
-        return f"yes: {departs}, within {of_mean} and {of_most}"
+    rms, largest = 100 * np.sqrt(np.mean(departures**2)), 100 * np.max(np.abs(departures))
+    limit = 100 * (WITHIN if max(rms, largest / 2) <= 100 * WITHIN else APPROXIMATE)
+    pairs = distinguishable(rms, limit, digits=2), distinguishable(largest, 2 * limit, digits=2)
+    (mean, of_mean), (most, of_most) = ((f"{float(one):g}", f"{float(other):g}") for one, other in pairs)
+    if departures.size == 1:
+        departs, limits = f"departs by {'-' if departures.flat[0] < 0 else '+'}{mean} %", f"limit {of_mean} %"
+    else:
+        departs = f"departs by {mean} % rms, at most {most} %{f' at {where}' if where else ''}"
+        limits = f"limits {of_mean} % and {of_most} %"
+    if max(rms, largest / 2) <= 100 * WITHIN:
+        return f"yes: {departs}; {limits}"
+    if chance >= DOUBTFUL:
+        return f"yes: {departs}, which scatter explains (probability {chance:.2g})"
+    if max(rms, largest / 2) <= limit:
+        return f"approximately: {departs}; {limits}"
     if np.isnan(chance):
         return f"not tested: too few realisations to know the scatter; {departs}"
-    if chance >= DOUBTFUL:
-        return f"yes: {departs}, which the scatter explains (probability {chance:.2g})"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
-    return f"no: {departs}; by scatter alone with probability {likely}"
+    return f"no: {departs}; scatter alone would cause this with probability {likely}"

@@ -1,4 +1,4 @@
-"""Film formulas of one's own: powers of load, speed and material parameter through the films of a map."""
+"""Film formulas from a map of computed films: powers of the load, speed and material parameters W, U and G."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, law_holds
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, WITHIN, Fit, law_holds
 from mdr_dask.models.ehl_line import groups as groups_of
+from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, PAN_HAMROCK_MINIMUM
 
-_FILMS = {"central_film": "central", "minimum_film": "minimum"}
+_FILMS = {
+    "central_film": ("central", PAN_HAMROCK_CENTRAL),
+    "minimum_film": ("minimum", PAN_HAMROCK_MINIMUM),
+}
 _GROUPS = {"load": "W", "speed": "U", "material": "G"}
 
 
 def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
-    """Return ln W, ln U, ln G and ln h/R of the cases that have a film, shape (4, n)."""
+    """Return ln W, ln U, ln G and ln (h/R) of the cases with a film, shape (4, cases)."""
     film = dataset[output].isel(realisation=0)
     table = np.stack([np.ravel(array) for array in xr.broadcast(*groups_of(dataset.coords.get), film)]).astype(
         np.float64
@@ -26,7 +30,7 @@ def _logarithms(dataset: xr.Dataset, output: str) -> FloatArray:
 
 
 def _maps(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield a map of films for each series and each value of what else varies there (the law, the inlet)."""
+    """Yield the films of each series, separately for each value of what varies beside W, U and G (law, inlet)."""
     for name, dataset in groups.items():
         outputs = [output for output in _FILMS if output in dataset]
         if not outputs:
@@ -43,7 +47,7 @@ def _maps(groups: Mapping[str, xr.Dataset]) -> Iterator[tuple[str, xr.Dataset]]:
 
 
 def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return constants, half widths of their 95 % intervals, and residuals of ln h over ln W, ln U, ln G."""
+    """Return constants, half widths of their 95 % intervals, and residuals of ln h against ln W, ln U, ln G."""
     from scipy.stats import t
 
     design = np.vstack([np.ones(table.shape[1]), table[:3]]).T
@@ -59,21 +63,15 @@ def _regression(table: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     covariance = np.linalg.inv(design[:, varied].T @ design[:, varied]) * np.sum(residuals**2) / freedom
     constants[varied] = solution
     width[varied] = t.ppf(0.975, freedom) * np.sqrt(np.diag(covariance))
-    if _sentence([residuals]).startswith("no"):
-        # films have no scatter: what a law misses may point one way everywhere
+    if np.sqrt(np.mean(residuals**2)) > WITHIN:  # a systematic misfit is no scatter: it may have one sign everywhere
         width[varied] += np.abs(np.linalg.pinv(design[:, varied])) @ np.abs(residuals)
     return constants, width, residuals
-
-
-def _sentence(residuals: list[FloatArray]) -> str:
-    """Say whether the law holds: films have no scatter that could explain a departure."""
-    return law_holds(np.concatenate(residuals), 0.0)
 
 
 def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Fit ``h/R = factor W^load U^speed G^material`` to the films of every series that varies W, U or G.
 
-    Whatever else varies in a series (the law of the viscosity, the inlet) makes a map of its own for each value.
+    Where something else varies in a series, such as the law of the viscosity, each of its values gets its own fit.
 
     Parameters
     ----------
@@ -85,8 +83,9 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
     Dataset, dims (series,)
         ``<film>_factor``, ``<film>_load``, ``<film>_speed``, ``<film>_material`` for the central and the minimum film,
         with ``_low`` and ``_high``; NaN for an exponent whose number is not varied. ``<film>_rms`` and ``<film>_worst``
-        are the deviations of ``ln h``: the law is an approximation, and the intervals measure its misfit, not noise;
-        in full where ``law_holds`` says *no*.
+        are the rms and the largest residual of ``ln h``. Films have no scatter, so the intervals measure the misfit of
+        the formula. ``law_holds`` judges the formula of Pan and Hamrock with its own constants, ``fitted_law_holds``
+        that with the fitted ones.
 
     Raises
     ------
@@ -94,32 +93,34 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
         If no series has enough points.
     """
     results: dict[str, dict[str, float]] = {}
-    sentences: list[str] = []
-    problem = "expected a series with central_film or minimum_film over W, U or G, got none"
+    stated_sentences, sentences = [], []
+    problem = "expected a series with central_film or minimum_film at several W, U or G, got none"
     for name, dataset in _maps(groups):
         constants: dict[str, float] = {}
-        departures = []
+        departures, of_stated = [], []
         try:
             for output in sorted(_FILMS.keys() & set(dataset.data_vars)):
-                found = _regression(_logarithms(dataset, str(output)))
-                constants |= _named(_FILMS[str(output)], *found)
+                film, formula = _FILMS[str(output)]
+                table = _logarithms(dataset, str(output))
+                found = _regression(table)
+                constants |= _named(film, *found)
                 departures.append(found[-1])
+                of_stated.append(table[3] - np.log(formula(*np.exp(table[:3]))))
         except FitError as error:
             problem = str(error)
             continue
         results[name] = constants
-        sentences.append(_sentence(departures))
+        stated_sentences.append(law_holds(np.concatenate(of_stated), 0.0))
+        sentences.append(law_holds(np.concatenate(departures), 0.0))
     if not results:
         raise FitError(problem)
     variables = sorted({key for constants in results.values() for key in constants})
-    return xr.Dataset(
-        {
-            key: ("series", [constants.get(key, np.nan) for constants in results.values()], {"units": "1"})
-            for key in variables
-        }
-        | {"law_holds": ("series", sentences)},
-        coords={"series": list(results)},
-    )
+    found_constants = {
+        key: ("series", [constants.get(key, np.nan) for constants in results.values()], {"units": "1"})
+        for key in variables
+    }
+    verdicts = {"fitted_law_holds": ("series", sentences, FITTED_LAW_HOLDS), "law_holds": ("series", stated_sentences)}
+    return xr.Dataset(found_constants | verdicts, coords={"series": list(results)})
 
 
 def _named(film: str, constants: FloatArray, width: FloatArray, residuals: FloatArray) -> dict[str, float]:
@@ -138,5 +139,10 @@ def _named(film: str, constants: FloatArray, width: FloatArray, residuals: Float
 
 
 FITS: tuple[Fit, ...] = (
-    Fit("film_exponents", ("ehl_line",), "h/R = factor W^load U^speed G^material over a map of films", film_exponents),
+    Fit(
+        "film_exponents",
+        ("ehl_line",),
+        "h/R = factor W^load U^speed G^material through a map of films, beside Pan and Hamrock (eq. 5.3)",
+        film_exponents,
+    ),
 )

@@ -10,7 +10,7 @@ import xarray as xr
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import Fit, fitted, law_holds, require
+from mdr_dask.fits.base import Fit, fitted, require, verdict
 from mdr_dask.fits.friction import (
     KELVIN,
     MODELS,
@@ -28,11 +28,11 @@ from mdr_dask.fits.friction import (
 from mdr_dask.physics.sliding import laws
 from mdr_dask.physics.surfaces import shapes as indenter
 
-BODY = 0.3  # rms slope of an indenter over its contact, over that of the roughness, beyond which its law does not hold
+BODY = 0.3  # rms slope of the body in contact over that of the roughness, up to which the law is meant to hold
 
 
 def _body(data: xr.Dataset) -> tuple[Any, float]:
-    """Return coefficient and exponent of the line c |x|^n of a store's indenter."""
+    """Return coefficient c and exponent n of the line c |x|^n of the indenter of a study."""
     if "indenter_angle" in data.coords:
         return indenter.mapped(1.0) * np.tan(data["indenter_angle"]), 1.0
     if "indenter_radius" in data.coords:
@@ -65,10 +65,10 @@ def indenter_xi(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
-    """Return where the law of rough indenters is meant to hold.
+    """Return the cases in which the law of rough indenters is meant to hold.
 
-    The body is flat against the roughness and pressed in by more than its rms height, and the velocity is not beyond
-    that of the largest friction, where region IV begins.
+    There the body is flat compared with the roughness and is pressed in by more than the rms height, and the velocity
+    is not beyond that of the largest friction, where region IV begins.
     """
     coefficient, exponent = _body(data)
     width = _half_width(data)
@@ -82,7 +82,7 @@ def within_indenter_law(data: xr.Dataset, slope: xr.DataArray) -> xr.DataArray:
 
 
 def _indenter(data: xr.Dataset) -> Variables:
-    """Fit the exponent of eq. 3.40; constants are NaN where fewer than three cases lie within the law."""
+    """Fit the exponent of eq. 3.40; the constants are NaN if fewer than three cases lie within the law."""
     slope = spectral_slope(data)
     table = table_of(data, np.sqrt(2) * slope, indenter_xi(data, slope), within_indenter_law(data, slope))
     xi, within = table.columns
@@ -93,10 +93,11 @@ def _indenter(data: xr.Dataset) -> Variables:
         errors = [f"{which}_error{suffix}" for suffix in ("", "_stated") for which in ("rms", "largest")]
         names = ["exponent", "exponent_low", "exponent_high", *errors]
         reason = (
-            f"not tested: {used.sum()} of {known.sum()} cases within the law, three are needed; in the others the body"
-            f" is steep against the roughness or barely pressed in, or the velocity lies beyond the largest friction"
+            f"not tested: {used.sum()} of {known.sum()} cases lie within the law, three are needed; in the others the"
+            f" body is steep against the roughness or barely pressed in, or the velocity lies beyond the largest"
+            f" friction"
         )
-        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason)
+        return {name: xr.Variable((), np.nan, {"units": "1"}) for name in names} | measured | holds(reason, reason)
     xi, count = xi[used], table.count(used)
     logs = table.logarithms(used)
 
@@ -105,18 +106,18 @@ def _indenter(data: xr.Dataset) -> Variables:
             law: FloatArray = np.log(laws.indenter(xi, np.exp(constants)))
         return law
 
+    def where(k: int) -> str:
+        return f"xi = {xi[k]:.2g}"
+
     start = (math.log(laws.INDENTER_EXPONENT),)
-    found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, found: rows - model(found), logs, count)
-    of_plateau = np.exp(logs[0]) - np.exp(logs[0] - found.departures)
-    worst = f"xi = {xi[np.argmax(np.abs(found.departures))]:.2g}"
+    found = fitted(lambda rows: least_squares(model, start, rows), lambda rows, best: rows - model(best), logs, count)
+    stated = logs - model(np.array([start]))
     return {
         **constant("exponent", np.exp(found.constants[:, 0]), count, "exponent of the law of rough indenters", True),
-        **law_error(of_plateau, "", "in units of sqrt 2 slope", "exponent fitted"),
-        **law_error(
-            np.exp(logs[0]) - np.exp(model(np.array([start]))[0]), "_stated", "in units of sqrt 2 slope", "exponent 1.5"
-        ),
+        **law_error(found.residuals[0], "", "exponent fitted"),
+        **law_error(stated[0], "_stated", "exponent 1.5"),
         **measured,
-        **holds(law_holds(found.departures, found.chance, 1, worst)),
+        **holds(verdict(stated, count, 0, where), found.holds(where)),
     }
 
 

@@ -1,8 +1,7 @@
-"""What stands behind the law of sliding friction: growth of the contact, its slope, and the general scaling."""
+"""Growth of the contact, slope in contact, and the general scaling of sliding friction (thesis eqs. 3.12 to 3.23)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,81 +11,72 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, law_holds
+from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, verdict
 from mdr_dask.fits.friction import (
     MODELS,
+    NEEDS_SLOPE,
     ZONE_ONE,
-    Table,
     Variables,
+    at_load,
     constant,
     each,
     holds,
+    load_and_velocity_axes,
     loads_and_velocities,
+    loads_of_zone_one,
     measure,
     one_value,
-    peak_velocity,
+    power_law,
+    rising,
     spectral_slope,
+    stated_power,
     table_of,
-    zone_one_axes,
+    text,
 )
 from mdr_dask.physics.sliding import laws
 
-KNOTS = 2  # of the common curve of a collapse for every decade of velocity
-BEND = 0.3  # change of d ln mu / d ln v along a curve, below which it could lie anywhere on a straight common curve
-
-
-def _one(value: float | FloatArray) -> xr.DataArray:
-    return xr.DataArray(value)
-
-
-def _slowest(force: FloatArray, velocity: FloatArray, known: BoolArray) -> list[int]:
-    """Return the case of the lowest velocity for every load of zone 1."""
-    loads = np.unique(force[(force >= ZONE_ONE[0]) & (force <= ZONE_ONE[1]) & known])
-    same = [np.flatnonzero((force == load) & known) for load in loads]
-    return [int(cases[np.argmin(velocity[cases])]) for cases in same]
+KNOTS = 2  # knots of the common curve of a collapse per decade of velocity
+BEND = 0.3  # a curve whose logarithmic slope changes by less fits any part of a straight common curve
+SLOPE_FOLLOWED = "whether friction beyond its maximum is proportional to the slope in contact"
 
 
 def _contact_growth(data: xr.Dataset) -> Variables:
-    """Fit the power of the length in contact over the load, at the lowest velocity."""
-    forces, velocities = loads_and_velocities(data)
-    table = table_of(data, _one(1.0), forces, velocities, output="contact_fraction")
+    """Fit the power of the contact length over the load in zone 1, at the lowest velocity."""
+    table = table_of(data, 1.0, *loads_and_velocities(data), output="contact_fraction")
     force, velocity = table.columns
-    used = _slowest(force, velocity, table.mean() > 0)
+    used = [int(same[np.argmin(velocity[same])]) for same in loads_of_zone_one(force, table.mean() > 0)]
     if len(used) < 3:
         raise FitError(f"expected three loads with F_N / (G h L) in {ZONE_ONE[0]}..{ZONE_ONE[1]}, got {len(used)}")
-    x, count, hurst = np.log(force[used]), table.count(used), one_value(data, "hurst")
-    design = np.vstack([x, np.ones(x.size)])
-    found = fitted(
-        lambda logs: logs @ np.linalg.pinv(design),
-        lambda logs, constants: logs - constants @ design,
-        table.logarithms(used),
-        count,
-    )
-    worst = f"F_N / (G h L) = {force[used][np.argmax(np.abs(found.departures))]:.2g}"
-    power, level = found.constants.T
+    x, count, stated = np.log(force[used]), table.count(used), 1 / (1 + one_value(data, "hurst"))
+    logs, where = table.logarithms(used), at_load(force[used])
+    found = power_law(x, logs, count)
+    level = np.exp(found.constants[:, 1])
     return {
-        **constant("exponent", power, count, "exponent of the length in contact over the load"),
-        **measure("exponent_stated", 1 / (1 + hurst), "1 / (1 + H) (after eq. 3.12)"),
-        **constant("factor", np.exp(level), count, "L_cont / L at F_N = G h L, by the power law", positive=True),
+        **constant("exponent", found.constants[:, 0], count, "exponent of the load in the contact length"),
+        **measure("exponent_stated", stated, "1 / (1 + H) (after eq. 3.12)"),
+        **constant("factor", level, count, "L_cont / L at F_N = G h L by the power law", positive=True),
         **_balance(data, used),
-        **measure("rms_error", float(np.sqrt(np.mean(found.departures**2))), "rms relative deviation from the law"),
+        **measure("rms_error", found.rms, "rms relative departure from the law with the fitted constants"),
         **measure("loads", len(used), "number of loads in zone 1"),
-        **holds(law_holds(found.departures, found.chance, 2, worst)),
+        **holds(stated_power(x, logs, stated, count, where), found.holds(where)),
     }
 
 
 def _balance(data: xr.Dataset, used: list[int]) -> Variables:
-    """Return the slope in contact over the slope, and mu over eq. 3.12, of the cases used, where the store has both."""
+    """Return the slope in contact over that of the line, and mu over eq. 3.12, if the store has both."""
     if not {"contact_slope", "friction_coefficient"} <= set(data.data_vars):
         return {}
     slope = spectral_slope(data)
-    ratio = table_of(data, slope, output="contact_slope")
-    force, velocity = loads_and_velocities(data)
-    law = laws.full_contact(force, velocity) * data["contact_fraction"] * (data["contact_slope"] / slope) ** 2
-    balance = table_of(data, slope * law)
+    law = laws.full_contact(*loads_and_velocities(data)) * data["contact_fraction"]
     found = {
-        "slope_in_contact": (ratio, "rms slope in contact over that of the line, mean over the loads"),
-        "mu_over_law": (balance, "mu over 4 eta v L_cont slope_cont^2 / F_N (eq. 3.12), mean over the loads"),
+        "slope_in_contact": (
+            table_of(data, slope, output="contact_slope"),
+            "rms slope in contact over that of the line, mean over the loads",
+        ),
+        "mu_over_law": (
+            table_of(data, slope * law * (data["contact_slope"] / slope) ** 2),
+            "mu over 4 eta v L_cont slope_cont^2 / F_N (eq. 3.12), mean over the loads",
+        ),
     }
     return {
         key: value
@@ -116,80 +106,85 @@ def contact_slope_law(fraction: FloatArray, hurst: float, points: float) -> Floa
 
 
 def _contact_slope(data: xr.Dataset) -> Variables:
-    """Compare the slope in contact with eq. 3.21 over the size of the contact."""
+    """Compare the slope in contact with eq. 3.21, which is stated up to a factor, and friction with that slope."""
     hurst, points = one_value(data, "hurst"), one_value(data, "points")
     slopes = table_of(data, spectral_slope(data), output="contact_slope")
-    fractions = table_of(data, _one(1.0), output="contact_fraction")
-    law = contact_slope_law(fractions.mean(), hurst, points)
-    used = np.flatnonzero((slopes.mean() > 0) & np.isfinite(law))
+    fractions = table_of(data, 1.0, output="contact_fraction")
+    used = np.flatnonzero((slopes.mean() > 0) & np.isfinite(contact_slope_law(fractions.mean(), hurst, points)))
     if used.size < 3:
         raise FitError(f"expected three cases whose contact is longer than the shortest wave, got {used.size}")
     count = min(slopes.count(used), fractions.count(used))
-    pairs = _pairs(slopes, fractions, used, lambda log: np.log(contact_slope_law(np.exp(log), hurst, points)))
+    law = np.log(contact_slope_law(np.exp(fractions.logarithms(used)), hurst, points))
     found = fitted(
-        lambda rows: (rows[:, 0] - rows[:, 1]).mean(axis=1, keepdims=True),
-        lambda rows, level: np.stack([rows[:, 0] - rows[:, 1] - level, 0 * rows[:, 1]], axis=1),
-        pairs,
+        lambda rows: rows.mean(axis=1, keepdims=True),
+        lambda rows, level: rows - level,
+        bootstrap.difference(slopes.logarithms(used), law),
         count,
     )
-    spread = float(np.ptp(pairs[0, 1]))
-    worst = f"L_cont / L = {fractions.mean()[used][np.argmax(np.abs(found.departures[0]))]:.2g}"
+    fraction = fractions.mean()[used]
     return {
         **constant("factor", np.exp(found.constants[:, 0]), count, "slope in contact over eq. 3.21", positive=True),
-        **constant("power", _slope_of(pairs), count, "power of the slope in contact over eq. 3.21; 1 if it holds"),
-        **measure("range", np.exp(spread), "largest over smallest slope by eq. 3.21"),
-        **measure("rms_error", float(np.sqrt(np.mean(found.departures[0] ** 2))), "rms relative deviation"),
+        **measure("range", float(np.exp(np.ptp(law[0]))), "largest over smallest slope by eq. 3.21"),
+        **measure("rms_error", found.rms, "rms relative departure from eq. 3.21 with the fitted factor"),
         **measure("cases", int(used.size), "cases whose contact is longer than the shortest wave"),
-        **holds(law_holds(found.departures[0], found.chance, 1, worst)),
+        **_friction_of_slope(data),
+        **holds(found.holds(lambda k: f"L_cont / L = {fraction[k]:.2g}")),
     }
 
 
-def _pairs(
-    slopes: Table, fractions: Table, used: NDArray[np.int64], law: Callable[[FloatArray], FloatArray]
-) -> FloatArray:
-    """Return the stack of logarithms of slopes and of what the law says of the contact, shape (rows, 2, cases)."""
-    plain = 1 + bootstrap.RESAMPLES
-    one, other = slopes.logarithms(used), fractions.logarithms(used)
-    rows = [np.stack([one[:plain], law(other[:plain])], axis=1)]
-    rows.append(np.stack([one[plain:], np.broadcast_to(law(other[0]), one[plain:].shape)], axis=1))
-    rows.append(np.stack([np.broadcast_to(one[0], other[plain:].shape), law(other[plain:])], axis=1))
-    both: FloatArray = np.concatenate(rows)
-    return both
-
-
-def _slope_of(pairs: FloatArray) -> FloatArray:
-    """Return the slope of the straight line through the pairs of every row."""
-    y, x = (pairs[:, k] - pairs[:, k].mean(axis=1, keepdims=True) for k in (0, 1))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slope: FloatArray = np.sum(x * y, axis=1) / np.sum(x**2, axis=1)
-    return slope
+def _friction_of_slope(data: xr.Dataset) -> Variables:
+    """Judge the reason for region IV: beyond its maximum friction falls because the slope in contact falls."""
+    if "friction_coefficient" not in data:
+        return {}
+    table = table_of(data, 1.0, *loads_and_velocities(data))
+    slopes = table_of(data, 1.0, output="contact_slope")
+    force, velocity = table.columns
+    mean = np.nan_to_num(table.mean())
+    known = (mean > 0) & (np.nan_to_num(slopes.mean()) > 0)
+    beyond = np.flatnonzero(known & ~rising(force, velocity, mean, known))
+    if not beyond.size:
+        return text("friction_follows", "not tested: no velocity beyond the largest friction", SLOPE_FOLLOWED)
+    count = table.count(beyond)
+    found = fitted(
+        lambda rows: rows.mean(axis=1, keepdims=True),
+        lambda rows, level: rows - level,
+        bootstrap.difference(table.logarithms(beyond), slopes.logarithms(beyond)),
+        count,
+    )
+    ratio = np.exp(found.constants[:, 0])
+    where = at_load(force[beyond])
+    meaning = "friction coefficient over slope in contact beyond the largest friction; 2 / sqrt 3 for one parabolic tip"
+    return {
+        **constant("friction_over_slope", ratio, count, meaning, positive=True),
+        **measure("fall", float(mean[beyond].max() / mean[beyond].min()), "largest over smallest friction there"),
+        **text("friction_follows", found.holds(where), SLOPE_FOLLOWED),
+    }
 
 
 class Collapse(NamedTuple):
-    """Curves shifted into one.
+    """Curves shifted onto one.
 
     Attributes
     ----------
     shifts : array, shape (rows, 2, curves)
-        Stack of the shifts along ln velocity and ln friction, the reference's 0.
+        Stack of the shifts along ln velocity and ln friction; those of the reference curve are 0.
     residuals : array, shape (rows, points)
         Stack of the distances of the points from the common curve.
     constants : int
-        How many heights of the common curve and shifts were fitted.
+        Number of fitted heights of the common curve and fitted shifts.
     """
 
     shifts: FloatArray
     residuals: FloatArray
     constants: int
 
-    @property
-    def tested(self) -> bool:
-        """Whether there are more points than constants."""
-        return bool(self.residuals.shape[1] > self.constants)
 
+def collapse(
+    x: FloatArray, rows: FloatArray, curve: NDArray[np.intp], start: FloatArray, reference: int, vertical: bool = True
+) -> Collapse:
+    """Shift curves onto a common curve, a natural cubic spline, by least squares.
 
-def collapse(x: FloatArray, rows: FloatArray, curve: FloatArray, start: FloatArray, reference: int) -> Collapse:
-    """Shift curves along both axes into a common curve without a form of its own, by least squares.
+    The shifts of resampled and moved rows follow from those of the first row by linearisation.
 
     Parameters
     ----------
@@ -198,166 +193,118 @@ def collapse(x: FloatArray, rows: FloatArray, curve: FloatArray, start: FloatArr
     rows : array, shape (rows, points)
         Stack of logarithms of friction.
     curve : int array, shape (points,)
-        Which curve a point is on.
+        Curve of each point.
     start : array, shape (curves,)
-        Shifts along x from which the search starts.
+        Shifts along x from which the search starts; it also starts from zero, and the better end is taken.
     reference : int
-        The curve that stays.
+        Curve that is not shifted.
+    vertical : bool
+        Whether to shift along friction, too.
     """
-    tries = (_collapsed_from(x, rows[0], curve, shift, reference) for shift in (start - start[reference], 0 * start))
-    jacobian, residuals, shift, _ = min(tries, key=lambda found: found.cost)
-    inverse = np.linalg.pinv(jacobian, rcond=1e-8)
-    change = rows - rows[0]
-    steps = change @ inverse[:, : x.size].T
-    free = np.delete(np.arange(start.size), reference)
-    shifts = np.zeros((len(rows), 2, start.size))
-    shifts[:, :, free] = shift + steps[:, -shift.size :].reshape(len(rows), *shift.shape)
-    return Collapse(shifts, residuals[: x.size] + change - steps @ jacobian[: x.size].T, jacobian.shape[1])
-
-
-class _Minimum(NamedTuple):
-    """A least-squares solution: how the common curve moves with what is unknown, its residuals, the shifts, the sum."""
-
-    jacobian: FloatArray
-    residuals: FloatArray
-    shift: FloatArray
-    cost: float
-
-
-def _collapsed_from(x: FloatArray, row: FloatArray, curve: FloatArray, start: FloatArray, reference: int) -> _Minimum:
-    """Fit a common curve, of natural splines that are held against bending where no point is, and the shifts to it."""
-    from scipy.optimize import least_squares
+    from scipy.optimize import OptimizeResult, least_squares
 
     free = np.delete(np.arange(start.size), reference)
     member = (curve[:, None] == free).astype(float)
-    ends = (x + start[curve]).min() - 0.5, (x + start[curve]).max() + 0.5
-    knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
-    bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)
-    stiff = np.hstack([bends, np.zeros((len(bends), 2 * free.size))])
-    splines = _splines(knots)
+    axes = 2 if vertical else 1
 
-    def residuals(unknown: FloatArray) -> FloatArray:
-        height, along, up = np.split(unknown, [knots.size, knots.size + free.size])
-        common = splines(x + member @ along)[0] @ height
-        return np.concatenate([row + member @ up - common, -bends @ height])
+    def from_start(begin: FloatArray) -> OptimizeResult:
+        place = x + begin[curve]
+        ends = place.min() - 0.5, place.max() + 0.5
+        knots = np.linspace(*ends, 2 + int(np.ceil(KNOTS * (ends[1] - ends[0]) / np.log(10))))
+        bends = 1e-3 * np.diff(np.eye(knots.size), 2, axis=0)  # keeps the curve straight where it has no points
 
-    def jacobian(unknown: FloatArray) -> FloatArray:
-        height, along, _ = np.split(unknown, [knots.size, knots.size + free.size])
-        basis, slopes = splines(x + member @ along)
-        return np.vstack([np.hstack([-basis, -(slopes @ height)[:, None] * member, member]), -stiff])
+        def residuals(unknown: FloatArray) -> FloatArray:
+            height, shift = unknown[: knots.size], unknown[knots.size :].reshape(axes, free.size)
+            common = _natural(knots, x + member @ shift[0]) @ height
+            up = member @ shift[1] if vertical else 0.0
+            return np.concatenate([rows[0] + up - common, -bends @ height])
 
-    basis, _ = splines(x + start[curve])
-    height = np.linalg.lstsq(np.vstack([basis, bends]), np.concatenate([row, np.zeros(len(bends))]))[0]
-    found = least_squares(residuals, np.concatenate([height, start[free], 0 * start[free]]), jacobian, method="lm")
-    shift = found.x[knots.size :].reshape(2, -1)
-    return _Minimum(-jacobian(found.x), found.fun, shift, float(found.cost))
+        right = np.concatenate([rows[0], np.zeros(len(bends))])
+        height = np.linalg.lstsq(np.vstack([_natural(knots, place), bends]), right)[0]
+        unknown = np.concatenate([height, begin[free], np.zeros((axes - 1) * free.size)])
+        return least_squares(residuals, unknown, method="lm")
+
+    tries = (from_start(begin) for begin in (start - start[reference], 0 * start))
+    best = min(tries, key=lambda found: float(found.cost))
+    change = rows - rows[0]
+    steps = -change @ np.linalg.pinv(best.jac, rcond=1e-8)[:, : x.size].T
+    shifts = np.zeros((len(rows), 2, start.size))
+    last = (best.x + steps)[:, best.x.size - axes * free.size :]
+    shifts[:, :axes, free] = last.reshape(len(rows), axes, free.size)
+    return Collapse(shifts, best.fun[: x.size] + change + steps @ best.jac[: x.size].T, best.jac.shape[1])
 
 
-def _splines(knots: FloatArray) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
-    """Return natural cubic splines of unit height at each knot, and their slopes, as a function of places."""
+def _natural(knots: FloatArray, place: FloatArray) -> FloatArray:
+    """Return natural cubic splines of unit height at each knot, continued by straight lines, shape (places, knots)."""
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(knots, np.eye(knots.size), bc_type="natural")
-
-    def at(place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        inside = np.clip(place, knots[0], knots[-1])
-        slopes = spline(inside, 1)
-        return spline(inside) + slopes * (place - inside)[:, None], slopes
-
-    return at
+    inside = np.clip(place, knots[0], knots[-1])
+    found: FloatArray = spline(inside) + spline(inside, 1) * (place - inside)[:, None]
+    return found
 
 
 def _collapse(data: xr.Dataset) -> Variables:
-    """Shift the curves of friction over velocity for every load into one, regions I to III."""
-    forces, velocities = loads_and_velocities(data)
-    table = table_of(data, spectral_slope(data), forces, velocities)
+    """Shift the curves of friction against velocity of all loads onto one, in regions I to III."""
+    table = table_of(data, spectral_slope(data), *loads_and_velocities(data))
     force, velocity = table.columns
-    mean = np.nan_to_num(table.mean())
-    loads: list[float] = []
-    used: list[int] = []
-    curve: list[int] = []
-    for load in np.unique(force):
-        same = np.flatnonzero((force == load) & (mean > 0))
-        same = same[velocity[same] <= peak_velocity(velocity[same], mean[same])] if same.size else same
-        if same.size >= 3:
-            used.extend(same)
-            curve.extend([len(loads)] * same.size)
-            loads.append(float(load))
-    if len(loads) < 2:
-        raise FitError(f"expected two loads with three velocities or more up to the largest friction, got {len(loads)}")
-    x, which, count = np.log(velocity[used]), np.array(curve), table.count(used)
-    stack = table.logarithms(used)
-    reference = len(loads) // 2
-    start = -np.log(laws.crossover(np.array(loads), laws.alpha(one_value(data, "hurst")), laws.BETA))
-    found = collapse(x, stack, which, start, reference)
+    known = rising(force, velocity, np.nan_to_num(table.mean()), np.ones(force.size, dtype=bool))
+    loads = np.array([load for load in np.unique(force) if np.count_nonzero(known & (force == load)) >= 3])
+    if loads.size < 2:
+        raise FitError(f"expected two loads with three velocities or more up to the largest friction, got {loads.size}")
+    used = np.flatnonzero(known & np.isin(force, loads))
+    x, curve, count = np.log(velocity[used]), np.searchsorted(loads, force[used]), table.count(used)
+    stack, reference = table.logarithms(used), loads.size // 2
+    start = -np.log(laws.crossover(loads, laws.alpha(one_value(data, "hurst")), laws.BETA))
+    found = collapse(x, stack, curve, start, reference)
     if not bootstrap.chance(found.residuals, count) >= DOUBTFUL:
         missed = np.concatenate([stack[:1], bootstrap.moved(stack[0], found.residuals[0])])
-        further = collapse(x, missed, which, start, reference).shifts[1:]
+        further = collapse(x, missed, curve, start, reference).shifts[1:]
         found = found._replace(shifts=np.concatenate([found.shifts, further]))
-    result = _collapsed(found, _spread(x, stack[0]), np.array(loads), start - start[reference], count)
-    return _for_all(np.unique(force), np.array(loads), result | _where(found, x, stack[0], which, count))
 
-
-def _spread(x: FloatArray, row: FloatArray) -> float:
-    """Return the rms distance of the points from a common curve before they are shifted."""
-    knots = np.linspace(x.min(), x.max(), 2 + int(np.ceil(KNOTS * np.ptp(x) / np.log(10))))
-    basis, _ = _splines(knots)(x)
-    left = row - basis @ np.linalg.lstsq(basis, row)[0]
-    return float(np.sqrt(np.mean(left**2)))
-
-
-def _collapsed(found: Collapse, spread: float, loads: FloatArray, stated: FloatArray, count: int) -> Variables:
-    """Return how well curves collapse, and whether they do."""
-    chance = bootstrap.chance(found.residuals, count)
-    rms = float(np.sqrt(np.mean(found.residuals[0] ** 2)))
-    names = {
-        "force_number": (loads, "F_N / (G h L) of every curve"),
-        "horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23"),
-    }
+    where = at_load(force[used])
+    stated = NEEDS_SLOPE
+    if "contact_slope" in data:
+        slopes = table_of(data, spectral_slope(data), output="contact_slope").logarithms(used)
+        of_contact = collapse(x, bootstrap.difference(stack, slopes), curve, start, reference, vertical=False)
+        stated = verdict(of_contact.residuals, count, of_contact.constants, where)
+    before = collapse(x, stack[:1], np.zeros_like(curve), np.zeros(1), 0).residuals
+    rms, spread = (float(np.sqrt(np.mean(left[0] ** 2))) for left in (found.residuals, before))
     return {
         **measure("rms_error", rms, "rms relative distance of the points from the common curve"),
         **measure("rms_before", spread, "the same before shifting"),
-        **measure("collapsed", 1 - (rms / spread) ** 2, "share of the spread that shifting takes away"),
-        **measure("cases", found.residuals.shape[1], "number of cases shifted"),
-        **{
-            name: xr.Variable("curve", value, {"units": "1", "long_name": text})
-            for name, (value, text) in names.items()
-        },
-        **holds(law_holds(found.residuals[0], chance, found.constants)),
+        **measure("collapsed", 1 - (rms / spread) ** 2, "share of the spread that shifting removes"),
+        **measure("cases", int(used.size), "number of cases shifted"),
+        **_shifts(np.unique(force), loads, found, start - start[reference], _vague(found, curve, x, stack[0]), count),
+        **holds(stated, verdict(found.residuals, count, found.constants, where)),
     }
 
 
-def _for_all(forces: FloatArray, loads: FloatArray, result: Variables) -> Variables:
-    """Return variables of curves as those of all loads of a study, NaN where friction falls too soon for a curve."""
-    wide: Variables = {}
-    for name, variable in result.items():
-        wide[name] = variable
-        if variable.dims == ("curve",):
-            values = np.full(forces.size, np.nan)
-            values[np.searchsorted(forces, loads)] = variable.values
-            wide[name] = xr.Variable("curve", forces if name == "force_number" else values, variable.attrs)
-    return wide
+def _vague(found: Collapse, curve: NDArray[np.intp], x: FloatArray, row: FloatArray) -> BoolArray:
+    """Return the curves without a determined shift: straight ones, and all of them if there are too few points."""
+    slopes = (np.diff(row[curve == k]) / np.diff(x[curve == k]) for k in range(found.shifts.shape[2]))
+    straight = np.array([np.ptp(slope) < BEND for slope in slopes])
+    vague: BoolArray = straight | (found.residuals.shape[1] <= found.constants)
+    return vague
 
 
-def _where(found: Collapse, x: FloatArray, row: FloatArray, curve: FloatArray, count: int) -> Variables:
-    """Return the shifts in decades with their intervals; NaN ends where the points cannot tell them apart."""
-    straight = [_bend(x[curve == k], row[curve == k]) < BEND for k in range(found.shifts.shape[2])]
-    vague = np.array(straight) | (not found.tested)
-    result = {}
+def _shifts(
+    forces: FloatArray, loads: FloatArray, found: Collapse, stated: FloatArray, vague: BoolArray, count: int
+) -> Variables:
+    """Return the shifts of all loads of a study in decades; NaN for loads without a curve, and for vague ends."""
+    decades = found.shifts / np.log(10)
+    columns = {"horizontal_stated": (stated / np.log(10), "shift along log velocity by eqs. 3.17 and 3.23")}
     for k, name in enumerate(("horizontal", "vertical")):
-        low, high = bootstrap.interval(found.shifts[:, k] / np.log(10), count)
-        ends = {"": found.shifts[0, k] / np.log(10), "_low": low, "_high": high}
-        for end, value in ends.items():
-            known = value if not end else np.where(vague, np.nan, value)
-            meaning = f"shift along the {'velocity' if k == 0 else 'friction'} in decades"
-            result[name + end] = xr.Variable("curve", known, {"units": "1", "long_name": meaning})
+        low, high = bootstrap.interval(decades[:, k], count)
+        meaning = f"shift along the {'velocity' if k == 0 else 'friction'} in decades"
+        ends = {f"{name}_low": np.where(vague, np.nan, low), f"{name}_high": np.where(vague, np.nan, high)}
+        columns |= {key: (value, meaning) for key, value in ({name: decades[0, k]} | ends).items()}
+    result = {"force_number": xr.Variable("curve", forces, {"units": "1", "long_name": "F_N / (G h L) of every curve"})}
+    for name, (values, meaning) in columns.items():
+        wide = np.full(forces.size, np.nan)
+        wide[np.searchsorted(forces, loads)] = values
+        result[name] = xr.Variable("curve", wide, {"units": "1", "long_name": meaning})
     return result
-
-
-def _bend(x: FloatArray, y: FloatArray) -> float:
-    """Return how much the logarithmic slope changes along a curve."""
-    slopes = np.diff(y) / np.diff(x)
-    return float(np.ptp(slopes))
 
 
 FITS: tuple[Fit, ...] = (
@@ -365,23 +312,23 @@ FITS: tuple[Fit, ...] = (
         "contact_growth",
         MODELS,
         "L_cont / L = factor (F_N / (G h L))^exponent in zone 1, beside 1 / (1 + H), and mu over eq. 3.12",
-        lambda series: each(series, zone_one_axes, _contact_growth, "contact_fraction"),
+        lambda series: each(series, load_and_velocity_axes, _contact_growth, "contact_fraction"),
         apart=True,
         constants=("exponent", "factor", "slope_in_contact", "mu_over_law"),
     ),
     Fit(
         "contact_slope",
         MODELS,
-        "rms slope in contact over its size, slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
-        lambda series: each(series, zone_one_axes, _contact_slope, "contact_slope", "contact_fraction"),
+        "rms slope in contact against its length, slope_cont^2 ~ q_max^(2 - 2H) - (2 pi / L_cont)^(2 - 2H) (eq. 3.21)",
+        lambda series: each(series, load_and_velocity_axes, _contact_slope, "contact_slope", "contact_fraction"),
         apart=True,
-        constants=("factor", "power"),
+        constants=("factor", "friction_over_slope"),
     ),
     Fit(
         "collapse",
         MODELS,
-        "mu = slope g(F_N) q(v f(F_N)): curves over log v shifted along both axes into one (eqs. 3.22, 3.23)",
-        lambda series: each(series, zone_one_axes, _collapse),
+        "mu = slope_cont(F_N) g(v f(F_N)): the curves of all loads shifted onto one (eqs. 3.22, 3.23)",
+        lambda series: each(series, load_and_velocity_axes, _collapse),
         apart=True,
         constants=("horizontal", "vertical"),
     ),
