@@ -134,7 +134,7 @@ def each(
         known = next(point[name] for point in points if name in point)
         blank = "" if known.dtype.kind == "U" else np.nan
         values = np.stack([point[name].values if name in point else np.full(known.shape, blank) for point in points])
-        found[name] = xr.Variable((*outer, *known.dims), values.reshape(*sizes, *known.shape), known.attrs)
+        found[name] = xr.Variable((*outer, *known.dims), values.reshape((*sizes, *known.shape)), known.attrs)
     return xr.Dataset(found, {dim: data[dim] for dim in outer if dim in data.coords})
 
 

@@ -69,7 +69,7 @@ def test_plateau_lies_near_root_two(forces):
     found = FIT["plateau"]({"": forces})
     assert found["plateau"].dims == ("hurst", "normal_force")
     high = found.isel(normal_force=slice(10, 13))
-    assert np.all(high["law_holds"].str.startswith("yes"))
+    assert np.all(high["reached"].str.startswith("yes"))
     assert high["plateau"].sel(hurst=0.7).values == pytest.approx(np.sqrt(2), rel=0.15)
 
 
@@ -169,7 +169,7 @@ def test_what_cannot_be_fitted_says_why(forces):
         FIT["zone_one"]({"": forces.isel(velocity=slice(-3, None))})
     with pytest.raises(FitError, match="expected a store with an indenter"):
         FIT["indenter"]({"": forces})
-    with pytest.raises(FitError, match="expected three velocities"):
+    with pytest.raises(FitError, match="expected friction at three"):
         FIT["plateau"]({"": forces.isel(velocity=slice(2))})
 
 

@@ -6,7 +6,7 @@ import xarray as xr
 from friction_store import store
 
 from mdr_dask.errors import FitError
-from mdr_dask.fits import scaling
+from mdr_dask.fits import available, scaling
 from mdr_dask.fits.friction import numbers
 from mdr_dask.fits.scaling import FITS, contact_slope_law
 from mdr_dask.physics.sliding import laws
@@ -40,13 +40,14 @@ def coverage(found, name, truth):
     return float(((found[f"{name}_low"] <= truth) & (truth <= found[f"{name}_high"])).mean())
 
 
-def judged(found, verdict):
-    return float(found["law_holds"].str.startswith(verdict).mean())
+def judged(found, verdict, which="fitted_law_holds"):
+    return float(found[which].str.startswith(verdict).mean())
 
 
 LOADS = {"normal_force": np.geomspace(1e-3, 3e-2, 8)}
 
 
+@pytest.mark.slow
 @LINES
 def test_growth_of_the_contact(lines):
     data = planted(LOADS, lines, 100, contact_fraction=lambda force, _: 0.3 * force**0.6)
@@ -54,7 +55,7 @@ def test_growth_of_the_contact(lines):
     assert coverage(found, "exponent", 0.6) >= LEAST
     assert coverage(found, "factor", 0.3) >= LEAST
     assert judged(found, "yes") >= LEAST
-    data = planted(LOADS, lines, 10, contact_fraction=lambda force, _: 0.3 * force**0.6 * (1 + (force > 0.05)))
+    data = planted(LOADS, lines, 10, contact_fraction=lambda force, _: 0.3 * force**0.6 * (1 + 3 * (force > 0.05)))
     found = FIT["contact_growth"].compute({"": data})
     assert judged(found, "no: departs") == 1
     assert np.all(found["exponent_high"] - found["exponent_low"] > 0.1)
@@ -73,6 +74,7 @@ def test_slope_in_contact_by_its_integral(hurst):
     assert np.isnan(contact_slope_law(np.array(1e-4), hurst, 4000))
 
 
+@pytest.mark.slow
 @LINES
 def test_slope_in_contact(lines):
     def fraction(force, _):
@@ -84,11 +86,10 @@ def test_slope_in_contact(lines):
     data = planted(LOADS, lines, 100, 0.9, contact_fraction=fraction, contact_slope=slope)
     found = FIT["contact_slope"].compute({"": data})
     assert coverage(found, "factor", 0.9) >= LEAST
-    assert coverage(found, "power", 1.0) >= LEAST
-    assert judged(found, "yes") >= LEAST
+    assert judged(found, "yes", "law_holds") >= LEAST
     data = planted(LOADS, lines, 10, 0.9, contact_fraction=fraction, contact_slope=lambda force, _: SLOPE * force**0.2)
     found = FIT["contact_slope"].compute({"": data})
-    assert judged(found, "no: departs") == 1
+    assert judged(found, "no: departs", "law_holds") == 1
     assert np.all(found["factor_high"] - found["factor_low"] > 0.1)
 
 
@@ -102,6 +103,7 @@ def scaled(force, velocity):
     return force**UP * x / (1 + x**0.7) ** (1 / 0.7)
 
 
+@pytest.mark.slow
 @LINES
 def test_curves_collapse_and_tell_their_shifts(lines):
     found = FIT["collapse"].compute({"": planted(CURVES, lines, 60, friction_coefficient=scaled)})
@@ -124,6 +126,7 @@ def test_curves_without_scatter_collapse_onto_a_curve_that_bends_as_they_do():
     assert np.max(np.abs(found.residuals)) < 0.01
 
 
+@pytest.mark.slow
 @LINES
 def test_curves_of_different_form_do_not_collapse(lines):
     def different(force, velocity):
@@ -166,6 +169,32 @@ def test_what_cannot_be_fitted_says_why():
         FIT["collapse"].compute({"": curves.isel(normal_force=[0])})
 
 
+def test_friction_beyond_its_maximum_follows_the_slope_in_contact():
+    """Region IV: friction falls because the slope in contact falls, in the ratio 2 / sqrt 3 of one parabolic tip."""
+    axes = {"velocity": np.geomspace(1e-2, 1e5, 12)}
+    outputs = ("friction_coefficient", "contact_fraction", "contact_slope", "rms_slope")
+    found = FIT["contact_slope"].compute({"": store(axes, realisations=6, outputs=outputs, normal_force=0.01)})
+    assert str(found["friction_follows"].item()).startswith("yes")
+    assert found["fall"] > 5
+    assert found["friction_over_slope"] == pytest.approx(2 / np.sqrt(3), abs=0.03)
+
+
+def test_the_plateau_is_judged_with_both_slopes():
+    """Friction of 1.2 times the slope in contact, which is steeper than the line: eq. 3.15 fails as it is written."""
+    axes = {"normal_force": [0.1], "velocity": np.geomspace(1e-4, 1e2, 9)}
+
+    def level(_, velocity):
+        return 1.2 * 1.2 * SLOPE / np.hypot(1, 1e-2 / velocity)
+
+    data = planted(axes, 10, 1, friction_coefficient=level, contact_slope=lambda force, v: 1.2 * SLOPE + 0 * v * force)
+    found = available("sliding_friction")["plateau"].compute({"": data.isel(study=0, normal_force=0)})
+    assert str(found["line_slope_holds"].item()).startswith("yes")
+    assert str(found["law_holds"].item()).startswith(("no: departs by -", "approximately: departs by -"))
+    assert found["plateau_of_contact"] == pytest.approx(1.2, rel=0.03)
+    without = available("sliding_friction")["plateau"].compute({"": data.isel(study=0).drop_vars("contact_slope")})
+    assert str(without["law_holds"].values.flat[0]).startswith("not tested: the study has no output contact_slope")
+
+
 def test_few_points_of_a_curve_are_no_test():
     """More constants than points always fit; and where one part of a study has a curve less, it says so by NaN."""
     axes = {"hurst": [0.3, 0.7], "normal_force": np.geomspace(1e-2, 10, 4), "velocity": np.geomspace(1e-6, 1, 5)}
@@ -175,7 +204,7 @@ def test_few_points_of_a_curve_are_no_test():
     found = FIT["collapse"].compute({"": data})
     assert found["horizontal"].isnull().sum("curve").values.tolist() == [0, 1]
     assert found["force_number"].notnull().all()
-    assert found["law_holds"].str.startswith("not tested: ").all()
+    assert found["fitted_law_holds"].str.startswith("not tested: ").all()
     assert found["horizontal_low"].isnull().all()
 
 
