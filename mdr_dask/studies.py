@@ -237,7 +237,7 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
-        A study, or the path of its store. For ``rate_and_state`` also that of a table of a velocity-step test.
+        A study, or the path of its store.
     law : str
         Its name; ``calibration`` explains measured points.
     measured : str, Path or DataFrame, optional
@@ -253,10 +253,6 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
     FitError
         If the study has not what the law needs.
     """
-    if isinstance(study, str | Path) and is_table(study):
-        from mdr_dask.fits.velocity_steps import of_file
-
-        return of_file(study, law)
     groups = _groups(study)
     if measured is not None:
         from mdr_dask.fits.calibration import with_table

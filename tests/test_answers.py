@@ -241,7 +241,6 @@ def test_fits_have_the_constants_that_they_declare(tmp_path):
     laws = {name: (fits.available("sliding_friction")[name], friction) for name in ("zone_one", "plateau")}
     laws["interpolation"] = fits.available("sliding_friction")["interpolation"], friction
     laws |= {law.name: (law, jumps) for law in fits.available("velocity_jump").values() if law.models}
-    del laws["relaxation_shape"]  # these courses are those of one exponential
     for law, data in laws.values():
         (result,) = law.results(data).values()
         assert law.constants

@@ -10,7 +10,6 @@ from mdr_dask.campaign.measured import LARGEST, require_readable
 from mdr_dask.errors import DataError, distinguishable
 from mdr_dask.fits.base import law_holds
 from mdr_dask.fits.sensitivity import NARROW, _advice
-from mdr_dask.fits.velocity_steps import read_trace
 from mdr_dask.models.parts.sliding_problem import refuse_immense
 from mdr_dask.models.parts.temperature import Wlf
 from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, THICKEST_FILM, thick_film
@@ -58,7 +57,6 @@ def indices() -> xr.Dataset:
 
 
 ENDS = {"low": 0.0, "high": 2 * NARROW * JUST}
-STEPS = "time [s],velocity [m/s],mu\n" + "".join(f"{k},{1 + k},1\n" for k in range(9)) + "7.999999999,3,1\n"
 #: Numbers just beyond a limit.
 SAID = {
     "bytes of a table": lambda: refused(lambda: require_readable("x" * (LARGEST + 1), "rig.csv", "toy", (), ())),
@@ -68,7 +66,6 @@ SAID = {
     "an immense number": immense,
     "a law that holds": lambda: law_holds(np.array([0.03, np.sqrt(0.0041)]) / JUST, 1.0),
     "an interval": lambda: _advice(indices()),
-    "a time": lambda: refused(lambda: read_trace(STEPS, "steps.csv")),
     "the end of wlf": lambda: refused(lambda: wlf_factor(250.0 / JUST, 300.0, 17.0, 50.0)),
     "the end of wlf in a campaign": lambda: refused(lambda: Wlf(c1=17.0, c2=50.0, reference=300.0).factor(250 / JUST)),
 }

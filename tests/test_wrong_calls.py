@@ -119,7 +119,6 @@ WRONG = [
         "--where velocity<0: no result",
     ),
     ("plot STORE velocity --style nothing -o new/x.png", "expected a style file"),
-    ("fit notes.txt rate_and_state -o new/x.png", "--series, --select, --measured and --figure are for stores"),
     ("fit STORE calibration -o new/x.csv", "expected a file that ends in .png, .pdf or .svg"),
     ("fit STORE calibration -o new/x.png", "table"),
     ("law STORE nothing -o new/x.nc", "no output 'nothing' in this study"),

@@ -1,4 +1,4 @@
-"""The command that fits laws to a store, and explains measured points by it."""
+"""The command that fits laws to a store, and calibrates parameters of a study by measured points."""
 
 from __future__ import annotations
 
@@ -46,30 +46,22 @@ def fit(
     limit: int,
     form: str | None,
 ) -> None:
-    """Fit laws to a store, each constant with its interval; without a name, say which laws there are.
+    """Fit laws to a store: constants with 95 % intervals, and whether the law holds. Without a name, list the laws.
 
-    `calibration` finds the parameters of a study that nobody measured from a table of what was measured. In place of a
-    store it may be a table of a velocity-step test, for `rate_and_state`.
+    `calibration` finds unknown parameters of a study from a table of measured points.
 
     \b
     mdr-dask fit results/friction_force.zarr
     mdr-dask fit results/friction_force.zarr zone_one --json
     mdr-dask fit results/rig.zarr calibration -o rig.png
     mdr-dask fit results/rig.zarr calibration --measured tuesday.csv
-    mdr-dask fit steps.csv rate_and_state
     """
     from mdr_dask import fits as room
     from mdr_dask import store as stores
     from mdr_dask.fits.calibration import with_table
     from mdr_dask.questions import selection
-    from mdr_dask.tables import is_table
 
     require_suffix(figure, FIGURES)
-    if is_table(store):
-        if series is not None or selections or measured or figure:
-            raise click.UsageError("--series, --select, --measured and --figure are for stores")
-        _fit_table(Path(store), names, form)
-        return
     model = stores.attributes(store)["model"]
     known = room.available(model)
     if not names:
@@ -96,14 +88,6 @@ def fit(
 
         save(drawn(groups), figure, provenance("calibration", [store], str(context.meta[COMMAND])))
         tell(str(figure))
-
-
-def _fit_table(path: Path, names: tuple[str, ...], form: str | None) -> None:
-    """Fit what there is for tables."""
-    from mdr_dask.fits.velocity_steps import of_file
-
-    for name in names or ("rate_and_state",):
-        _print(of_file(path, name), "", form, 0)
 
 
 def _print(result: xr.Dataset, group: str, form: str | None, limit: int) -> None:

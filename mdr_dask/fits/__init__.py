@@ -14,7 +14,6 @@ SUBJECTS: tuple[str, ...] = (
     "friction",
     "indenter",
     "jumps",
-    "kinetic_courses",
     "kinetics",
     "master_curve",
     "scaling",

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -103,7 +102,8 @@ def _judged(result: xr.Dataset) -> xr.Dataset:
     return result.drop_vars("law_holds", errors="ignore").assign(law_holds=sentence.assign_attrs(LAW_HOLDS))
 
 
-class Fitted(NamedTuple):
+@dataclass(frozen=True)
+class Fitted:
     """A law fitted to a stack of data.
 
     Attributes
@@ -195,7 +195,7 @@ def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: 
     rms, largest = 100 * np.sqrt(np.mean(departures**2)), 100 * np.max(np.abs(departures))
     limit = 100 * (WITHIN if max(rms, largest / 2) <= 100 * WITHIN else APPROXIMATE)
     pairs = distinguishable(rms, limit, digits=2), distinguishable(largest, 2 * limit, digits=2)
-    (mean, of_mean), (most, of_most) = ((f"{float(one):g}", f"{float(other):g}") for one, other in pairs)
+    (mean, of_mean), (most, of_most) = ((_plain(one), _plain(other)) for one, other in pairs)
     if departures.size == 1:
         departs, limits = f"departs by {'-' if departures.flat[0] < 0 else '+'}{mean} %", f"limit {of_mean} %"
     else:
@@ -211,3 +211,8 @@ def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: 
         return f"not tested: too few realisations to know the scatter; {departs}"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
     return f"no: {departs}; scatter alone would cause this with probability {likely}"
+
+
+def _plain(number: str) -> str:
+    """Return a number without an exponent."""
+    return f"{float(number):.0f}" if "e+" in number else number

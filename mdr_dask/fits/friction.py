@@ -319,18 +319,21 @@ def _plateau(data: xr.Dataset) -> Variables:
 
 def _root_two(data: xr.Dataset, height: FloatArray, flat: NDArray[np.intp], count: int, reached: str) -> Variables:
     """Judge mu = sqrt 2 slope with the slope in contact, as eq. 3.15 states, and with that of the whole line."""
-    if not reached.startswith("yes"):
-        return text("line_slope_holds", reached, LINE_SLOPE) | holds(f"not tested: {reached.partition(': ')[2]}")
-    line = text("line_slope_holds", verdict(height[:, None] / math.sqrt(2) - 1, count), LINE_SLOPE)
-    if "contact_slope" not in data:
-        return line | holds(NEEDS_SLOPE)
-    friction, slope = table_of(data, 1.0), table_of(data, 1.0, output="contact_slope")
-    ratio = np.exp(bootstrap.difference(friction.logarithms(flat), slope.logarithms(flat)).mean(axis=1))
     meaning = "largest friction coefficient over rms slope in contact"
+    if "contact_slope" in data:
+        friction, slope = table_of(data, 1.0), table_of(data, 1.0, output="contact_slope")
+        ratio = np.exp(bootstrap.difference(friction.logarithms(flat), slope.logarithms(flat)).mean(axis=1))
+    else:
+        ratio = np.full(1 + bootstrap.RESAMPLES, np.nan)
+    if not reached.startswith("yes"):
+        of_line = of_contact = f"not tested: {reached.partition(': ')[2]}"
+    else:
+        of_line = verdict(height[:, None] / math.sqrt(2) - 1, count)
+        of_contact = verdict(ratio[:, None] / math.sqrt(2) - 1, count) if "contact_slope" in data else NEEDS_SLOPE
     return {
         **constant("plateau_of_contact", ratio, count, meaning, positive=True),
-        **line,
-        **holds(verdict(ratio[:, None] / math.sqrt(2) - 1, count)),
+        **text("line_slope_holds", of_line, LINE_SLOPE),
+        **holds(of_contact),
     }
 
 

@@ -1,4 +1,4 @@
-"""The law of the jump of friction at a jump of the velocity, and its limits (thesis eqs. 4.8 to 4.11)."""
+"""The jump of friction at a jump of the velocity: its law, its limits, and its linearity (thesis eqs. 4.8 to 4.11)."""
 
 from __future__ import annotations
 
@@ -11,154 +11,201 @@ from numpy.typing import NDArray
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
-from mdr_dask.fits.base import LAW_HOLDS, Fit, fitted, law_holds
-from mdr_dask.fits.kinetic_cases import LEVELS, Cases, jump_numbers, rms, rows_of
+from mdr_dask.fits.base import FITTED_LAW_HOLDS, LAW_HOLDS, Fit, fitted, verdict
+from mdr_dask.fits.kinetic_cases import LEVELS, Cases, jump_numbers, rows_of
 
 Series = Mapping[str, xr.Dataset]
 
 LAW = 0.4  # constant of eqs. 4.10 and 4.11 in the thesis
-REGION_ONE = 0.1  # mu_1 / rms slope below which eqs. 4.9 and 4.11 differ by less than 3 %
+REGION_ONE = 0.1  # mu_1 / rms slope up to which eqs. 4.9 and 4.11 differ by less than 3 %
 PLATEAU = 1.1  # mu_1 / rms slope from which friction is on its plateau, of 1.26 to 1.44
 
-
-def _jump_law(series: Series) -> xr.Dataset:
-    """Fit the constant of eq. 4.11 for every Hurst exponent and for all cases."""
-    cases = Cases.of(series, *LEVELS, "rms_slope")
-    numbers = jump_numbers(cases)
-    before, jump = numbers["before_over_slope"], numbers["jump_over_slope"]
-    known = _rising(cases, numbers) & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
-    if np.count_nonzero(known) < 2 or not np.any(before[0, known] > REGION_ONE):
-        raise FitError(f"expected two or more cases whose friction jumps, not all with mu_1 / rms_slope < {REGION_ONE}")
-    rows = rows_of(cases)
-    table: dict[str, list[float | str]] = {}
-    for _, chosen in rows:
-        for name, value in _constant(before, jump, chosen & known, cases).items():
-            table.setdefault(name, []).append(value)
-    result = xr.Dataset({name: ("hurst", column, {"units": "1"}) for name, column in table.items()})
-    result["deviation"].attrs["long_name"] = "rms of the relative deviations from the law with the constant fitted"
-    result["law_holds"].attrs |= LAW_HOLDS
-    result.attrs["law"] = f"d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2), s = rms_slope; thesis: c = {LAW}"
-    result.attrs["window"] = "regions I to III, where friction does not fall; equal weights of the relative deviations"
-    return result.assign_coords(hurst=[label for label, _ in rows])
-
-
-def _constant(before: FloatArray, jump: FloatArray, used: NDArray[np.bool_], cases: Cases) -> dict[str, float | str]:
-    """Return a row of the table of `_jump_law`."""
-    pairs = np.log(np.stack([before[:, used], jump[:, used]], axis=1))
-    count = cases.count(used)
-    nothing = f"not tested: no case with mu_1 / rms_slope > {REGION_ONE}, where the law depends on its constant"
-    stated = _left(pairs[:1], np.array([[LAW]]))[0, 1]
-    row: dict[str, float | str] = {"constant_of_thesis": LAW, "deviation_of_thesis": rms(stated)}
-    if not np.any(pairs[0, 0] > np.log(REGION_ONE)):
-        ends = dict.fromkeys(("constant", "constant_low", "constant_high", "deviation"), np.nan)
-        return ends | row | {"cases": pairs.shape[2], "law_holds": nothing}
-    found = fitted(_constants, _left, pairs, count)
-    low, high = bootstrap.interval(found.constants[:, 0], count, positive=True)
-    worst = f"mu_1 / rms_slope = {np.exp(pairs[0, 0, np.argmax(np.abs(found.departures[1]))]):.2g}"
-    return {
-        "constant": float(found.constants[0, 0]),
-        "constant_low": float(low),
-        "constant_high": float(high),
-        **row,
-        "deviation": rms(found.departures[1]),
-        "cases": pairs.shape[2],
-        "law_holds": law_holds(found.departures[1], found.chance, 1, worst),
-    }
-
-
-def _rising(cases: Cases, numbers: Mapping[str, FloatArray]) -> NDArray[np.bool_]:
-    """Return which cases lie in regions I to III, those of eqs. 4.9-4.11: friction does not fall with velocity."""
-    highest = bootstrap.interval(numbers["xi"], cases.counts)[1]
-    rising: NDArray[np.bool_] = np.isfinite(highest) & (highest >= 0)
-    return rising
+JUMP_FIELDS = {
+    "constant": "constant c of eq. 4.11",
+    "constant_of_thesis": "0.4",
+    "deviation": "rms relative departure from the law with the fitted constant",
+    "deviation_of_thesis": "rms relative departure from the law with 0.4",
+    "cases": "cases in regions I to III",
+    "zeta": "mean zeta of the cases in region I; 1 by eq. 4.9",
+    "zeta_holds": "whether zeta = 1 in region I (eq. 4.9)",
+    "plateau_jump": "mean d_mu_0 v_1 / (dv rms_slope) of the cases on the plateau; 0.4 by eq. 4.10",
+    "plateau_holds": "whether it is 0.4 on the plateau (eq. 4.10)",
+    "fitted_law_holds": FITTED_LAW_HOLDS["long_name"],
+    "law_holds": LAW_HOLDS["long_name"],
+}
 
 
 def jump_law(before: FloatArray, constant: float | FloatArray) -> FloatArray:
-    """Return d_mu_0 v_1 / (dv rms_slope) over mu_1 / rms_slope (eq. 4.11)."""
+    """Return d_mu_0 v_1 / (dv rms_slope) from mu_1 / rms_slope (eq. 4.11)."""
     law: FloatArray = before / np.hypot(1.0, before / np.asarray(constant))
     return law
 
 
-def _left(pairs: FloatArray, constant: FloatArray) -> FloatArray:
-    """Return ln d_mu_0 less the law, shape (rows, 2, cases), beside zeros for ln mu_1, which no law gives."""
-    left = pairs[:, 1] - np.log(jump_law(np.exp(pairs[:, 0]), constant))
-    return np.stack([0 * left, left], axis=1)
-
-
-def _constants(pairs: FloatArray) -> FloatArray:
-    """Return the constant c that fits ln d_mu_0 best in every row of ln mu_1 and ln d_mu_0, by Gauss and Newton."""
-    constant = np.full((len(pairs), 1), LAW)
-    for _ in range(30):
-        slope = (jump_law(np.exp(pairs[:, 0]), constant) / constant) ** 2  # d ln law / d ln c
-        left = _left(pairs, constant)[:, 1]
-        step = np.sum(slope * left, axis=1, keepdims=True) / np.sum(slope**2, axis=1, keepdims=True)
-        constant = constant * np.exp(np.clip(step, -1, 1))
-    return constant
-
-
-def _jump_limits(series: Series) -> xr.Dataset:
-    """Return d_mu_0 in region I over that of eq. 4.9, and on the plateau beside eq. 4.10, for every Hurst exponent."""
+def _jump_law(series: Series) -> xr.Dataset:
+    """Fit the constant of eq. 4.11 for every Hurst exponent and for all cases, and judge the limits 4.9 and 4.10."""
     cases = Cases.of(series, *LEVELS, "rms_slope")
     numbers = jump_numbers(cases)
-    before = numbers["before_over_slope"][0]
-    law = jump_law(before, LAW)
+    before, jump, zeta = numbers["before_over_slope"], numbers["jump_over_slope"], numbers["zeta"]
+    highest = bootstrap.interval(numbers["xi"], cases.counts)[1]
+    rising = np.isfinite(highest) & (highest >= 0)  # regions I to III: friction does not fall with the velocity
+    known = rising & ~np.any(before <= 0, axis=0) & ~np.any(jump <= 0, axis=0)
     limits = {
-        "region I": (before < REGION_ONE, numbers["zeta"], 1.0, 1 / np.hypot(1.0, before / LAW)),
-        "plateau": ((before > PLATEAU) & _rising(cases, numbers), numbers["jump_over_slope"], LAW, law),
+        "zeta": (zeta, 1.0, (before[0] < REGION_ONE) & np.isfinite(zeta[0])),
+        "plateau": (jump, LAW, (before[0] > PLATEAU) & rising),
     }
-    if not any(np.any(inside) for inside, *_ in limits.values()):
-        raise FitError(f"expected cases with mu_1 / rms_slope below {REGION_ONE} or above {PLATEAU}")
+    if np.count_nonzero(known) < 2 and not any(np.any(region) for _, _, region in limits.values()):
+        raise FitError(f"expected two or more cases in regions I to III whose friction jumps, got {int(known.sum())}")
     rows = rows_of(cases)
-    table = np.full((len(rows), len(limits), len(LIMIT_FIELDS)), np.nan)
-    verdicts = np.empty(table.shape[:2], dtype=object)
-    for i, (_, chosen) in enumerate(rows):
-        for j, (inside, samples, limit, interpolated) in enumerate(limits.values()):
-            within = inside & chosen & np.isfinite(samples[0])
-            count = cases.count(within)
-            table[i, j] = _limit(samples, within, limit, interpolated, count)
-            verdicts[i, j] = _limit_holds(samples[:, within] / limit - 1, count)
-    result = xr.Dataset(
-        {
-            name: (("hurst", "limit"), table[..., k], {"units": "1", "long_name": meaning})
-            for k, (name, meaning) in enumerate(LIMIT_FIELDS.items())
-        },
-        {"hurst": [label for label, _ in rows], "limit": list(limits)},
-    )
-    result["law_holds"] = (("hurst", "limit"), verdicts.astype(str), LAW_HOLDS)
-    result.attrs["law"] = f"eq. 4.9: zeta = 1 in region I; eq. 4.10: d_mu_0 v_1 / (dv rms_slope) = {LAW} on the plateau"
-    result.attrs["window"] = f"region I: mu_1 / rms_slope < {REGION_ONE}; plateau: > {PLATEAU}, and not falling"
-    return result
+    table: dict[str, list[float | str]] = {}
+    for _, chosen in rows:
+        row = _constant(before[:, chosen & known], jump[:, chosen & known], cases.count(chosen & known))
+        row |= _limit("zeta", "zeta_holds", *limits["zeta"], chosen, cases)
+        row |= _limit("plateau_jump", "plateau_holds", *limits["plateau"], chosen, cases)
+        for name, value in row.items():
+            table.setdefault(name, []).append(value)
+    result = xr.Dataset({name: ("hurst", column, {"units": "1"}) for name, column in table.items()})
+    for name, meaning in JUMP_FIELDS.items():
+        result[name].attrs["long_name"] = meaning
+    result.attrs["law"] = f"d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2), s = rms_slope; thesis: c = {LAW}"
+    result.attrs["window"] = "regions I to III, where friction does not fall; equal weights of the relative departures"
+    return result.assign_coords(hurst=[label for label, _ in rows])
 
 
-LIMIT_FIELDS = {
-    "found": "mean over the cases: of zeta in region I, of d_mu_0 v_1 / (dv rms_slope) on the plateau",
-    "found_low": "lower end of its 95 % interval",
-    "found_high": "upper end of its 95 % interval",
-    "limit_of_law": "1 of eq. 4.9, 0.4 of eq. 4.10",
-    "interpolated": "mean of eq. 4.11 over the same cases",
-    "smallest": "of the cases",
-    "greatest": "of the cases",
-    "cases": "how many",
-}
+def _constant(before: FloatArray, jump: FloatArray, count: int) -> dict[str, float | str]:
+    """Return the constant of eq. 4.11 of some cases, from stacks of mu_1 and the jump over the slope."""
+    row: dict[str, float | str] = {"cases": jump.shape[1], "constant_of_thesis": LAW}
+    if jump.shape[1] < 2 or not np.any(before[0] > REGION_ONE):
+        reason = f"not tested: the constant needs two cases, one of them with mu_1 / rms_slope above {REGION_ONE}"
+        names = ("constant", "constant_low", "constant_high", "deviation", "deviation_of_thesis")
+        return dict.fromkeys(names, np.nan) | row | {"fitted_law_holds": reason, "law_holds": reason}
+    logs = np.log(jump)
+
+    def before_of(rows: FloatArray) -> FloatArray:
+        return before if len(rows) == len(before) else before[:1]  # rows moved by departures have the mu_1 of the first
+
+    def left(rows: FloatArray, constant: FloatArray) -> FloatArray:
+        return rows - np.log(jump_law(before_of(rows), constant))
+
+    def fit(rows: FloatArray) -> FloatArray:
+        constant = np.full((len(rows), 1), LAW)
+        for _ in range(30):  # Gauss-Newton steps in ln c
+            slope = (jump_law(before_of(rows), constant) / constant) ** 2
+            step = np.sum(slope * left(rows, constant), axis=1, keepdims=True) / np.sum(slope**2, axis=1, keepdims=True)
+            constant = constant * np.exp(np.clip(step, -1, 1))
+        return constant
+
+    def where(k: int) -> str:
+        return f"mu_1 / rms_slope = {before[0, k]:.2g}"
+
+    found = fitted(fit, left, logs, count)
+    stated = left(logs, np.full((len(logs), 1), LAW))
+    low, high = bootstrap.interval(found.constants[:, 0], count, positive=True)
+    return row | {
+        "constant": float(found.constants[0, 0]),
+        "constant_low": float(low),
+        "constant_high": float(high),
+        "deviation": found.rms,
+        "deviation_of_thesis": float(np.sqrt(np.mean(stated[0] ** 2))),
+        "fitted_law_holds": found.holds(where),
+        "law_holds": verdict(stated, count, 0, where),
+    }
 
 
 def _limit(
-    samples: FloatArray, inside: NDArray[np.bool_], limit: float, interpolated: FloatArray, count: int
-) -> list[float]:
-    """Return the entries of `LIMIT_FIELDS` for the cases inside a region."""
+    name: str,
+    holds: str,
+    stack: FloatArray,
+    limit: float,
+    region: NDArray[np.bool_],
+    chosen: NDArray[np.bool_],
+    cases: Cases,
+) -> dict[str, float | str]:
+    """Return the mean of a number over the cases of a region, and whether it is the limit in all of them."""
+    inside = region & chosen
     if not np.any(inside):
-        return [np.nan, np.nan, np.nan, limit, np.nan, np.nan, np.nan, 0]
-    mean = samples[:, inside].mean(axis=1)
+        return dict.fromkeys((name, f"{name}_low", f"{name}_high"), np.nan) | {
+            holds: "not tested: no case in this region"
+        }
+    count, mean = cases.count(inside), stack[:, inside].mean(axis=1)
     low, high = bootstrap.interval(mean, count)
-    ends = samples[0, inside].min(), samples[0, inside].max()
-    return [mean[0], float(low), float(high), limit, interpolated[inside].mean(), *ends, np.count_nonzero(inside)]
+    sentence = verdict(stack[:, inside] / limit - 1, count)
+    return {name: float(mean[0]), f"{name}_low": float(low), f"{name}_high": float(high), holds: sentence}
 
 
-def _limit_holds(departures: FloatArray, count: int) -> str:
-    """Say whether a limit holds in the cases of its region, from the stack of their relative departures."""
-    if not departures.shape[1]:
-        return "not tested: no case in this region"
-    return law_holds(departures[0], bootstrap.chance(departures, count))
+LINEAR_FIELDS = {
+    "zeta": "zeta of eq. 4.8 in the limit of a small jump",
+    "zeta_trend": "relative change of zeta with dv / v_1",
+    "xi": "xi of eq. 4.8 in the limit of a small jump",
+    "xi_trend": "change of xi with dv / v_1, over zeta",
+}
+
+
+def _jump_linearity(series: Series) -> xr.Dataset:
+    """Fit straight lines to zeta and xi against dv / v_1; by eq. 4.8 both are constant."""
+    cases = Cases.of(series, *LEVELS, "rms_slope")
+    outer = [dim for dim in cases.template.dims if dim not in cases.data["velocity_change"].dims]
+    change, place, numbers = cases.column("velocity_change"), cases.places(outer), jump_numbers(cases)
+    both = np.stack([numbers["zeta"], numbers["xi"]], axis=1)
+    both[~np.isfinite(both)] = np.nan
+    rows = []
+    for i in range(int(place.max()) + 1):
+        used = np.flatnonzero((place == i) & np.all(np.isfinite(both[0]), axis=0))
+        rows.append(_lines(both[:, :, used], change[used], cases.count(used)))
+    if all(str(row["law_holds"]).startswith("not tested") for row in rows):
+        raise FitError("expected a series with jumps dv / v_1 of three sizes or more")
+    shape = [cases.template.sizes[dim] for dim in outer]
+    axes = {dim: cases.template[dim] for dim in outer if dim in cases.template.coords}
+    columns = {name: np.reshape([row[name] for row in rows], shape) for name in rows[0]}
+    meanings = LINEAR_FIELDS | {"law_holds": LAW_HOLDS["long_name"]}
+    result = xr.Dataset(
+        {
+            name: (outer, column, {"units": "1", "long_name": meanings.get(name, name)})
+            for name, column in columns.items()
+        },
+        axes,
+    )
+    result.attrs["law"] = "eq. 4.8: d_mu_0 / mu_1 = zeta dv / v_1, (mu_2 - mu_1) / mu_1 = xi dv / v_1"
+    return result
+
+
+def _lines(numbers: FloatArray, change: FloatArray, count: int) -> dict[str, float | str]:
+    """Return zeta and xi with their trends and intervals, and whether both are constant.
+
+    Parameters
+    ----------
+    numbers : array, shape (rows, 2, jumps)
+        Stack of zeta and xi.
+    change : array, shape (jumps,)
+        dv / v_1.
+    count : int
+        Realisations.
+    """
+    names = [f"{name}{end}" for name in LINEAR_FIELDS for end in ("", "_low", "_high")]
+    if change.size < 3:
+        empty: dict[str, float | str] = dict.fromkeys([*names, "rms_error"], np.nan)
+        return empty | {"law_holds": f"not tested: {change.size} jumps, three are needed"}
+    scale, both = numbers[0, 0].mean(), np.concatenate([numbers[:, 0], numbers[:, 1]], axis=1)
+
+    def levels(rows: FloatArray) -> FloatArray:
+        means: FloatArray = rows.reshape(len(rows), 2, -1).mean(axis=2)
+        return means
+
+    def left(rows: FloatArray, constants: FloatArray) -> FloatArray:
+        return rows - np.repeat(constants, change.size, axis=1)
+
+    flat = fitted(levels, left, both / scale, count)
+    line = numbers @ np.linalg.pinv(np.vstack([np.ones(change.size), change]))
+    moved = scale * (flat.constants[len(numbers) :] - flat.constants[0])  # departures from a constant count as errors
+    level = np.concatenate([line[:, :, 0], line[0, :, 0] + moved])
+    with np.errstate(divide="ignore", invalid="ignore"):  # zeta may be zero within its error
+        trend = line[:, :, 1] / line[:, :1, 0]
+    found: dict[str, float | str] = {}
+    stacks = (level[:, 0], trend[:, 0], level[:, 1], trend[:, 1])
+    for name, stack in zip(LINEAR_FIELDS, stacks, strict=True):
+        low, high = bootstrap.interval(stack, count)
+        found |= {name: float(stack[0]), f"{name}_low": float(low), f"{name}_high": float(high)}
+    sentence = flat.holds(lambda k: f"dv / v_1 = {change[k % change.size]:.2g}, relative to zeta")
+    return found | {"rms_error": flat.rms, "law_holds": sentence}
 
 
 _MODELS = ("velocity_jump",)
@@ -166,17 +213,17 @@ FITS: tuple[Fit, ...] = (
     Fit(
         "jump_law",
         _MODELS,
-        "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) with the constant c for every H",
+        "d_mu_0 v_1 / (dv s) = [(s / mu_1)^2 + 1 / c^2]^(-1/2) for every H (eq. 4.11), and its limits 4.9 and 4.10",
         _jump_law,
         apart=True,
-        constants=("constant",),
+        constants=("constant", "zeta", "plateau_jump"),
     ),
     Fit(
-        "jump_limits",
+        "jump_linearity",
         _MODELS,
-        "zeta in region I beside 1, and d_mu_0 v_1 / (dv s) on the plateau beside 0.4, for every H",
-        _jump_limits,
+        "zeta and xi against dv / v_1: constant if the jump is proportional to the change of velocity (eq. 4.8)",
+        _jump_linearity,
         apart=True,
-        constants=("found",),
+        constants=tuple(LINEAR_FIELDS),
     ),
 )

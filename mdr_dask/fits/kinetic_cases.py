@@ -1,4 +1,4 @@
-"""The cases of a series of velocity jumps, with stacks of their means."""
+"""The cases of a series of velocity jumps, and the stacks of their means."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Cases:
 
     @classmethod
     def of(cls, series: Mapping[str, xr.Dataset], *needed: str) -> Cases:
-        """Take the only series; raise FitError where it lacks an output."""
+        """Return the cases of the only series; raise FitError if an output is missing."""
         data = next(iter(series.values()))
         missing = [name for name in needed if name not in data]
         if missing:
@@ -85,11 +85,16 @@ class Cases:
         return mean
 
     def places(self, dims: Sequence[Hashable]) -> NDArray[np.int64]:
-        """Return which point of some of the axes every case lies at."""
+        """Return the index of every case in the flattened grid of some of the axes."""
         places = np.arange(int(np.prod([self.template.sizes[dim] for dim in dims], dtype=int)))
         shaped = xr.DataArray(places.reshape([self.template.sizes[dim] for dim in dims]), dims=list(dims))
         found: NDArray[np.int64] = np.asarray(self._like(shaped), dtype=np.int64).ravel()
         return found
+
+    @property
+    def times(self) -> FloatArray:
+        """Return the times (t - t_0) / tau of the transient, from 0 on."""
+        return np.concatenate([[0.0], self.data["relaxation_times"].values])
 
     @property
     def slope(self) -> FloatArray:
@@ -130,7 +135,7 @@ class Cases:
     def relaxing_error(self) -> FloatArray:
         """Return the error of the grid in the mean of mu - mu_2, shape (cases, 1 + times).
 
-        The trace stands on mu_2 and shares its error, which is therefore taken off.
+        The error of mu contains that of mu_2, which is therefore subtracted.
         """
         whole, after = self.error("friction_coefficient"), self.error(LEVELS[2])[:, None]
         trace = np.where(np.isinf(whole), np.inf, np.maximum(whole - np.where(np.isinf(after), 0.0, after), 0.0))
@@ -140,7 +145,7 @@ class Cases:
         return value.broadcast_like(self.template).transpose(*self.template.dims)
 
     def found(self, values: NDArray[Any], unit: str, meaning: str) -> xr.DataArray:
-        """Return what was found for every case over the axes of the series."""
+        """Return values of all cases over the axes of the series."""
         shaped = np.asarray(values).reshape(self.template.shape)
         axes = {dim: self.template[dim] for dim in self.template.dims if dim in self.template.coords}
         return xr.DataArray(shaped, axes, self.template.dims, attrs={"units": unit, "long_name": meaning})
@@ -172,7 +177,7 @@ def law_rate(number: FloatArray, hurst: FloatArray) -> FloatArray:
 
 
 def jump_numbers(cases: Cases) -> dict[str, FloatArray]:
-    """Return samples of what follows from mu_1, d_mu_0 and mu_2; zeta and xi are infinite or NaN where mu_1 is 0."""
+    """Return stacks of the numbers of the jump; zeta and xi are infinite or NaN where mu_1 is 0."""
     before, jump, after = cases.levels()
     change, slope = cases.column("velocity_change"), cases.slope
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -192,8 +197,3 @@ def rows_of(cases: Cases) -> list[tuple[str, NDArray[np.bool_]]]:
     hurst = cases.column("hurst")
     rows = [(f"{value:.4g}", hurst == value) for value in np.unique(hurst)]
     return [*rows, ("all", np.ones(hurst.size, dtype=bool))] if len(rows) > 1 else rows
-
-
-def rms(values: FloatArray) -> float:
-    """Return the root of the mean square, NaN of nothing."""
-    return float(np.sqrt(np.mean(values**2))) if values.size else np.nan

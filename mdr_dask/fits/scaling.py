@@ -13,6 +13,7 @@ from mdr_dask.arrays import BoolArray, FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits.base import DOUBTFUL, Fit, fitted, verdict
 from mdr_dask.fits.friction import (
+    KELVIN,
     MODELS,
     NEEDS_SLOPE,
     ZONE_ONE,
@@ -134,7 +135,7 @@ def _contact_slope(data: xr.Dataset) -> Variables:
 
 def _friction_of_slope(data: xr.Dataset) -> Variables:
     """Judge the reason for region IV: beyond its maximum friction falls because the slope in contact falls."""
-    if "friction_coefficient" not in data:
+    if not {"friction_coefficient", *KELVIN} <= set(data.variables):
         return {}
     table = table_of(data, 1.0, *loads_and_velocities(data))
     slopes = table_of(data, 1.0, output="contact_slope")

@@ -238,7 +238,6 @@ def draw_power(groups: Mapping[str, xr.Dataset]) -> Figure:
     figure, (axes,) = drawing.panels(1)
     rows = (
         ("above", "power", r"$v_1\tau q_{max} > 1$"),
-        ("above", "power_unweighted", r"$v_1\tau q_{max} > 1$, all times alike"),
         ("below", "power", r"$v_1\tau q_{max} < 1$"),
     )
     for number, (regime, power, label) in enumerate(rows):

@@ -206,21 +206,17 @@ def _draw_exponentials(axes: Axes, found: xr.Dataset, first: float) -> None:
     )
     label = f"$b$ = {float(found['rate']):.2f} ({ends('rate')}), weights 1/variance"
     drawing.law(axes, inside, curve("one"), color=style.colour(style.FITTED), label=label)
-    alike = f"$b$ = {float(found['rate_unweighted']):.2f} ({ends('rate_unweighted')}), all times alike"
-    drawing.law(axes, inside, curve("alike"), "-.", color=style.colour(4), lw=1, label=alike)
     law = float(found["law_rate"])
     start = float(found["one"][0])
     label = f"$b$ = {law:.2f} of eq. 4.12"
     drawing.law(axes, inside, start * np.exp(-law * inside), "--", color=style.colour(0), lw=1, label=label)
-    if "two" in found:
-        drawing.law(axes, inside, curve("two"), ":", color=style.colour(2), lw=1.5, label="two exponentials")
 
 
 def draw_course(groups: Mapping[str, xr.Dataset]) -> Figure:
     """Draw simulated friction against time beside the closed courses of eqs. 4.13-4.15."""
     from mdr_dask.fits.base import require
     from mdr_dask.fits.kinetic_cases import law_rate
-    from mdr_dask.fits.kinetic_courses import relaxation_law
+    from mdr_dask.fits.kinetics import relaxation_law
 
     name, data, told = pick(groups, (*OUTPUTS, "rms_slope"), "velocity")
     require(data, "hurst", "relaxation_time", "length", "points")

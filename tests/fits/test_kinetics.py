@@ -1,16 +1,12 @@
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.stats import norm, t
 
 from mdr_dask.errors import FitError
 from mdr_dask.fits import available, kinetics
 from mdr_dask.fits.jumps import jump_law
 from mdr_dask.fits.kinetics import relaxation_curves
 from mdr_dask.fits.relaxation import exponential, widths
-from mdr_dask.plots import available as drawn
-from mdr_dask.plots.kinetics import over_slope, relaxing
 
 FIT = available("velocity_jump")
 TIMES = np.geomspace(1e-4, 20, 60)
@@ -65,33 +61,31 @@ def test_jump_and_relaxing_part() -> None:
 
 def test_rate_of_an_exponential_is_found() -> None:
     found = FIT["relaxation"].compute({"": store(ABOVE, 0.7, 0.3)})
-    assert np.allclose(found["rate"], found["passing_number"] ** 0.3, rtol=1e-6)
-    assert np.allclose(found["rate_unweighted"], found["rate"], rtol=1e-6)
+    assert np.allclose(found["rate"], found["passing_number"] ** 0.3, rtol=1e-3)
     assert np.all(found["rate_low"] <= found["rate"] + 1e-9)
-    assert np.all(found["unexplained"] < 1e-9)
-    assert np.all(found["law_holds"].str.startswith("yes: one exponential"))
+    assert np.all(found["fitted_law_holds"].str.startswith("yes: "))
     # the trapezoidal rule on 12 moments a decade
     assert np.allclose(found["integral_rate"], found["rate"], rtol=0.02)
     assert np.allclose(found["relaxation_duration"], TAU / found["rate"])
     assert np.allclose(found["relaxation_length"], 1.2 * found["velocity"] * found["relaxation_duration"])
     assert np.allclose(found["length_times_wavenumber"], 1.2 * found["passing_number"] / found["rate"])
     assert found.attrs["window"].startswith("one exponential over")
-    with pytest.raises(FitError, match="one exponential is enough"):
-        FIT["relaxation_shape"].compute({"": store(ABOVE, 0.7, 0.3)})
 
 
-def test_two_more_laws_where_one_exponential_is_not_enough() -> None:
-    series = {"": store(ABOVE[3:4], 0.7, 0.3, shape=0.5)}
-    rates = FIT["relaxation"].compute(series).squeeze()
-    assert rates["law_holds"].item().startswith("no: one exponential")
-    assert rates["unexplained"].item() > 0.01
-    assert rates["probability"].item() < 0.05
-    found = FIT["relaxation_shape"].compute(series).squeeze()
-    assert found.attrs["window"].startswith("one exponential over")
-    assert found["stretched_exponent"].item() == pytest.approx(0.5, rel=1e-3)
-    assert found["stretched_rate"].item() == pytest.approx(float(rates["passing_number"]) ** 0.3, rel=1e-3)
-    assert found["two_unexplained"].item() < 0.3 * found["unexplained"].item()
-    assert found["fast_rate"].item() > found["slow_rate"].item()
+def test_a_stretched_decay_is_no_exponential_and_its_rate_is_not_narrow() -> None:
+    found = FIT["relaxation"].compute({"": store(ABOVE[3:4], 0.7, 0.3, shape=0.5)}).squeeze()
+    assert not found["fitted_law_holds"].item().startswith("yes")
+    assert found["rate_low"] <= found["integral_rate"] <= found["rate_high"]
+
+
+def test_the_closed_law_is_judged_with_its_own_jump_and_rate() -> None:
+    """The planted jump has the constant 0.42 in place of 0.4, and a fifth of it relaxes."""
+    found = FIT["relaxation"].compute({"": store(ABOVE, 0.7, 0.3)})
+    assert np.all(found["law_holds"].str.startswith("yes"))
+    assert np.all(found["rms_error"] < 0.05)
+    assert np.all(found["rms_error_of_rate"] < 1e-9)
+    other = FIT["relaxation"].compute({"": store(ABOVE, 0.2, 0.3)})  # planted rates grow with 0.3, not with 0.8
+    assert np.all(other["rms_error_of_rate"][2:] > found["rms_error_of_rate"][2:])
 
 
 def test_nothing_relaxes_in_full_contact() -> None:
@@ -99,7 +93,7 @@ def test_nothing_relaxes_in_full_contact() -> None:
     still = data["friction_coefficient_before"] + data["friction_coefficient_jump"]
     flat = still.expand_dims(relaxation_times=TIMES, axis=-1)
     found = FIT["relaxation"].compute({"": data.assign(friction_coefficient_after=still, friction_coefficient=flat)})
-    assert found["law_holds"].values.tolist() == ["not tested: nothing relaxes"]
+    assert found["fitted_law_holds"].values.tolist() == ["not tested: nothing relaxes"]
     assert np.all(np.isnan(found["rate"]))
 
 
@@ -122,28 +116,35 @@ def test_two_cases_are_enough_for_the_jump_law_and_one_is_not() -> None:
         FIT["jump_law"].compute({"": data.isel(velocity=slice(-4, -3))})
 
 
-def test_friction_is_drawn_as_it_is_where_no_slope_is_stored() -> None:
-    data = store(ABOVE, 0.7, 0.3)
-    divided, label = over_slope(data.drop_vars("rms_slope"))
-    assert (float(divided), label) == (1.0, r"$\mu$")
-    np.testing.assert_allclose(relaxing(data.drop_vars("rms_slope")), SLOPE * relaxing(data))
-
-
 def test_limits_of_the_jump() -> None:
     data = store(np.geomspace(1e-6, 1e3, 10), 0.7, 0.3, noise=0.0)
-    found = FIT["jump_limits"].compute({"": data}).squeeze()
+    found = FIT["jump_law"].compute({"": data}).squeeze()
     before = data["friction_coefficient_before"].mean("realisation").values / SLOPE
-    # the store follows eq. 4.11 with 0.42
-    low = before[before < 0.1]
-    first = found.sel(limit="region I")
-    assert first["found"].item() == pytest.approx(np.mean(jump_law(low, 0.42) / low), rel=0.01)
-    assert first["interpolated"].item() == pytest.approx(np.mean(jump_law(low, 0.4) / low), rel=1e-12)
-    assert first["cases"].item() == low.size
-    plateau = found.sel(limit="plateau")
-    assert plateau["found"].item() == pytest.approx(np.mean(jump_law(before[before > 1.1], 0.42)), rel=0.01)
-    assert plateau["limit_of_law"].item() == 0.4
-    with pytest.raises(FitError, match="rms_slope below"):
-        FIT["jump_limits"].compute({"": store(np.array([3e-3]), 0.7, 0.3)})
+    low = before[before < 0.1]  # the store follows eq. 4.11 with 0.42
+    assert found["zeta"].item() == pytest.approx(np.mean(jump_law(low, 0.42) / low), rel=0.01)
+    assert found["plateau_jump"].item() == pytest.approx(np.mean(jump_law(before[before > 1.1], 0.42)), rel=0.01)
+    assert found["zeta_holds"].item().startswith("yes")
+    assert found["plateau_holds"].item().startswith("yes")
+    only = FIT["jump_law"].compute({"": store(np.array([2e-3, 3e-3]), 0.7, 0.3)}).squeeze()
+    assert only["plateau_holds"].item() == "not tested: no case in this region"
+
+
+def test_jumps_proportional_to_the_change_are_linear_and_others_are_not() -> None:
+    changes = [-0.2, 0.1, 0.3]
+    data = axes(store(ABOVE[2:4], 0.7, 0.3), "velocity_change", changes)
+    for name in ("before", "jump", "after"):
+        data[f"friction_coefficient_{name}"] = data[f"friction_coefficient_{name}"].copy()
+    change = data["velocity_change"]
+    before = data["friction_coefficient_before"]
+    for bend, word in ((0.0, "yes"), (2.0, "no")):
+        jump = 0.9 * before * change * (1 + bend * change)
+        planted = data.assign(friction_coefficient_jump=jump, friction_coefficient_after=before + 0.8 * jump)
+        found = FIT["jump_linearity"].compute({"": planted})
+        assert np.all(found["law_holds"].str.startswith(word))
+        np.testing.assert_allclose(found["zeta"], 0.9, rtol=0.02)
+        np.testing.assert_allclose(found["zeta_trend"], bend, atol=0.05)
+    with pytest.raises(FitError, match="three sizes"):
+        FIT["jump_linearity"].compute({"": data.isel(velocity_change=slice(2))})
 
 
 def test_power_of_the_rate_in_both_regimes() -> None:
@@ -155,34 +156,25 @@ def test_power_of_the_rate_in_both_regimes() -> None:
     # slow traces end before they have relaxed
     assert powers["slow"]["power"].sel(regime="below").item() == pytest.approx(1.0, abs=0.05)
     assert np.isnan(powers["slow"]["power"].sel(regime="above").item())
-    assert powers["fast"]["power"].sel(regime="above").item() == pytest.approx(0.7, abs=1e-5)
+    assert powers["fast"]["power"].sel(regime="above").item() == pytest.approx(0.7, abs=1e-3)
     assert powers["fast"]["law_power"].sel(regime="above").item() == pytest.approx(0.7)
     rows = FIT["rate_power"].compute({"": axes(store(ABOVE, 0.8, 0.2), "normal_force", [1.0, 2.0])})
     assert rows["power"].dims == ("normal_force", "regime")
-    assert np.allclose(rows["power"].sel(regime="above"), 0.2, atol=1e-5)
+    assert np.allclose(rows["power"].sel(regime="above"), 0.2, atol=1e-3)
     with pytest.raises(FitError, match="three or more rates"):
         FIT["rate_power"].compute({"": store(ABOVE[:1], 0.3, 0.7)})
 
 
-def test_rate_and_state_terms() -> None:
+def test_rate_and_state_terms_give_the_trace_back() -> None:
     data = store(ABOVE, 0.0, 1.0)
-    found = FIT["rate_and_state"].compute({"": data})
-    step = np.log(1.2)
-    mean = data.mean("realisation")
-    assert np.allclose(found["direct_effect"], mean["friction_coefficient_jump"] / step)
-    change = (mean["friction_coefficient_after"] - mean["friction_coefficient_before"]).values
-    assert np.allclose(found["velocity_dependence"] * step, change)
-    assert np.allclose(found["direct_effect"] - found["evolution_effect"], found["velocity_dependence"])
-    # b = v_1 tau q_max: the slip length is v_2 / v_1 over q_max
-    assert np.allclose(found["slip_length"], 1.2 * LENGTH / np.pi / POINTS, rtol=1e-6)
-    assert np.allclose(found["slip_length_times_wavenumber"], 1.2, rtol=1e-6)
-    # the law itself gives the trace back
+    found = FIT["kinetics"].compute({"": data})
+    length = FIT["relaxation"].compute({"": data})["relaxation_length"].values[:, None]
+    step, mean = np.log(1.2), data.mean("realisation")
     slip = 1.2 * ABOVE[:, None] * TAU * TIMES
-    trace = mean["friction_coefficient_before"].values[:, None] + step * (
-        found["direct_effect"].values[:, None]
-        - found["evolution_effect"].values[:, None] * (1 - np.exp(-slip / found["slip_length"].values[:, None]))
-    )
-    assert np.allclose(trace, mean["friction_coefficient"], rtol=1e-6)
+    a, b = (found[f"{which}_effect"].values[:, None] for which in ("direct", "evolution"))
+    trace = mean["friction_coefficient_before"].values[:, None] + step * (a - b * (1 - np.exp(-slip / length)))
+    np.testing.assert_allclose(trace, mean["friction_coefficient"], rtol=1e-4)
+    np.testing.assert_allclose(a - b, found["velocity_dependence"].values[:, None])
 
 
 def test_failed_realisations_are_left_out() -> None:
@@ -204,57 +196,25 @@ def test_weights_integrate() -> None:
 
 def test_exponential_outside_its_first_grid() -> None:
     time = np.linspace(0, 1, 200)
-    rate, amplitude, left = exponential(time, 3 * np.exp(-5 * time)[None], widths(time))
-    assert (rate[0], amplitude[0]) == (pytest.approx(5, rel=1e-6), pytest.approx(3, rel=1e-6))
-    assert left[0] < 1e-12
+    rate, amplitude = exponential(time, 3 * np.exp(-5 * time)[None], widths(time))
+    assert (rate[0], amplitude[0]) == (pytest.approx(5, rel=1e-3), pytest.approx(3, rel=1e-3))
 
 
 def test_curves_of_a_relaxation_are_those_of_its_constants():
-    """What a figure draws of a stretched decay: each law by its formula, and two exponentials nearer than one."""
-    data = store(np.array([0.05]), 0.7, 0.3, shape=0.5)
-    found = relaxation_curves(data)
-    relaxing = ((data["friction_coefficient"] - data["friction_coefficient_after"]) / SLOPE).mean("realisation")[0]
-    inside = (found["t"] > TIMES[0]) & (found["t"] < found["window"])
-    planted = np.interp(found["t"][inside], TIMES, relaxing)
-    left = {name: np.abs(found[name][inside] - planted).max() for name in ("one", "two")}
-    assert left["two"] < 0.5 * left["one"]
+    found = relaxation_curves(store(np.array([0.05]), 0.7, 0.3, shape=0.5))
     rate = -np.polyfit(found["t"], np.log(found["one"]), 1)[0]
     assert rate == pytest.approx(found["rate"].item())
-    alike = -np.polyfit(found["t"], np.log(found["alike"]), 1)[0]
-    assert alike == pytest.approx(found["rate_unweighted"].item())
     assert np.all((found["one_low"] <= found["one"]) & (found["one"] <= found["one_high"]))
-    # on an axis of logarithms they begin long before the first time, and close up to nothing
-    assert found["t"][0] == 0.0
-    assert 0.0 < found["t"][1] < 1e-3 * found["window"]
 
 
 def test_rates_count_in_a_power_as_well_as_their_logarithms_are_known():
-    """Half-widths of logarithms are those of a bootstrap of eight realisations; one rate is hardly known."""
-    x, scatter = np.log([2.0, 5.0, 10.0, 20.0, 50.0]), np.array([0.02, 0.05, 0.1, 0.19, 0.6])
+    x, error = np.log([2.0, 5.0, 10.0, 20.0]), np.array([0.02, 0.05, 0.1, 0.19])
     random = np.random.default_rng(3)
-    logs = 0.4 * x + np.append([[0.0, 0.02, -0.05, 0.05, 0.0]], scatter * random.standard_normal((400, 5)), axis=0)
-    power, factor, deviation, number, _ = kinetics._power(x, np.exp(logs), np.full(5, 8))
-    low, high = np.quantile(logs[1:], [0.025, 0.975], axis=0)
-    half = np.sqrt(8 / 7) * t.ppf(0.975, 7) / norm.ppf(0.975) * (high - low) / 2
-    good = half < 0.5
-    assert good.tolist() == [True] * 4 + [False]
-    weights = 1 / ((half[good] / 2) ** 2 + 0.1**2)
-    slope, level = np.polyfit(x[good], logs[0, good], 1, w=np.sqrt(weights))
-    assert number == 4
-    assert power[0] == pytest.approx(slope, rel=1e-9)
+    logs = 0.4 * x + np.append([[0.0, 0.02, -0.05, 0.05]], error * random.standard_normal((400, 4)), axis=0)
+    (power, _, _, _, factor, *_), _ = kinetics._power(x, np.exp(logs), error, 0.4, 8)
+    slope, level = np.polyfit(x, logs[0], 1, w=1 / np.sqrt(error**2 + 0.1**2))
+    assert power == pytest.approx(slope, rel=1e-9)
     assert factor == pytest.approx(np.exp(level), rel=1e-9)
-    assert deviation == pytest.approx(np.std(logs[0, good] - slope * x[good] - level), rel=0.5)
-
-
-def test_a_figure_draws_each_exponential_that_was_fitted():
-    data = store(np.array([0.05]), 0.7, 0.3, shape=0.5)
-    figure = drawn("velocity_jump")["jump_fit"].figure({"": data.isel(velocity=0)})
-    found = relaxation_curves(data)
-    lines = {line.get_label(): line for line in figure.axes[0].lines}
-    for label, name in (("two exponentials", "two"), ("all times alike", "alike"), ("weights", "one")):
-        (line,) = (line for words, line in lines.items() if label in words)
-        np.testing.assert_allclose(np.sort(line.get_ydata()), np.sort(found[name].values))
-    plt.close(figure)
 
 
 def test_a_limit_is_not_tested_where_one_line_is_left() -> None:
@@ -263,6 +223,5 @@ def test_a_limit_is_not_tested_where_one_line_is_left() -> None:
     for name in levels:
         data[name][1, 1:] = np.nan
     data["friction_coefficient_jump"] = 2 * data["friction_coefficient_jump"]
-    found = FIT["jump_limits"].results({"one": data})["one"].sel(limit="region I")
-    assert found["cases"].item() == 2
-    assert found["law_holds"].item().startswith("not tested: too few realisations")
+    found = FIT["jump_law"].results({"one": data})["one"]
+    assert found["zeta_holds"].item().startswith("not tested: too few realisations")

@@ -13,6 +13,7 @@ POINTS, LENGTH, TAU, SLOPE, CHANGE = 5000, 0.01, 1e-3, 0.07, 0.2
 WAVENUMBER = np.pi * POINTS / LENGTH
 SHARE = 0.25  # of the jump that relaxes
 LEAST = 0.9  # 95 % less 2.3 standard deviations of a share of 100 stores
+pytestmark = pytest.mark.slow
 LINES = pytest.mark.parametrize("lines", [5, 30])
 
 
@@ -58,7 +59,7 @@ def coverage(found: xr.Dataset, name: str, truth: object) -> float:
 
 
 def said(found: xr.Dataset, verdict: str) -> float:
-    return float(found["law_holds"].str.startswith(verdict).mean())
+    return float(found["fitted_law_holds"].str.startswith(verdict).mean())
 
 
 @LINES
@@ -71,11 +72,11 @@ def test_jump_and_rate_and_state_terms(lines: int) -> None:
     assert coverage(found, "zeta", jump / before / CHANGE) >= LEAST
     assert coverage(found, "xi", (1 - SHARE) * jump / before / CHANGE) >= LEAST
     assert coverage(found, "relaxing_over_slope", SHARE * jump) >= LEAST
-    terms = FIT["rate_and_state"].compute({"": data})
+    lengths = FIT["relaxation"].compute({"": data})
     rate = (0.01 * TAU * WAVENUMBER) ** 0.5
-    assert coverage(terms, "direct_effect", jump * SLOPE / np.log(1.2)) >= LEAST
-    assert coverage(terms, "evolution_effect", SHARE * jump * SLOPE / np.log(1.2)) >= LEAST
-    assert coverage(terms, "slip_length", 1.2 * 0.01 * TAU / rate) >= LEAST
+    assert coverage(found, "direct_effect", jump * SLOPE / np.log(1.2)) >= LEAST
+    assert coverage(found, "evolution_effect", SHARE * jump * SLOPE / np.log(1.2)) >= LEAST
+    assert coverage(lengths, "relaxation_length", 1.2 * 0.01 * TAU / rate) >= LEAST
 
 
 @LINES
@@ -83,7 +84,6 @@ def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
     found = FIT["relaxation"].compute({"": studies(np.array([0.05]), 100, lines)})
     rate = (0.05 * TAU * WAVENUMBER) ** 0.5
     assert coverage(found, "rate", rate) >= LEAST
-    assert coverage(found, "rate_unweighted", rate) >= LEAST
     # the trapezoidal rule on 9 moments a decade adds 2 %
     assert coverage(found, "integral_rate", 0.98 * rate) >= LEAST
     # the truth is one exponential, and is doubted by chance only
@@ -91,20 +91,12 @@ def test_rate_and_when_one_exponential_is_enough(lines: int) -> None:
 
 
 @LINES
-def test_stretched_exponential(lines: int) -> None:
-    found = FIT["relaxation_shape"].compute({"": studies(np.array([0.05]), 100, lines, shape=0.5)})
-    assert coverage(found, "stretched_exponent", 0.5) >= LEAST
-    assert coverage(found, "stretched_rate", (0.05 * TAU * WAVENUMBER) ** 0.5) >= LEAST
-
-
-@LINES
 def test_power_of_the_rate_of_lines_that_all_velocities_share(lines: int) -> None:
     found = FIT["rate_power"].compute({"": studies(np.geomspace(1e-3, 1, 3), 100, lines)}).sel(regime="above")
     assert coverage(found, "power", 0.5) >= LEAST
-    assert coverage(found, "power_unweighted", 0.5) >= LEAST
     # five lines do not know every rate to a factor of 1.6, and the fit says so
     unknown = found["power"].isnull()
-    assert np.all(found["law_holds"].where(unknown, "not tested").str.startswith("not tested"))
+    assert np.all(found["fitted_law_holds"].where(unknown, "not tested").str.startswith("not tested"))
     assert said(found, "no:") < 0.08
 
 
@@ -116,13 +108,8 @@ def test_constant_and_limits_of_the_jump(lines: int) -> None:
     found = xr.concat(results, "store")
     assert coverage(found, "constant", 0.42) >= LEAST
     assert said(found, "no:") < 0.08
-    limits = [FIT["jump_limits"].compute({"": data.isel(normal_force=k)}).squeeze() for k in range(100)]
-    first = xr.concat(limits, "store").sel(limit="region I")
-    x = speeds * TAU * WAVENUMBER
-    # which cases lie in region I is a matter of their mean: two of them always, with the lines of all stores
-    assert set(first["cases"].values) == {2}
-    before = 0.05 * np.sqrt(x[:2])
-    assert coverage(first, "found", np.mean(jump_law(before, 0.42) / before)) >= LEAST
+    before = 0.05 * np.sqrt(speeds[:2] * TAU * WAVENUMBER)  # the two cases in region I
+    assert coverage(found, "zeta", np.mean(jump_law(before, 0.42) / before)) >= LEAST
 
 
 def stated(data: xr.Dataset, grid: float) -> xr.Dataset:
@@ -163,7 +150,7 @@ def test_an_error_of_the_trace_that_is_stated_is_held(lines: int) -> None:
     data["friction_coefficient"] = trace.assign_attrs(ancillary_variables="friction_coefficient_error")
     found = FIT["relaxation"].compute({"": data})
     # the trapezoidal rule on 9 moments a decade adds 2 %
-    for name, truth in (("rate", rate), ("rate_unweighted", rate), ("integral_rate", 0.98 * rate)):
+    for name, truth in (("rate", rate), ("integral_rate", 0.98 * rate)):
         assert coverage(found, name, truth) >= LEAST
     assert said(found, "no:") == 0
 
@@ -176,8 +163,7 @@ def test_jumps_by_another_law_are_named(lines: int) -> None:
     found = FIT["jump_law"].compute({"": data.assign(friction_coefficient_jump=before**2)}).squeeze()
     assert found["law_holds"].item().startswith("no: departs by")
     assert found["constant_high"] / found["constant_low"] > 3
-    limits = FIT["jump_limits"].compute({"": data.assign(friction_coefficient_jump=before**2)}).squeeze()
-    assert limits["law_holds"].sel(limit="region I").item().startswith("no: departs by")
+    assert found["zeta_holds"].item().startswith("no: departs by")
 
 
 @LINES
@@ -193,7 +179,7 @@ def test_rates_with_a_step_are_named(lines: int, same: bool) -> None:
     if same:
         data = data.map(lambda values: values.mean("realisation").broadcast_like(values) if values.ndim > 1 else values)
     found = FIT["rate_power"].compute({"": data}).sel(regime="above").isel(normal_force=0)
-    assert found["law_holds"].item().startswith("no: departs by" if same or lines > 5 else ("no: ", "not tested: "))
+    assert not found["fitted_law_holds"].item().startswith("yes")
     if np.isfinite(found["power"]):
         assert found["power_high"] - found["power_low"] > 0.1
 
@@ -207,11 +193,6 @@ def test_two_exponentials_are_not_one(lines: int) -> None:
     trace = data["friction_coefficient_after"] + start * (0.6 * np.exp(-0.3 * run) + 0.4 * np.exp(-10 * run))
     data["friction_coefficient"] = trace.transpose(*data["friction_coefficient"].dims)
     found = FIT["relaxation"].compute({"": data})
-    assert said(found, "no: one exponential leaves") == 1
+    assert said(found, "yes") == 0
     assert np.all(found["rate_high"] / found["rate_low"] > 1.3)
-    terms = FIT["rate_and_state"].compute({"": data})
-    assert said(terms, "no: one exponential leaves") == 1
-    assert np.all(terms["slip_length_high"] / terms["slip_length_low"] > 1.3)
-    shape = FIT["relaxation_shape"].compute({"": data})
-    assert said(shape, "yes: two exponentials") == 1
-    assert coverage(shape, "slow_rate", 0.3 * rate) == 1
+    assert np.all(found["relaxation_length_high"] / found["relaxation_length_low"] > 1.3)
