@@ -91,7 +91,7 @@ def surface(
             [{name: row[name] for name in known} for row in rows], {n: units[n] for n in known}
         )
     print_rows(rows, units, form or "table")
-    for note in (*(read.notes() if not anisotropic else ()), *anisotropic):
+    for note in read.notes():
         click.echo(_as_options(note), err=True)
     click.echo(_method(read), err=True)
 

@@ -56,8 +56,10 @@ def read_map(file: DataFile, units: Units) -> Recorded:
     DataError
         If the file holds no map, if a unit or spacing is missing, or if the file says something else than `units`.
     """
+    axes: tuple[float, float] | None = None
+    remarks: tuple[str, ...] = ()
     if file.name.lower().endswith(".npy"):
-        rows, axes, remarks = _array(file), None, ()
+        rows = _array(file)
     elif (channel := _channel(file)) is not None:
         if channel.dim != 2:
             raise DataError(f"{file.name}: expected a map, got a line scan: name it by `scan` instead of `map`")

@@ -86,6 +86,8 @@ def _notes(surface: Surface, file: DataFile, found: Found, spectrum: Spectrum) -
         f"spectrum of the line: wavelengths {shown(shortest, 'm')} to {shown(longest, 'm')}, "
         f"rms height {shown(spectrum.rms_height(), 'm')}, rms gradient {spectrum.rms_gradient():.3g}"
     )
+    if surface.map is not None and (reason := anisotropic(surface.map, file)):
+        return (*(f"surface {file.name}: {remark}" for remark in found.remarks), f"surface {reason}")
     notes = [statistics, *found.remarks]
     if found.resolution:
         noise = f"wavelengths below {shown(found.resolution, 'm')} are noise"

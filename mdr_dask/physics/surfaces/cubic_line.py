@@ -1,4 +1,4 @@
-"""The line that the solvers take: cubic cells between equidistant nodes, and its cells counted from the highest point.
+"""The line used by the solvers: cubic cells between equidistant nodes, counted from the highest point.
 
 Lengths are in cells and slopes are rises over a cell. Heights, in any unit, point into the elastomer.
 """
@@ -43,7 +43,7 @@ class CubicLine(NamedTuple):
 
 
 def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
-    """Return a periodic line of cubic cells, or of straight ones where there are no slopes.
+    """Return a periodic line of cubic cells, or of straight cells if no slopes are given.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def periodic_line(height: FloatArray, slope: FloatArray | None) -> CubicLine:
 
 
 def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Shape) -> CubicLine:
-    """Return the line of a rough indenter, of cubic cells or of straight ones where there are no slopes.
+    """Return the line of a rough indenter with cubic cells, or with straight cells if no slopes are given.
 
     Parameters
     ----------
@@ -81,13 +81,13 @@ def indented_line(height: FloatArray, slope: FloatArray | None, body: shapes.Sha
 
 
 def without_kinks(line: CubicLine) -> CubicLine:
-    """Return the line with the mean of both slopes at every inner node: a kink is rounded over the cells beside it."""
+    """Return the line with both slopes averaged at every inner node; a kink is rounded over two cells."""
     slope = 0.5 * (line.leave[:-1] + line.enter[1:])
     return line._replace(enter=np.append(line.enter[0], slope), leave=np.append(slope, line.leave[-1]))
 
 
 class Cells(NamedTuple):
-    """The n cells of a line, a periodic one from its highest point on, with one more at the end that repeats the first.
+    """The n cells of a line, starting at the highest point if it is periodic, and one more cell that repeats the first.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def cubic(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def summit(a: float, b: float, c: float) -> float:
-    """Return where between 0 and 1 a cubic has its maximum, or `NONE`."""
+    """Return the position of the maximum of a cubic between 0 and 1, or `NONE`."""
     discriminant = b * b - 3 * a * c
     if not discriminant > 0:
         return NONE
@@ -141,7 +141,7 @@ def summit(a: float, b: float, c: float) -> float:
 
 @jit_inline
 def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> tuple[float, float]:
-    """Return the highest point of a cell, and where in the cell it is."""
+    """Return the position within a cell of its highest point, and the height there."""
     here, after = np.uintp(i), np.uintp(i + 1)
     first, last, begin, end = enter[here], leave[here], height[here], height[after]
     rise, place, peak = end - begin, 0.0 if begin >= end else 1.0, max(begin, end)
@@ -157,7 +157,7 @@ def _peak(height: FloatArray, enter: FloatArray, leave: FloatArray, i: int) -> t
 
 @jit
 def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[int, float, float]:
-    """Return the first cell that reaches the highest point of a line, the place in it, and the height."""
+    """Return the first cell that contains the highest point of a line, the position in the cell, and the height."""
     best, place, highest = 0, 0.0, -np.inf
     for i in range(enter.size):
         rise = STEEPEST_RISE * (max(enter[i], 0.0) + max(-leave[i], 0.0))
@@ -169,7 +169,7 @@ def _highest(height: FloatArray, enter: FloatArray, leave: FloatArray) -> tuple[
 
 
 def cut(line: CubicLine) -> Cells:
-    """Cut a line into its cells, a periodic one at its highest point."""
+    """Split a line into its cells; a periodic line starts at its highest point."""
     best, place, top = _highest(line.height, line.enter, line.leave)
     if line.smooth and place == 1:  # a turn begins with a whole cell, wherever the line begins
         best, place = (best + 1) % line.enter.size, 0.0
@@ -181,7 +181,7 @@ def cut(line: CubicLine) -> Cells:
 
 @jit
 def running(integrals: FloatArray) -> FloatArray:
-    """Return the integral up to every node from those over the cells, shape (cells + 1,)."""
+    """Return the cumulative integral at each node from the integrals over the cells, shape (cells + 1,)."""
     summed, total = np.empty(integrals.size + 1), 0.0
     for i in range(integrals.size):
         summed[i] = total
@@ -194,7 +194,7 @@ def running(integrals: FloatArray) -> FloatArray:
 def _turned(
     line: CubicLine, top: float, first: int
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the arrays of the cells from a cell on, with that cell once more at the end, heights from the top."""
+    """Return the cells rotated to start at a given one, repeated at the end; heights are relative to the top."""
     nodes, entered, left, n = line.height, line.enter, line.leave, line.enter.size
     height, enter, leave, peak, mean, stretch = (
         np.empty(n + 2),
@@ -220,14 +220,14 @@ def _turned(
 
 
 def _is_resolved(slope: FloatArray, stretch: FloatArray) -> bool:
-    """Return whether nodes and cells know the slope squared alike, which two nodes a wave do not."""
+    """Return whether the sum over nodes equals the integral of the squared slope (more than two nodes a wave)."""
     by_nodes, by_cells = np.dot(slope, slope), np.sum(stretch)
     return bool(abs(by_nodes - by_cells) < UNRESOLVED * by_cells)
 
 
 @jit
 def _resum(slope: FloatArray, stretch: FloatArray) -> None:
-    """Write the integrals of the slope squared over cells by Euler and Maclaurin, the same over the whole line.
+    """Write the integrals of the squared slope over cells by the Euler-Maclaurin formula; the total is exact.
 
     The first cell is cut in two and integrated as a polynomial, and keeps that value: the others take the difference.
     """

@@ -1,4 +1,4 @@
-"""Areal maps: from recorded heights to rings of the isotropic spectrum, straight cuts, slopes and their directions."""
+"""Areal maps: spectrum in rings of the wave vector, straight cuts, slopes and anisotropy."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Order = Literal["none", "mean", "plane", "parabola"]
 
 LEAST_POINTS = 16  # along each axis
 MOST_MISSING = 0.05  # share of the points that may be filled
-FAR = 19.0  # robust standard deviations that no roughness reaches: ``python -m benchmarks surfaces outliers``
-BAND = 128  # rows that stay in the cache
-TELLING = 1e-3  # of the largest ring
+FAR = 19.0  # robust standard deviations; no generated rough surface reaches it
+BAND = 128  # rows processed at once, so that they fit into the processor's cache
+TELLING = 1e-3  # share of the largest ring below which a ring may be rounding
 MOST_SCATTER = 0.02  # mean square of the angular harmonics that an isotropic octave may have by chance
-FLAT = 1e-12  # of the largest height
-ROUNDING = 1e-20  # of the largest ring: what is left by the transform where there are no waves
-HANN_MODES = 0.3  # independent waves of a map under Hann's window, for every wave of the transform
+FLAT = 1e-12  # range of heights over the largest height, below which a map is flat
+ROUNDING = 1e-20  # share of the largest ring that rounding of the transform leaves
+HANN_MODES = 0.3  # independent waves per wave of the transform, under Hann's window
 
 
 class SurfaceMap(NamedTuple):
@@ -43,7 +43,7 @@ class SurfaceMap(NamedTuple):
 
 
 def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
-    """Return which points stick out of their neighbours along both axes, by `FAR` times what is usual."""
+    """Return the points more than `FAR` robust standard deviations from their neighbours along both axes."""
     height = surface.height
     away = np.empty((max(height.shape[0] - 2, 0), max(height.shape[1] - 2, 0)))
     for first in range(0, away.shape[0], BAND):
@@ -57,16 +57,16 @@ def outliers(surface: SurfaceMap) -> NDArray[np.bool_]:
     for down, right in np.ndindex(3, 3):
         beside = np.clip(row + down - 1, 0, away.shape[0] - 1), np.clip(column + right - 1, 0, away.shape[1] - 1)
         largest = np.fmax(largest, away[beside])
-    # a point beside an outlier is one itself only if it sticks out nearly as far
+    # a neighbour of an outlier is an outlier only if it deviates nearly as much
     telling = away[row, column] > 0.5 * largest
     found[row[telling] + 1, column[telling] + 1] = True
     return found
 
 
 def _off_neighbours(height: FloatArray) -> FloatArray:
-    """Return how far inner points are from the middle between their neighbours, along the axis that tells them better.
+    """Return the distance of inner points from the mean of their two neighbours, along the axis where it is smaller.
 
-    A crest is level along itself: where points lie closer along one axis, those on it are far from the others only.
+    A point on a crest is close to its neighbours along the crest, though far from those across it.
     """
     middle = height[1:-1, 1:-1]
     along = np.abs(middle - 0.5 * (height[2:, 1:-1] + height[:-2, 1:-1]))
@@ -99,7 +99,7 @@ def filled(surface: SurfaceMap) -> SurfaceMap:
 
 
 def _harmonic(height: FloatArray, missing: NDArray[np.bool_]) -> FloatArray:
-    """Return heights whose missing ones are the mean of their neighbours."""
+    """Return heights in which each missing one is the mean of its four neighbours."""
     number = np.full(height.shape, -1)
     number[missing] = np.arange(np.count_nonzero(missing))
     size, diagonal, right = number.max() + 1, np.zeros(number.max() + 1), np.zeros(number.max() + 1)
@@ -145,7 +145,7 @@ def without_trend(surface: SurfaceMap, order: Order) -> SurfaceMap:
 
 
 def hann_disc(points: tuple[int, int], size: tuple[float, float]) -> FloatArray:
-    """Return Hann's window of the distance from the middle, 0 beyond half the shorter side, of a mean square of one."""
+    """Return Hann's window of the distance from the middle, with mean square 1; 0 beyond half the shorter side."""
     x, y = (length * np.arange(n // 2 + 1) / n for n, length in zip(points, size, strict=True))
     distance = np.minimum(np.hypot(x[:, None], y) / (0.5 * min(size)), 1.0)
     quarter = 0.5 + 0.5 * np.cos(np.pi * distance)
@@ -167,17 +167,17 @@ class MapSpectrum:
     count : array, shape (rings,)
         Number of waves in each, both signs.
     independent : float
-        Independent ones for each of them.
+        Independent waves per wave.
     rms_height : float
-        Of all waves, m.
+        rms height of the windowed map, m.
     slopes : tuple of float
         Mean squares of the slopes along x and y, and of their product.
     angular : complex array, shape (2, rings)
-        Mean of exp(2 i angle) and exp(4 i angle) over the power of each ring: 0 of an isotropic one.
+        Mean of exp(2 i angle) and exp(4 i angle), weighted by power, in each ring; 0 if isotropic.
     cuts : tuple of (array, array)
         Wave numbers and C_cut, m^3, of straight cuts along x and along y.
     axes : tuple of float
-        Power of the waves along x and along y over that of their rings, in the middle: 1 of an isotropic surface.
+        Median over rings of the power of waves along x and along y over the mean power of the ring; 1 if isotropic.
     """
 
     wavenumber: FloatArray
@@ -196,30 +196,31 @@ class MapSpectrum:
         return float(np.sqrt(self.slopes[0] + self.slopes[1]))
 
     def spectrum(self) -> Spectrum:
-        """Return C2D between the first ring and the last that hold any power."""
+        """Return C2D between the first and the last ring that contain power."""
         there = np.flatnonzero(self.density > ROUNDING * self.density.max(initial=0.0))
         rings = slice(there[0], there[-1] + 1)
         return Spectrum(self.wavenumber[rings], np.maximum(self.density[rings], ROUNDING * self.density.max()))
 
     def binned(self) -> Cut:
-        """Return C2D in logarithmic bins with its relative errors."""
+        """Return C2D in logarithmic bins with relative errors."""
         there = self.density > ROUNDING * self.density.max(initial=0.0)
         rings = self.wavenumber[there], self.density[there], 0.5 * self.independent, self.count[there]
         return averaged(*rings)
 
     def along(self, axis: int) -> Spectrum:
-        """Return the C2D whose line is the straight cut along an axis, 0 for x: for grooves across the motion."""
+        """Return the C2D whose line is the straight cut along an axis (0 for x), for sliding across grooves."""
         q, cut = self.cuts[axis]
         there = cut > ROUNDING * cut.max()
         return Spectrum(q[there], cut[there] / (np.pi * q[there]))
 
     def anisotropy(self) -> float:
-        """Return how far the rings are from isotropy: 0, to 1 of waves in one direction only; scatter is taken off.
+        """Return the anisotropy: 0 for isotropic, 1 for waves in one direction only; corrected for scatter.
 
-        The larger one of the second and the fourth harmonic of the angle, rms over octaves with enough waves.
+        It is the larger of the second and fourth harmonics of the angle, rms over octaves with enough waves.
         """
         there = np.flatnonzero(telling(self.wavenumber, self.density))
         octave = np.floor(np.log2(self.wavenumber[there] / self.wavenumber[there[0]] + 1e-9)).astype(int)
+        _, octave = np.unique(octave, return_inverse=True)  # octaves without a ring do not count
         power = self.density[there] * self.wavenumber[there]
         weight = np.bincount(octave, power)
         scatter = np.bincount(octave, power**2 * 2 / (self.count[there] * self.independent)) / weight**2
@@ -239,7 +240,7 @@ def spectrum_of_map(surface: SurfaceMap, hann: bool = True) -> MapSpectrum:
     surface : SurfaceMap
         Without its trend.
     hann : bool
-        Whether to window it by `hann_disc`; only a periodic map needs none.
+        Whether to apply the window `hann_disc`. A periodic map needs none.
     """
     points, size = surface.height.shape, surface.size
     height = surface.height - surface.height.mean()
@@ -308,19 +309,19 @@ def _rings(
 
 
 def telling(wavenumber: FloatArray, density: FloatArray) -> NDArray[np.bool_]:
-    """Return which rings tell something of the height or of the gradient, and not of the rounding of a file."""
+    """Return the rings that contribute to the height or to the gradient beyond the rounding of a file."""
     height, gradient = density * wavenumber, density * wavenumber**3
     return np.asarray((height > TELLING * height.max()) | (gradient > TELLING * gradient.max()))
 
 
 def _cut(power: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return wave numbers and two-sided C_cut of the power of both signs."""
+    """Return wave numbers and two-sided C_cut from the summed power of both signs."""
     step = 2 * np.pi / length
     return np.asarray(step * np.arange(1, power.size + 1), dtype=np.float64), power / (2 * step)
 
 
 def _axis(power: FloatArray, ring: NDArray[np.int32], total: FloatArray, count: FloatArray) -> float:
-    """Return the power of waves along an axis over that of a wave of their rings, in the middle over all rings."""
+    """Return the median over rings of the power of waves along an axis over the mean power in the ring."""
     number = np.arange(1.0, total.size + 1)
     alive = number[telling(number, total / number)]
     inner = (ring >= 4) & np.isin(ring, alive)

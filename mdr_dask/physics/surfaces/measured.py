@@ -105,7 +105,7 @@ def _window(points: int, taper: float) -> FloatArray:
 
 
 def detrended(height: FloatArray, order: Detrend) -> FloatArray:
-    """Return heights without their best polynomial of order 0 to 2, as `measured_line` names them."""
+    """Return heights minus their least-squares polynomial; the orders are named as in `measured_line`."""
     if order == "none":
         return height.copy()
     place = np.linspace(-1, 1, height.size)
@@ -114,7 +114,7 @@ def detrended(height: FloatArray, order: Detrend) -> FloatArray:
 
 
 def band_limited(height: FloatArray, length: float, shortest: float = 0.0, longest: float = 0.0) -> FloatArray:
-    """Return a periodic line without waves shorter or longer than two wavelengths; 0 keeps that end, the mean stays."""
+    """Return a periodic line without the waves below the first or above the second wavelength; 0 keeps that end."""
     waves = np.fft.rfft(height)
     number = np.arange(waves.size)
     if shortest > 0:
@@ -139,7 +139,7 @@ def rms_height(height: FloatArray) -> float:
 
 
 def rms_slope(height: FloatArray, length: float) -> float:
-    """Return the spectral rms slope of the periodic line through samples, down to the wave of two points."""
+    """Return the spectral rms slope of the periodic line through samples, including the wave of two points."""
     return waves_of(height).rms_slope() / length
 
 

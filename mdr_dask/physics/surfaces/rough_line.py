@@ -1,4 +1,4 @@
-"""Roughness over what is under it: the line that problems are stated on, before it is put on a grid."""
+"""A rough line before discretisation: roughness, on a plane or on an indenter."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class RoughLine:
         return self.roughness.heights(nodes)
 
     def slopes(self, nodes: int) -> FloatArray:
-        """Return its derivative by position, over the length of the line."""
+        """Return the derivative of the roughness with respect to x / L."""
         return self.roughness.slopes(nodes)
 
     def through(self, height: FloatArray, slope: FloatArray | None) -> CubicLine:
-        """Return the line of cubic cells through heights and slopes of the roughness; straight cells without slopes."""
+        """Return the line of cubic cells through heights and slopes, or of straight cells if no slopes are given."""
         return periodic_line(height, slope) if self.body is None else indented_line(height, slope, self.body)
 
     def cubic(self, nodes: int) -> CubicLine:
@@ -53,7 +53,7 @@ class RoughLine:
         return self.through(self.heights(nodes), None)
 
     def from_summit(self) -> RoughLine:
-        """Return a periodic line from its highest point on, which every grid has a node at; one of a body as it is."""
+        """Return a periodic line shifted so that its highest point is a node of every grid."""
         if self.body is not None:
             return self
         nodes = SEEN * self.points

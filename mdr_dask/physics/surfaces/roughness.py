@@ -85,7 +85,7 @@ def _generator(seed: int, realisation: int) -> np.random.Generator:
 
 
 def phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
-    """Return exp(i phi_k) of the phases of a realisation, shape (modes,), kept for the next line of it."""
+    """Return exp(i phi_k) for the phases of a realisation, shape (modes,); cached."""
     # rounded up, so that lines of many cut-offs share them
     return _phase_factors(seed, realisation, 1 << max(modes - 1, 0).bit_length())[:modes]
 
@@ -101,7 +101,7 @@ def _phase_factors(seed: int, realisation: int, modes: int) -> ComplexArray:
 
 @jit
 def _turn(share: FloatArray, factors: FloatArray) -> None:
-    """Write cosine and sine of shares 0..1 of a turn, to rounding: series about the nearest quarter, vectorised."""
+    """Write cosine and sine of fractions 0..1 of a revolution by series about the nearest quarter."""
     for k in range(share.size):
         quarter = np.floor(4 * share[k] + 0.5)
         x = 2 * np.pi * (share[k] - 0.25 * quarter)

@@ -19,10 +19,10 @@ from mdr_dask.physics.surfaces.measured import MeasuredLine
 from mdr_dask.physics.surfaces.spectrum import Spectrum, quadrature
 
 BINS = 10  # for every decade of the wave number
-BEND = 3.0  # standard deviation that is granted to a change of the slope d log C2D / d log q from bin to bin
+BEND = 3.0  # prior standard deviation of the change of d log C2D / d log q from bin to bin
 NOISE_SLOPE = -0.5  # a tail of a cut that is flatter is noise: d log C / d log q is -1 of H = 0
-NOISE_TAIL = 0.5  # decades at its end
-STEEPEST = 30.0  # fall d log C / d log q from bin to bin that is an end of the spectrum
+NOISE_TAIL = 0.5  # decades at the end of the cut that are tested for noise
+STEEPEST = 30.0  # a steeper fall -d log C / d log q is the end of the spectrum
 
 
 class Cut(NamedTuple):
@@ -56,7 +56,7 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
     lines : sequence of MeasuredLine
         Detrended scans of one length and spacing.
     hann : bool
-        Whether to window them by Hann's window, normalised so that <h^2> is kept.
+        Whether to apply Hann's window, normalised so that <h^2> is kept.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def cut_of_lines(lines: Sequence[MeasuredLine], hann: bool = True) -> Cut:
 
 
 def averaged(wavenumber: FloatArray, density: FloatArray, independent: float, count: FloatArray | None = None) -> Cut:
-    """Average a spectrum in logarithmic bins, so that the power of each is kept.
+    """Average a spectrum in logarithmic bins; the power in each bin is kept.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def hann_window(points: int) -> FloatArray:
 
 
 def _until_the_end(cut: Cut) -> slice:
-    """Return the bins before the spectrum ends: before its first fall that is steeper than that of any roughness."""
+    """Return the bins before the end of the spectrum, the first fall steeper than `STEEPEST`."""
     with np.errstate(divide="ignore"):
         logs = np.log(cut.density)
     falls = np.flatnonzero(np.diff(logs) < -STEEPEST * np.diff(np.log(cut.wavenumber)))
@@ -112,11 +112,11 @@ def _until_the_end(cut: Cut) -> slice:
 
 
 def of_cut(cut: Cut) -> Spectrum:
-    """Return the isotropic spectrum whose cut is the one given.
+    """Return the isotropic spectrum with a given cut (inverse Abel transform).
 
-    C2D is a power law between the wave numbers of the cut, so that it is positive. Its logarithms there are the most
-    likely ones: the cut is known within its errors, and the slope changes from one to the next by a standard deviation
-    of `BEND`. Noise is not amplified, as it is by -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk.
+    C2D is a power law between the wave numbers of the cut, so that it is positive. Its logarithms are fitted to the
+    cut within the cut's errors. The change of slope from bin to bin has a normal prior of standard deviation `BEND`. The
+    explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
     ------
@@ -126,7 +126,9 @@ def of_cut(cut: Cut) -> Spectrum:
     q, density, error = (np.asarray(column, dtype=np.float64)[_until_the_end(cut)] for column in cut)
     if q.size < 3:
         raise DataError(f"expected a spectrum of three wave numbers or more, got {q.size}")
-    edge = q[-1] ** 2 / q[-2]  # the cut at the last wave number is of shorter waves: they end one step beyond
+    edge = (
+        q[-1] ** 2 / q[-2]
+    )  # the cut at the last wave number comes from shorter waves, which are taken to end one step beyond
     knots = np.append(q, edge)
     place, weight = quadrature(q, knots)
     where = np.clip(np.searchsorted(knots, place, side="right") - 1, 0, knots.size - 2)

@@ -1,4 +1,4 @@
-"""What a measured spectrum says of its surface: Hurst exponent, cut-offs, and where the instrument ends."""
+"""Parameters of a measured spectrum: Hurst exponent, cut-off wavelengths, and the resolution of the instrument."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class SelfAffine(NamedTuple):
 
 
 def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> float:
-    """Return the wave number beyond which a spectrum is the flat one of noise, infinite if it is not.
+    """Return the wave number beyond which the spectrum is flat, as that of noise; infinite if there is no such tail.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def noise_limit(bins: Cut, flattest: float = FLATTEST, decades: float = 0.3) -> 
 
 
 def steep_limit(bins: Cut) -> float:
-    """Return the wave number from which C2D falls more steeply than that of any roughness, infinite if it does not."""
+    """Return the wave number beyond which C2D falls more steeply than any roughness; infinite if it never does."""
     wavenumber, density = bins.wavenumber, bins.density
     there = density > 0
     x, y = np.log(wavenumber[there]), np.log(density[there])
@@ -71,7 +71,7 @@ def steep_limit(bins: Cut) -> float:
 
 
 def fit_self_affine(bins: Cut) -> SelfAffine | None:
-    """Fit a power law with a bend at either end where the data show one; None of too few bins, or no such law.
+    """Fit a power law with cut-offs where the data show them; None if there is no power law or too few bins.
 
     Parameters
     ----------

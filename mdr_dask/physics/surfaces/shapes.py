@@ -30,17 +30,17 @@ def mapped(exponent: float) -> float:
 
 
 class Shape(Protocol):
-    """The line of a body under the roughness: what an indenter has to say of itself to the solvers."""
+    """The line of an indenter: the interface that the solvers use."""
 
     def at(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the height into the elastomer, 0 at the tip, and the slopes on the left and right of every x."""
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that acts like the line."""
+        """Return height and slope of the body of revolution that corresponds to the line."""
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Radii at which the body is not smooth."""
+        """Radii at which the slope or the curvature jumps."""
 
     def scaled(self, length: float, height: float) -> Shape:
         """Return the shape in other units of length and height."""
@@ -68,11 +68,11 @@ class PowerLaw:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """The body is smooth but for its tip."""
+        """The body is smooth except at its tip."""
         return ()
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that acts like the line."""
+        """Return height and slope of the body of revolution that corresponds to the line."""
         height = self.coefficient / mapped(self.exponent) * r**self.exponent
         return height, np.where(r > 0.0, self.exponent * height / np.where(r > 0.0, r, 1.0), 0.0)
 
@@ -117,7 +117,7 @@ class RoundedCone:
         return (self.blend,)
 
     def body(self, r: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return height and slope of the body of revolution that acts like the line."""
+        """Return height and slope of the body of revolution that corresponds to the line."""
         height = np.where(r <= self.blend, 0.5 * r**2 / self.blend, r - 0.5 * self.blend)
         return self.steepness * height, self.steepness * np.minimum(r / self.blend, 1.0)
 

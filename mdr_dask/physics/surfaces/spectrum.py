@@ -1,4 +1,4 @@
-"""The isotropic spectrum of a surface: power laws between points, and the line, the cut and the moments that follow.
+"""The isotropic spectrum of a surface: power laws between points; line, cut and moments derived from it.
 
 Angular wave numbers q are in rad/m; spectra are two-sided (thesis 2.12 and 2.13).
 """
@@ -69,7 +69,7 @@ class Spectrum:
         return density
 
     def line(self, length: float, modes: int) -> FloatArray:
-        """Return the amplitudes of the line that the method puts in the place of the surface.
+        """Return the amplitudes of the MDR line of the surface.
 
         Parameters
         ----------
@@ -108,7 +108,8 @@ class Spectrum:
     def continued(self, longest: float = 0.0, shortest: float = 0.0, decades: float = 1.0) -> Spectrum:
         """Return the spectrum with power laws to wavelengths, m, beyond its ends; 0 leaves that end.
 
-        Each goes on from the last point with the slope of a straight line through the logarithms of the last decade.
+        Each power law starts at the last point, with the slope of a straight line fitted to the logarithms of the last
+        decade.
         """
         q, density = [self.wavenumber], [self.density]
         for index, end in (
@@ -143,7 +144,7 @@ class Spectrum:
         """Return the integral of q^order C2D, exact for power laws."""
         q, value = self._logs[0], np.exp(self._logs[1] + (order + 1) * self._logs[0])
         rise = np.diff(np.log(value))
-        # int exp(v) dx of a straight v: the mean of its ends, weighted
+        # int exp(v) dx for linear v is the logarithmic mean of its end values
         small = np.abs(rise) < 1e-8
         safe = np.where(small, 1.0, rise)
         mean = np.where(small, 0.5 * (value[1:] + value[:-1]), np.diff(value) / safe)
@@ -172,7 +173,7 @@ def self_affine(hurst: float, longest: float, shortest: float, rms: float = 1.0,
 
 
 def quadrature(wavenumber: FloatArray, edges: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return places k and weights of the integral along a cut, for every wave number, shape (wave numbers, places).
+    """Return nodes k and weights of the integral along a cut, shape (wave numbers, nodes).
 
     sum(weight * C2D(k)) = 2 int C2D(k) k / sqrt(k^2 - q^2) dk over k from q on, for a C2D that is smooth between edges.
     """

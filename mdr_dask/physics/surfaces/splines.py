@@ -1,4 +1,4 @@
-"""A closed line as a cubic spline: what lies between its nodes, from one coefficient a node.
+"""A closed line as a cubic spline with one coefficient per node.
 
 With coefficients c_k and the uniform cubic B-spline, the line between two nodes is ``a0 + a1 t + a2 t^2 + a3 t^3`` with
 t from 0 to 1 and the numbers of `piece`. It never leaves the range of the four coefficients that make it (de Boor, *A
@@ -21,7 +21,7 @@ Piece = tuple[float, float, float, float]
 
 
 def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the spline that is closest to a line of waves in the mean square.
+    """Return the least-squares spline of a sum of waves.
 
     Parameters
     ----------
@@ -40,12 +40,12 @@ def closest(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
 
 
 def through(waves: NDArray[np.complex128], nodes: int) -> FloatArray:
-    """Return the spline that goes through a line of waves at its nodes; arguments and result as of `closest`."""
+    """Return the spline that interpolates a sum of waves at its nodes; arguments and result as for `closest`."""
     return series(waves * _through(waves.size, nodes), nodes)
 
 
 def through_heights(height: FloatArray) -> FloatArray:
-    """Return the spline, shape (nodes,), that goes through the heights, shape (nodes,), of a closed line."""
+    """Return the spline, shape (nodes,), that interpolates the heights, shape (nodes,), of a closed line."""
     phase = 2 * np.pi * np.arange(height.size // 2 + 1) / height.size
     return np.asarray(fft.irfft(fft.rfft(height) / _at_nodes(phase), height.size), dtype=np.float64)
 
@@ -57,7 +57,7 @@ def heights(spline: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _closest(modes: int, nodes: int) -> FloatArray:
-    """Return the factors of the waves in the closest spline."""
+    """Return the factor by which the least-squares spline multiplies each wave."""
     phase = _phases(modes, nodes)
     cosine = np.cos(phase)
     transform = np.sinc(phase / (2 * np.pi)) ** 4
@@ -67,17 +67,17 @@ def _closest(modes: int, nodes: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def _through(modes: int, nodes: int) -> FloatArray:
-    """Return the factors of the waves in the spline through their nodes."""
+    """Return the factor by which the interpolating spline multiplies each wave."""
     return 1 / _at_nodes(_phases(modes, nodes))
 
 
 def _phases(modes: int, nodes: int) -> FloatArray:
-    """Return by how much the phase of each wave grows from node to node."""
+    """Return the phase increment of each wave from node to node."""
     return 2 * np.pi * np.arange(1, modes + 1) / nodes
 
 
 def _at_nodes(phase: FloatArray) -> FloatArray:
-    """Return the transform of the B-spline's values at the nodes, 1/6, 4/6 and 1/6."""
+    """Return the Fourier transform of the B-spline's nodal values 1/6, 4/6, 1/6."""
     return np.asarray((2 + np.cos(phase)) / 3)
 
 
@@ -102,7 +102,7 @@ def integral(of: Piece, t: float) -> float:
 
 @jit
 def shares(t: float) -> Piece:
-    """Return what each of four coefficients adds to the integral of their piece from 0 to t."""
+    """Return the contribution of each of four coefficients to the integral of their piece from 0 to t."""
     square = t * t
     second, third = t * (4 - 2 * square + 0.75 * t * square) / 6, t * (1 + 1.5 * t + square - 0.75 * t * square) / 6
     return (1 - (1 - t) ** 4) / 24, second, third, square * square / 24
@@ -110,7 +110,7 @@ def shares(t: float) -> Piece:
 
 @jit
 def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
-    """Append the places, from k to k + 1, where a piece changes between above zero and not; return the new count.
+    """Append the positions between k and k + 1 where a piece changes sign, and return the new count.
 
     There are three at most, and none where all four coefficients are above zero or none is.
     """
@@ -132,7 +132,7 @@ def zeros(spline: FloatArray, k: int, found: FloatArray, count: int) -> int:
 
 @jit
 def _extremes(of: Piece) -> tuple[float, float]:
-    """Return where a piece has its extremes, in order, 0 in place of one outside 0..1."""
+    """Return the positions of the extremes of a piece in ascending order; 0 replaces one outside 0..1."""
     a, b, c = 3 * of[3], of[2], of[1]  # a t^2 + 2 b t + c
     root = b * b - a * c
     if root <= 0:
@@ -147,7 +147,7 @@ def _extremes(of: Piece) -> tuple[float, float]:
 
 @jit
 def _zero(of: Piece, low: float, at_low: float, high: float, at_high: float) -> float:
-    """Return the zero of a piece that is monotonic from `low` to `high`, where its signs differ: Newton, bracketed."""
+    """Return the zero of a piece between `low` and `high`, where it is monotonic and changes sign: bracketed Newton."""
     t = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(STEPS):
         here = value(of, t)

@@ -35,7 +35,7 @@ class Waves:
         return series(self.coefficients * (2j * np.pi * np.arange(1, self.coefficients.size + 1)), nodes)
 
     def from_place(self, place: float) -> Waves:
-        """Return the same line from a place on, 0..1, for grids of more than two nodes for the shortest wave."""
+        """Return the line shifted by a fraction 0..1 of its length; needs more than two nodes for the shortest wave."""
         wave = np.arange(1, self.coefficients.size + 1)
         return Waves(self.coefficients * np.exp(2j * np.pi * wave * place), self.points)
 
@@ -65,7 +65,7 @@ def series(coefficients: NDArray[np.complex128], nodes: int) -> FloatArray:
 
 
 def waves_of(height: FloatArray) -> Waves:
-    """Return the waves of the periodic line through equidistant samples, their mean left out.
+    """Return the waves of the periodic line through equidistant samples, without the mean.
 
     The last wave of an even number of samples, two samples long, is the cosine that they show; it counts in full.
     """
