@@ -115,7 +115,7 @@ def of_cut(cut: Cut) -> Spectrum:
     """Return the isotropic spectrum with a given cut (inverse Abel transform).
 
     C2D is a power law between the wave numbers of the cut, so that it is positive. Its logarithms are fitted to the
-    cut within the cut's errors. The change of slope from bin to bin has a normal prior of standard deviation `BEND`. The
+    cut within its errors. The change of slope from bin to bin has a normal prior of standard deviation `BEND`. The
     explicit inverse -1/pi int C_cut'(k) / sqrt(k^2 - q^2) dk would amplify noise.
 
     Raises
