@@ -277,7 +277,7 @@ def test_an_interrupted_process_group_ends_quietly_and_leaves_nobody_behind(camp
     _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert errors.strip().splitlines() == [
-        "interrupted; nothing is lost: the same command goes on where this one stopped"
+        "interrupted; finished results are kept, and the same command goes on with the others"
     ]
     _, alive = psutil.wait_procs(children, timeout=PATIENCE)
     assert not alive

@@ -152,7 +152,7 @@ def test_an_interrupted_command_says_that_nothing_is_lost(monkeypatch, capsys):
 
     monkeypatch.setattr(campaign, "json_schema", stopped)
     assert main(["schema"]) == 130
-    assert capsys.readouterr().err.strip().startswith("interrupted; nothing is lost: the same command goes on")
+    assert capsys.readouterr().err.strip().startswith("interrupted; finished results are kept")
 
 
 def test_a_reader_that_has_read_enough_is_no_error(monkeypatch, tmp_path):

@@ -70,9 +70,10 @@ def test_rounds_go_by_outputs_and_not_by_their_errors(toy):
 
 def test_show_tells_scatter_and_grid_apart(filled, capsys):
     assert main(["show", filled, "width"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["position", "[m]", "width", "[m]", "realisations", "status"]
-    assert all(line.count("+-") == 2 for line in lines[1:])
+    note, *_, units, first, last = capsys.readouterr().out.splitlines()
+    assert note.startswith("mean +- standard error +- grid error; in all rows: realisations = 6")
+    assert units.split() == ["[m]", "[m]"]
+    assert [line.count("+-") for line in (first, last)] == [2, 2]
     assert main(["show", filled, "width", "--json"]) == 0
     row = json.loads(capsys.readouterr().out)["rows"][0]
     opened = store.datasets(filled)[""].isel(position=0)
@@ -85,5 +86,5 @@ def test_show_hides_rounding_noise_and_says_what_is_unknown():
     from mdr_dask.cli.printing import with_error
 
     assert with_error(0.1642, 8e-18) == "0.1642 +- 0"
-    assert with_error(0.1642, float("nan"), 2e-4) == "0.1642 +- - +- 0.0002"
+    assert with_error(0.1642, float("nan"), 2e-4) == "0.1642 +- ? +- 0.0002"
     assert with_error(0.1642, float("nan")) == "0.1642"

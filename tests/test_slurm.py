@@ -70,7 +70,7 @@ def test_a_campaign_longer_than_the_wall_time_finishes_by_submitting_its_script_
     told = "".join(path.read_text() for path in folder.glob("*.txt"))
     assert missing("long.zarr") == 0, told
     assert len(ends) > 1, told
-    assert "interrupted; nothing is lost" in told
+    assert "interrupted; finished results are kept" in told
     assert ends[-1] == {"COMPLETED"}
     assert digests("long.zarr") == whole
     done = [

@@ -13,6 +13,8 @@ from mdr_dask.models.base import Parameters
 from mdr_dask.models.data_file import DataFile
 
 _DIGITS = 14
+#: Digits to which two values of an axis differ at least; closer ones are one value, computed once.
+SAME_DIGITS = 12
 #: Most values of an axis that are looked at where all would take long.
 SOME = 64
 

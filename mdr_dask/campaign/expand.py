@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from mdr_dask.campaign import fields, sampling, variation
-from mdr_dask.campaign.definition import Axis, Series
+from mdr_dask.campaign.definition import SAME_DIGITS, Axis, Series
 from mdr_dask.campaign.document import Document
 from mdr_dask.campaign.messages import report_errors, value_at
 from mdr_dask.campaign.problems import Path, Place, Problems, dotted
@@ -89,15 +89,13 @@ class _Expansion:
         variations = tuple(found for found in variations if found.items)
         base = self._validate(self.data, variations, 0, broken)
         if self.spec.sampling == "grid":
-            columns = [self._grid_column(base, variations, index, broken) for index in range(len(variations))]
+            columns = [self._grid_values(base, variations, index, broken) for index in range(len(variations))]
         else:
-            columns = [self._cases(base, variations, broken)] * len(variations)
-        if base is None or broken or any(None in column for column in columns):
+            columns = self._case_values(base, variations, broken)
+        if base is None or broken or None in columns:
             return None
-        axes = [
-            self._axis(one, [_get(point, one.path) for point in column])
-            for one, column in zip(variations, columns, strict=True)
-        ]
+        pairs = zip(variations, columns, strict=True)
+        axes = [self._axis(one, column) for one, column in pairs if column is not None]
         for axis, one in zip(axes, variations, strict=True):
             self._require_places(base, axis, one.origin, model, outputs)
         return Series(name, base, tuple(self._refined(axes, variations, model, outputs)))
@@ -152,35 +150,57 @@ class _Expansion:
                 what = f"expected {len(sized[0].items)} values as {'.'.join(sized[0].path)} has, got {len(one.items)}"
                 self._complain(one.origin, f"{what} (sampling: grid combines all with all)")
 
-    def _grid_column(
+    def _grid_values(
         self, base: Parameters | None, variations: Sequence[Variation], index: int, broken: set[Path]
-    ) -> list[Parameters | None]:
-        """Return the parameters at each value of one axis, the others at their first value."""
+    ) -> list[Any] | None:
+        """Return the checked values of one axis, the other parameters at their first value; None if one is wrong."""
         one = variations[index]
         known = _checked(base, self._substituted(self.data, variations, 0), {one.path[0]})
-        elsewhere = broken | {other.path for other in variations if other is not one}  # told by their own columns
+        elsewhere = broken | {other.path for other in variations if other is not one}  # reported by their own columns
         last = self._validate(known, [one], len(one.items) - 1, elsewhere)
-        column: list[Parameters | None] = []
-        seen = set()
+        independent = fields.is_independent(self.parameters, one.path, self.data)
+        values: list[Any] = []
+        seen, sound = set(), None not in (base, last)
         for position, item in enumerate(one.items):
-            if item.inner and None in (base, last):
+            if item.inner and (not sound or independent):  # within the bounds if both ends are
+                values.append(item.value)
                 continue
             checked = base if position == 0 else self._validate(known, [one], position, elsewhere)
-            column.append(checked)
-            value = None if checked is None else _get(checked, one.path)
-            key = value if isinstance(value, int | float | tuple) else item.label
-            if checked is not None and key in seen:
+            if checked is None:
+                sound = False
+                continue
+            value = _get(checked, one.path)
+            values.append(value)
+            key = (
+                float(f"{value:.{SAME_DIGITS}g}")
+                if isinstance(value, float)
+                else value
+                if isinstance(value, int | tuple)
+                else item.label
+            )
+            if key in seen:
                 self._complain(item.origin, f"this value is given twice: {item.label}")
             seen.add(key)
-        return column
+        return values if sound else None
 
-    def _cases(
+    def _case_values(
         self, base: Parameters | None, variations: Sequence[Variation], broken: set[Path]
-    ) -> list[Parameters | None]:
-        """Return the parameters of each case."""
+    ) -> list[list[Any] | None]:
+        """Return the checked values of every varied parameter, case by case; None for all if a case is wrong."""
         known = _checked(base, self.data, {one.path[0] for one in variations})
-        cases = min((len(one.items) for one in variations), default=0)
-        return [self._validate(known, variations, position, broken) for position in range(cases)]
+        cases = range(min((len(one.items) for one in variations), default=0))
+        if all(one.spread and fields.is_independent(self.parameters, one.path, self.data) for one in variations):
+            sizes = [[item.value for item in one.items] for one in variations]
+            extremes = {values.index(end(values)) for values in sizes for end in (min, max)}
+            good = [self._validate(known, variations, position, broken) is not None for position in extremes]
+            return [values if all(good) else None for values in sizes]
+        columns: list[list[Any]] = [[] for _ in variations]
+        for position in cases:
+            checked = self._validate(known, variations, position, broken)
+            for one, column in zip(variations, columns, strict=True):
+                if checked is not None:
+                    column.append(_get(checked, one.path))
+        return [column if len(column) == len(cases) else None for column in columns]
 
     def _validate(
         self, data: Mapping[str, Any], variations: Sequence[Variation], position: int, broken: set[Path]

@@ -92,6 +92,19 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
     return None
 
 
+def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
+    """Return whether the field at a path is checked by its own bounds alone, not together with other parameters."""
+    found = [
+        parameters,
+        *(pair[0] for depth in range(1, len(path) + 1) if (pair := owner(parameters, path[:depth], data))),
+    ]
+    return all(
+        validator.info.mode == "before"
+        for kind in found
+        for validator in kind.__pydantic_decorators__.model_validators.values()
+    )
+
+
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
     """Return what a file may say so that there is a field at a path, each such as ``indenter: {shape: power}``."""
     name, *rest = path

@@ -1,4 +1,4 @@
-"""A campaign from its keys: a dictionary has no lines, so that its messages name keys alone."""
+"""A campaign from a dictionary: numbers of numpy and pint, paths, and messages without line numbers."""
 
 from __future__ import annotations
 
@@ -8,20 +8,29 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from mdr_dask.campaign.definition import Campaign
+import numpy as np
+
+from mdr_dask.campaign.definition import Campaign, tidy
 from mdr_dask.campaign.read import loads
 from mdr_dask.errors import CampaignError
 
 
 def of_keys(source: Mapping[str, Any]) -> Campaign:
-    """Read a campaign from the keys of its file; numbers of numpy and paths are as good as those of a file.
+    """Read a campaign from the keys of a campaign file.
+
+    Parameters
+    ----------
+    source : mapping
+        Values as in a file, or numpy, pandas or xarray arrays and numbers, ranges, paths, or pint quantities. Numbers
+        of numpy are rounded to 14 digits as in a range, so that ``np.linspace`` gives the same values as
+        ``{linear: [a, b, n]}``.
 
     Raises
     ------
     CampaignError
         With every problem.
     """
-    text = json.dumps({"name": "study", **source}, indent=1, default=_plain)
+    text = json.dumps({"name": "study", **{str(key): _plain(value) for key, value in source.items()}}, indent=1)
     try:
         found = loads(text, "campaign", ".")
     except CampaignError as error:
@@ -34,6 +43,26 @@ def _without_lines(messages: Sequence[str]) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    """Return numbers of numpy, pandas and xarray, and ranges, as JSON holds them; the rest as text."""
-    numbers = list(value) if isinstance(value, range) else getattr(value, "values", value)
-    return numbers.tolist() if hasattr(numbers, "tolist") else numbers if isinstance(numbers, list) else str(value)
+    """Return a value as JSON holds it."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple | range):
+        return [_plain(inner) for inner in value]
+    if hasattr(value, "magnitude") and hasattr(value, "units"):
+        return _quantity(_plain(value.magnitude), f"{value.units:~}")
+    if isinstance(value, np.floating):
+        return tidy(float(str(value)), whole=False)  # the shortest text of a float32 is the number that was meant
+    if isinstance(value, np.generic):
+        return value.item()
+    array = value if isinstance(value, np.ndarray) else getattr(value, "values", None)
+    if isinstance(array, np.ndarray):
+        return [_plain(inner) for inner in array] if array.ndim else _plain(array[()])
+    return value if value is None or isinstance(value, str | bool | int | float) else str(value)
+
+
+def _quantity(magnitude: Any, unit: str) -> Any:
+    return (
+        [_quantity(each, unit) for each in magnitude]
+        if isinstance(magnitude, list)
+        else f"{magnitude!r} {unit}".strip()
+    )

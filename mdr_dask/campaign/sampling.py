@@ -125,7 +125,7 @@ def _column(name: str, sheet: Sheet, index: int) -> Variation:
     heading, unit = sheet.names[index], sheet.units[index]
     path = tuple(heading.text.split("."))
     items = [
-        Item(_value(cell.text, unit), cell.text, Origin(dotted(path), _place(name, cell)))
+        Item(_value(cell.text, unit), Origin(dotted(path), _place(name, cell)), cell.text)
         for cell in (row[index] for row in sheet.rows)
     ]
     return Variation(path, Origin(dotted(path), _place(name, heading)), tuple(items))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from pydantic import BaseModel
@@ -34,14 +34,18 @@ class Origin:
     path: Path | None = None
 
 
-@dataclass(frozen=True)
-class Item:
+class Item(NamedTuple):
     """One value of a varied parameter, as written or in SI; inner ones lie between the ends of a range."""
 
     value: Any
-    label: str
     origin: Origin
+    written: str = ""
     inner: bool = False
+
+    @property
+    def label(self) -> str:
+        """The value as it is written in the file, or as a number of a range."""
+        return self.written or f"{self.value:g}"
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class Variation:
     def drawn(self, shares: Any) -> Variation:
         """Return this variation with values drawn at shares of its interval."""
         assert self.spread is not None
-        return replace(self, items=tuple(Item(value, f"{value:g}", self.origin) for value in self.spread.at(shares)))
+        return replace(self, items=tuple(Item(value, self.origin) for value in self.spread.at(shares)))
 
 
 def find(
@@ -159,7 +163,7 @@ class _Search:
             self._complain(at, "expected at least one value, got []", name)
         places = [(*at, index) for index in range(len(values))]
         return [
-            Item(value, self.document.flow(place), self._origin(place, name))
+            Item(value, self._origin(place, name), self.document.flow(place))
             for value, place in zip(values, places, strict=True)
         ]
 
@@ -196,9 +200,10 @@ class _Search:
         if len(numbers) < (2 if spread.whole else count):
             self._complain(at, f"expected ends far enough apart for {count} values", name)
         first, last = (numbers[0], numbers[-1]) if spread.whole else content[:2]
-        inner = [Item(number, f"{number:g}", self._origin(at, name), inner=True) for number in numbers[1:-1]]
+        origin = self._origin(at, name)
+        inner = [Item(number, origin, inner=True) for number in numbers[1:-1]]
         ends = [
-            Item(end, self.document.flow((*at, index)), self._origin((*at, index), name))
+            Item(end, self._origin((*at, index), name), self.document.flow((*at, index)))
             for index, end in enumerate((first, last))
         ]
         return [ends[0], *inner, ends[1]]

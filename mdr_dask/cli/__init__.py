@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import signal
 import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
 import click
 
@@ -14,7 +18,7 @@ from mdr_dask.cli.figures import figures, plot
 from mdr_dask.cli.fitting import fit
 from mdr_dask.cli.law import law
 from mdr_dask.cli.master import master_curve
-from mdr_dask.cli.printing import printable
+from mdr_dask.cli.printing import printable, say
 from mdr_dask.cli.publishing import publish, report, serve
 from mdr_dask.cli.results import aggregate, show, status
 from mdr_dask.cli.running import run
@@ -25,23 +29,52 @@ from mdr_dask.version import __version__
 
 BROKE = 3
 INTERRUPTED = 130
+#: Commands as ``--help`` lists them; those that are not named here are in the last group.
+GROUPS = {
+    "study": ("check", "run", "status", "verify"),
+    "answers": ("show", "fit", "master-curve", "plot", "report"),
+}
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class Commands(click.Group):
+    """A group whose help lists its commands by purpose."""
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands of each group with a line of help, and the names of all others."""
+        limit = formatter.width - 20
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(limit)) for name in names])
+        others = [name for name in sorted(self.commands) if not any(name in names for names in GROUPS.values())]
+        with formatter.section("more"):
+            formatter.write_text(f"{', '.join(others)}; each with --help")
+
+    def invoke(self, context: click.Context) -> Any:
+        """Run a command; a reader of the output that has stopped reading, such as ``head``, is not an error."""
+        try:
+            result = super().invoke(context)
+            sys.stdout.flush()
+        except BrokenPipeError:
+            _discard_output()
+            return 0
+        return result
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="mdr-dask")
 def cli() -> None:
     """Parameter studies for tribology with the method of dimensionality reduction.
 
     \b
-    mdr-dask init sliding_friction -o mine.yaml  a first campaign to edit
-    mdr-dask check campaigns/quickstart.yaml     is the file right, and what will it cost?
-    mdr-dask run campaigns/quickstart.yaml       run it, or what is missing of it
-    mdr-dask show results/quickstart.zarr        look at results, while it runs too
-    mdr-dask plot results/quickstart.zarr        draw the figures
-    mdr-dask report results/quickstart.zarr      one page with everything, for any browser
+    mdr-dask init sliding_friction -o mine.yaml   write a first campaign to edit
+    mdr-dask check mine.yaml                      is the file right, what will it cost?
+    mdr-dask run mine.yaml                        compute it, or what is missing of it
+    mdr-dask show results/sliding_friction.zarr   results as a table, also during a run
+    mdr-dask plot results/sliding_friction.zarr   figures
+    mdr-dask report results/sliding_friction.zarr one page with everything
 
-    Completion in bash: eval "$(_MDR_DASK_COMPLETE=bash_source mdr-dask)"; in zsh and fish likewise.
-    Exit codes: 0 all done, 1 ran but some cases failed, 2 refused, 3 the program broke, 130 interrupted.
+    Exit codes: 0 all done, 1 some cases failed, 2 refused, 3 a fault of the program, 130 interrupted. Options can also
+    be set in the environment: MDR_DASK_RUN_THREADS=4 for `run --threads 4`.
     """
 
 
@@ -67,40 +100,59 @@ for command in (
     schema,
 ):
     cli.add_command(command)
+    for option in command.params:
+        if isinstance(option, click.Option) and option.name != "form":
+            words = f"{command.name}{max(option.opts, key=len).removeprefix('-')}"
+            option.envvar = f"MDR_DASK_{words.upper().replace('-', '_')}"
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     from mdr_dask.errors import MdrDaskError
 
+    _open_streams()
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         result = cli.main(arguments, prog_name="mdr-dask", standalone_mode=False)
-        sys.stdout.flush()
     except click.ClickException as error:
-        error.show()
+        context = error.ctx if isinstance(error, click.UsageError) else None
+        say(error.format_message() + (f" (see {context.command_path} --help)" if context else ""), err=True)
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
-        click.echo("interrupted; nothing is lost: the same command goes on where this one stopped", err=True)
+        say("interrupted; finished results are kept, and the same command goes on with the others", err=True)
         return INTERRUPTED
     except MdrDaskError as error:
-        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # tasks of Zarr that are given up with it
-        click.echo(printable(str(error)), err=True)
+        logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # tasks of Zarr that are cancelled with it
+        say(str(error), err=True)
         return 2
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except OSError as error:
-        click.echo(f"{error.filename or 'input or output'}: {error.strerror or error}", err=True)
+        say(f"{error.filename or 'input or output'}: {error.strerror or error}", err=True)
+        _discard_output()
         return 2
     except Exception:
-        click.echo(_reported(sys.argv[1:] if arguments is None else arguments), err=True)
+        say(_reported(sys.argv[1:] if arguments is None else arguments), err=True)
         return BROKE
     return result if isinstance(result, int) else 0
 
 
+def _open_streams() -> None:
+    """Give a process without standard streams some, and print what their encoding does not have in ASCII."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:  # closed by a service manager or with >&-
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _discard_output() -> None:
+    """Write the rest of the output nowhere, so that Python does not fail once more when it exits."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def _reported(arguments: list[str]) -> str:
-    """Keep what there is to know of a fault of the program itself in a file, and say so in one sentence."""
+    """Write the details of an unexpected error to a file, and return the message for the user."""
     import platform
     import tempfile
     import traceback
@@ -113,9 +165,9 @@ def _reported(arguments: list[str]) -> str:
     with os.fdopen(descriptor, "w") as report:
         report.write("\n".join(lines))
     last = traceback.format_exc().strip().splitlines()[-1]
-    return f"a fault of mdr-dask itself, what is in stores is kept: {printable(last)}; please send {path}"
+    return f"a fault of mdr-dask itself; finished results are kept: {printable(last)}; please report it with {path}"
 
 
 def _interrupt(*_: object) -> None:
-    """Treat the word of a batch system at the wall time like Ctrl-C."""
+    """Treat SIGTERM, which batch systems send at the wall time, like Ctrl-C."""
     raise KeyboardInterrupt

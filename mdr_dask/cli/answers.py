@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from mdr_dask.questions.table import Table
 
+#: Rows of one printed table; longer answers are printed as several.
+AT_ONCE = 2**16
 FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
 
@@ -69,44 +71,72 @@ def check_target(path: Path) -> None:
 
 
 def _print_aligned(answer: Table, limit: int, join: bool) -> None:
-    widths: list[int] = []
-    printed = 0
+    import pandas as pd
+
+    waiting: list[pd.DataFrame] = []
+    count, printed = 0, False
     for frame in answer.frames:
-        shown = frame[: limit - printed] if limit else frame
-        widths = _print_frame(shown, answer.units, widths, join)
-        printed += len(shown)
-        if limit and printed >= limit:
-            more = len(shown) < len(frame) or next(answer.frames, None) is not None
-            print_left(answer.total - printed if answer.total is not None else None if more else 0)
-            return
-    if not widths:
-        _print_frame(_frame(answer), answer.units, widths, join)
+        waiting.append(frame)
+        count += len(frame)
+        if count >= (limit or AT_ONCE):
+            whole = pd.concat(waiting, ignore_index=True)
+            _print_frame(whole[:limit] if limit else whole, answer, join)
+            if limit:
+                more = count > limit or next(answer.frames, None) is not None
+                print_left(answer.total - limit if answer.total is not None else None if more else 0)
+                return
+            waiting, count, printed = [], 0, True
+    if waiting:
+        _print_frame(pd.concat(waiting, ignore_index=True), answer, join)
+    elif not printed:
         tell("no rows")
 
 
-def _print_frame(frame: pd.DataFrame, units: dict[str, str], widths: list[int], join: bool) -> list[int]:
+def _print_frame(frame: pd.DataFrame, answer: Table, join: bool) -> None:
     columns = {str(name): frame[name].tolist() for name in frame}
-    columns = _joined(columns) if join else columns
+    note = ""
+    if join:
+        columns, note = _joined(columns)
+    units = answer.units
     titles = [titled(name, units[name] if name in units else units[f"{name}_mean"]) for name in columns]
-    return print_aligned(titles, list(columns.values()), widths, head=not widths)
+    print_aligned(titles, list(columns.values()), answer.keys, note)
 
 
-def _joined(columns: dict[str, list[Any]]) -> dict[str, list[Any]]:
-    """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``."""
-    outputs = [name.removesuffix("_mean") for name in columns if name.endswith("_mean")]
-    joined, left_out = {}, set()
+def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
+    """Join each mean with its errors, ``0.1234 +- 0.0005 +- 0.0001``, or its interval, ``0.1234 (0.1220, 0.1240)``.
+
+    An error that is not known in any row is left out; the text returned says which errors are printed.
+    """
+    known = {name for name, values in columns.items() if any(map(_is_known, values))}
+    joined: dict[str, list[Any]] = {}
+    left_out: set[str] = set()
+    kinds: dict[str, tuple[str, ...]] = {}
     for name, values in columns.items():
         output = name.removesuffix("_mean")
-        if output in outputs and output != name:
+        if output != name:
             errors = [f"{output}_{part}" for part in ("standard_error", "grid_error") if f"{output}_{part}" in columns]
             ends = [f"{output}_{part}" for part in ("low", "high") if f"{output}_{part}" in columns]
+            left_out |= {*errors, *ends}
+            parts = [each for each in errors or ends if each in known]
             join = with_error if errors else with_interval
-            parts = zip(values, *(columns[each] for each in errors or ends), strict=True)
-            joined[output] = [join(*part) for part in parts]
-            left_out |= {*(errors or ends)}
+            joined[output] = [join(*each) for each in zip(values, *(columns[part] for part in parts), strict=True)]
+            if errors and parts:
+                kinds[output] = tuple(part.removeprefix(f"{output}_").replace("_", " ") for part in parts)
         elif name not in left_out:
             joined[name] = values
-    return joined
+    return joined, _meaning(kinds)
+
+
+def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
+    """Return what the errors of means are, once if it is the same for all outputs that have both."""
+    longest = max(kinds.values(), key=len, default=())
+    if all(longest[: len(kind)] == kind for kind in kinds.values()):
+        return "".join(["mean", *(f" +- {kind}" for kind in longest)]) if longest else ""
+    return "; ".join(f"{output} +- {' +- '.join(kind)}" for output, kind in kinds.items())
+
+
+def _is_known(value: Any) -> bool:
+    return not (value is None or (isinstance(value, float) and math.isnan(value)))
 
 
 def _write_text(answer: Table, form: str, stream: TextIO) -> None:

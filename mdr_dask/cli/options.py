@@ -8,10 +8,12 @@ from typing import Any
 
 import click
 
+from mdr_dask.cli.printing import say
+
 
 def tell(sentence: str) -> None:
-    """Say something beside the results, on stderr."""
-    click.echo(sentence, err=True)
+    """Print a message on stderr, beside the results on stdout."""
+    say(sentence, err=True)
 
 
 def _units(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> dict[str, str]:

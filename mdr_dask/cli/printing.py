@@ -1,4 +1,4 @@
-"""Results to a terminal, a pipe, JSON or CSV."""
+"""Results and messages for a terminal, a pipe, JSON or CSV."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import csv
 import io
 import json
 import math
+import os
+import re
+import shutil
+import sys
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +20,35 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Row = dict[str, Any]
-#: Errors below this part of their mean are rounding.
+#: Errors below this part of their mean are rounding errors.
 ROUNDING = 1e-13
+#: Columns between two columns of a table, and the narrowest terminal that tables are made for.
+GAP, NARROWEST = 2, 40
+#: Sizes outside which numbers are printed with a power of ten.
+_SMALL, _LARGE = 1e-4, 1e6
+UNKNOWN = "-"
+#: A blank at which lines are not broken.
+_BLANK = "\N{NO-BREAK SPACE}"
+
+
+def terminal_width() -> int:
+    """Return the width of the terminal, or 80 where the output is not a terminal."""
+    return max(NARROWEST, shutil.get_terminal_size((80, 24)).columns)
+
+
+def say(text: str, err: bool = False) -> None:
+    """Print a text without control characters; on a terminal its lines are wrapped between words."""
+    stream = sys.stderr if err else sys.stdout
+    lines = printable(text).split("\n")
+    if stream is not None and (stream.isatty() or "COLUMNS" in os.environ):
+        lines = [_filled(line) for line in lines]
+    click.echo("\n".join(lines), err=err)
+
+
+def _filled(line: str) -> str:
+    indent = " " * (len(line) - len(line.lstrip()))
+    options: dict[str, Any] = {"break_long_words": False, "break_on_hyphens": False}
+    return textwrap.fill(line, terminal_width(), subsequent_indent=indent + "  ", **options) or line
 
 
 def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int | None = None) -> None:
@@ -31,7 +63,7 @@ def print_rows(rows: Sequence[Row], units: dict[str, str], form: str, limit: int
     form : str
         ``table``, ``csv`` or ``json``.
     limit : int, optional
-        Most rows of a table; the rest is counted in a last line on stderr.
+        Largest number of rows of a table; the number of the others is printed on stderr.
     """
     if form == "json":
         print_json({"units": units, "rows": [{key: _finite(value) for key, value in row.items()} for row in rows]})
@@ -55,31 +87,124 @@ def titled(name: str, unit: str) -> str:
     return f"{name} [{unit}]" if unit not in ("1", "") else name
 
 
-def print_aligned(
-    titles: Sequence[str], columns: Sequence[Sequence[Any]], widths: Sequence[int] = (), head: bool = True
-) -> list[int]:
-    """Print columns side by side, at least as wide as those before them; return how wide they are."""
-    cells = [[title, *map(short, column)] for title, column in zip(titles, columns, strict=True)]
-    widths = [max(map(len, column)) for column in cells] if head else list(widths)
-    widths = [max(width, *map(len, column)) for width, column in zip(widths, cells, strict=True)]
-    for line in list(zip(*cells, strict=True))[0 if head else 1 :]:
-        click.echo("  ".join(map(_aligned, titles, line, widths)).rstrip())
-    return widths
+def print_aligned(titles: Sequence[str], columns: Sequence[Sequence[Any]], keys: int = 1, note: str = "") -> None:
+    """Print columns side by side, within the width of the terminal.
+
+    Columns with one value in all rows are printed above the table, and columns without any value are named there. A
+    single row that is too wide is printed as a list; a table that is too wide is printed in parts.
+
+    Parameters
+    ----------
+    titles : sequence of str
+        Headings, ``name`` or ``name [unit]``.
+    columns : sequence of sequence
+        The values of each column.
+    keys : int
+        Number of leading columns that identify a row; each part of a wide table begins with them.
+    note : str
+        A first line.
+    """
+    rows = len(columns[0]) if columns else 0
+    cells = [[short(value) for value in column] for column in columns]
+    if rows > 1:
+        same = [all(cell == column[0] for cell in column) for column in cells]
+        named = zip(titles, cells, same, strict=True)
+        fixed = [(title, column[0]) for title, column, alike in named if alike]
+        known = [
+            f"{_name(title)} = {cell}{_unit(title)}".replace(" ", _BLANK) for title, cell in fixed if cell != UNKNOWN
+        ]
+        missing = [_name(title) for title, cell in fixed if cell == UNKNOWN]
+        note += f"{'; ' if note else ''}in all rows: {', '.join(known)}" if known else ""
+        note += f"{'; ' if note else ''}not known: {', '.join(missing)}" if missing else ""
+        keys = sum(not alike for alike in same[:keys])
+        titles = [title for title, alike in zip(titles, same, strict=True) if not alike]
+        cells = [column for column, alike in zip(cells, same, strict=True) if not alike]
+    if note:
+        click.echo(_filled(note).replace(_BLANK, " "))
+    if cells:
+        _print_table(titles, cells, keys)
+
+
+def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: int) -> None:
+    heads = [_heading(title, max(map(len, column), default=0)) for title, column in zip(titles, cells, strict=True)]
+    widths = [max(map(len, [*head, *column])) for head, column in zip(heads, cells, strict=True)]
+    if sum(widths) + GAP * (len(widths) - 1) <= terminal_width():
+        _print_block(heads, cells, widths)
+        return
+    if len(cells[0]) == 1:
+        size = max(map(len, titles))
+        for title, column in zip(titles, cells, strict=True):
+            click.echo(_hanging(f"{title.ljust(size)}  ", column[0]))
+        return
+    for part in _parts(widths, keys):
+        _print_block([heads[k] for k in part], [cells[k] for k in part], [widths[k] for k in part])
+
+
+def _parts(widths: Sequence[int], keys: int) -> list[list[int]]:
+    """Return the columns of each part of a table that is too wide; the keys come first in every part."""
+    first, rest = list(range(keys)), list(range(keys, len(widths)))
+    parts, part = [], list(first)
+    for column in rest:
+        size = sum(widths[k] + GAP for k in part) + widths[column]
+        if size > terminal_width() and len(part) > keys:
+            parts.append(part)
+            part = list(first)
+        part.append(column)
+    return [*parts, part]
+
+
+def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]], widths: Sequence[int]) -> None:
+    """Print headings and cells; a long text in the last column is wrapped."""
+    left = [any(re.search(r"[a-df-zA-Z]{2}", cell) for cell in column) for column in cells]
+    height = max(map(len, heads))
+    lines = [[*[""] * (height - len(head)), *head] for head in heads]
+    for line in [*zip(*lines, strict=True), *zip(*cells, strict=True)]:
+        aligned = [
+            cell.ljust(width) if is_left else cell.rjust(width)
+            for cell, width, is_left in zip(line, widths, left, strict=True)
+        ]
+        before = "".join(cell + " " * GAP for cell in aligned[:-1])
+        click.echo(_hanging(before, aligned[-1].rstrip()) if left[-1] else (before + aligned[-1]).rstrip())
+
+
+def _hanging(before: str, text: str) -> str:
+    """Return a text behind something, wrapped below its own beginning if it is too long."""
+    room = max(terminal_width() - len(before), NARROWEST // 2)
+    if len(before) + len(text) <= terminal_width() or room <= NARROWEST // 2:
+        return (before + text).rstrip()
+    lines = textwrap.wrap(text, room, break_on_hyphens=False)
+    return ("\n" + " " * len(before)).join([before + lines[0], *lines[1:]]).rstrip()
+
+
+def _heading(title: str, width: int) -> list[str]:
+    """Return the lines of a heading: its name broken behind ``_`` where the cells are narrower, then its unit."""
+    name, unit = _name(title), _unit(title).strip()
+    pieces = re.findall(r"[^_ ]+[_ ]*", name) or [name]
+    lines = [""]
+    for piece in pieces:
+        if lines[-1] and len(lines[-1] + piece.rstrip()) > max(width, max(map(len, pieces))):
+            lines.append("")
+        lines[-1] += piece
+    return [line.rstrip() for line in lines] + ([f"[{unit}]"] if unit else [])
+
+
+def _name(title: str) -> str:
+    return title.partition(" [")[0]
+
+
+def _unit(title: str) -> str:
+    unit = title.partition(" [")[2].removesuffix("]")
+    return f" {unit}" if unit else ""
 
 
 def print_left(count: int | None) -> None:
-    """Say on stderr how many rows a limit left out; None for some that nobody counted."""
+    """Print on stderr how many rows a limit left out; None if their number is not known."""
     if count != 0:
         click.echo(f"... {'' if count is None else f'{count} '}more rows (--limit 0 prints all)", err=True)
 
 
-def _aligned(name: str, cell: str, width: int) -> str:
-    """Return a cell, numbers to the right and the sentence of a fit to the left."""
-    return cell.ljust(width) if name in ("law_holds", "status") else cell.rjust(width)
-
-
 def printable(text: str) -> str:
-    """Return a text without control characters, which would speak to the terminal in place of the user."""
+    """Return a text with control characters escaped, so that data cannot control the terminal."""
     return "".join(mark if mark.isprintable() or mark == "\n" else repr(mark)[1:-1] for mark in text)
 
 
@@ -111,7 +236,7 @@ def _spread(column: xr.DataArray, dims: list[Any], shape: Any) -> list[Any]:
 
 
 def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], dict[str, str]]:
-    """Join each constant and the ends of its interval into one column for a reader: ``0.123 (0.120, 0.126)``."""
+    """Join each constant and the ends of its interval into one column: ``0.123 (0.120, 0.126)``."""
     known = {name for name in units if f"{name}_low" in units and f"{name}_high" in units}
     ends = {f"{name}_{end}" for name in known for end in ("low", "high")}
     kept = [name for name in units if name not in ends]
@@ -126,28 +251,36 @@ def with_intervals(rows: list[Row], units: dict[str, str]) -> tuple[list[Row], d
 
 
 def with_interval(value: float, low: float = math.nan, high: float = math.nan) -> str:
-    """Join a number and the ends of its interval, where they are known."""
+    """Join a number and the ends of its interval, if they are known."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return short(value)
-    return f"{value:.4g} ({low:.4g}, {high:.4g})"
+    return f"{_number(value, 4)} ({_number(low, 4)}, {_number(high, 4)})"
 
 
 def with_error(mean: float, *errors: float | None) -> str:
-    """Join a mean and its errors; ``-`` for an error that is not known, 0 for rounding noise."""
-    if not any(error is not None and math.isfinite(error) for error in errors):
+    """Join a mean and its errors: ``?`` for an error that is not known, 0 for one below rounding."""
+    if not math.isfinite(mean) or not any(error is not None and math.isfinite(error) for error in errors):
         return short(mean)
-    shown = [_error(error, abs(mean)) for error in errors if error is not None]
-    return " +- ".join([f"{mean:.4g}", *shown])
+    shown = ["?" if error is None or not math.isfinite(error) else _error(error, abs(mean)) for error in errors]
+    return " +- ".join([_number(mean, 4), *shown])
 
 
 def _error(error: float, size: float) -> str:
-    if not math.isfinite(error):
-        return "-"
-    return f"{error:.1g}" if error > ROUNDING * size else "0"
+    return _number(error, 1) if error > ROUNDING * size else "0"
+
+
+def _number(value: float, digits: int) -> str:
+    """Return a number with some digits, and with a power of ten only if it is very small or large."""
+    text = f"{value:.{digits}g}"
+    if "e" in text and _SMALL <= abs(float(text)) < _LARGE:
+        return f"{float(text):.0f}"
+    return text
 
 
 def short(value: Any) -> str:
-    """Return a value as a cell of a table."""
+    """Return a value as a cell of a table; ``-`` for one that is not known."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return UNKNOWN
     return f"{value:.6g}" if isinstance(value, float) else printable(str(value)).replace("\n", " ")
 
 

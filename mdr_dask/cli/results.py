@@ -15,7 +15,7 @@ from mdr_dask.cli.options import (
     question_options,
     tell,
 )
-from mdr_dask.cli.printing import print_json, print_rows, printable
+from mdr_dask.cli.printing import print_json, print_rows, say
 from mdr_dask.cli.writing import writing
 
 
@@ -62,17 +62,16 @@ def status(store: str, failures: bool, messages: bool, watch: bool, form: str | 
         _print_counts([progress.counts(look) for look in looks], watching.at_work(store), form)
         room.require_blocks(looks)
         return
-    found = [message for name, data in room.datasets(store).items() for message in progress.messages(store, name, data)]
+    studies = room.datasets(store)
+    found = [message for name, data in studies.items() for message in progress.messages(store, name, data)]
     if not messages:
         found = [message for message in found if message["status"] != "done"]
     if form == "json":
         print_json(found)
         return
-    for group in progress.grouped(found):
-        click.echo(
-            printable(f"{group.series + ': ' if group.series else ''}{group.results} x {group.kind}: {group.reason}")
-        )
-        click.echo(printable(f"    {group.cases}"))
+    for group in progress.grouped(found, studies):
+        say(f"{group.series + ': ' if group.series else ''}{group.results} x {group.kind}: {group.reason}")
+        say(f"    {group.cases}")
     if not found:
         click.echo("no failures" if not messages else "no messages")
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from mdr_dask import store
 from mdr_dask.models.base import Status
+from mdr_dask.questions.units import as_written
+from mdr_dask.units import shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,34 +64,59 @@ def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]
     return [last[place] for place in inside if ledger[place] == Status[last[place]["status"].upper()]]
 
 
-def grouped(found: Sequence[dict[str, Any]]) -> list[Group]:
-    """Return messages that say the same together, in the order in which they came."""
-    groups: dict[tuple[str, str], list[dict[str, Any]]] = {}
+def grouped(found: Sequence[dict[str, Any]], studies: Mapping[str, xr.Dataset]) -> list[Group]:
+    """Group messages that differ in their numbers only, in the order of their first appearance.
+
+    Parameters
+    ----------
+    found : sequence of dict
+        As `messages` returns them.
+    studies : mapping of str to Dataset
+        The groups of the study by series, for the units of its axes.
+    """
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for message in found:
-        groups.setdefault((message["series"], message["message"]), []).append(message)
+        template = _NUMBER.sub("#", message["message"])
+        groups.setdefault((message["series"], message["status"], template), []).append(message)
     return [
         Group(
             series,
-            "warning" if alike[0]["status"] == "done" else alike[0]["status"],
-            reason,
+            "warning" if status == "done" else status,
+            _merged([message["message"] for message in alike]),
             len(alike),
-            _shared(alike),
+            _cases([message["case"] for message in alike], studies.get(series)),
         )
-        for (series, reason), alike in groups.items()
+        for (series, status, _), alike in groups.items()
     ]
 
 
-def _shared(alike: list[dict[str, Any]]) -> str:
-    """Return the range that each varied parameter takes among messages."""
+_NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+
+
+def _merged(texts: Sequence[str]) -> str:
+    """Return one text for texts that differ in their numbers only, with ranges: ``a film ratio of 0.2 to 0.4``."""
+    columns = iter(list(zip(*map(_NUMBER.findall, texts), strict=True)))
+
+    def ends(_: re.Match[str]) -> str:
+        numbers = sorted(set(next(columns)), key=float)
+        return numbers[0] if len(numbers) == 1 else f"{numbers[0]} to {numbers[-1]}"
+
+    return _NUMBER.sub(ends, texts[0])
+
+
+def _cases(cases: Sequence[Mapping[str, Any]], study: xr.Dataset | None) -> str:
+    """Return the range of each varied parameter among cases, in the units of the campaign file."""
+    wanted = {} if study is None else as_written(study)
     parts = []
-    for path in alike[0]["case"]:
-        values = sorted({message["case"].get(path) for message in alike}, key=lambda v: (str(type(v)), v))
-        if len(values) == 1:
-            parts.append(f"{path} = {_brief(values[0])}")
-        else:
-            parts.append(f"{path} {_brief(values[0])} .. {_brief(values[-1])} ({len(values)} values)")
-    return ", ".join(parts) or "the only case"
+    for path in cases[0]:
+        name = path.replace(".", "_")
+        unit = "1" if study is None or name not in study.coords else str(study[name].attrs.get("units", "1"))
+        values = sorted({case.get(path) for case in cases}, key=lambda value: (str(type(value)), value))
+        first, *_, last = [_shown(value, unit, wanted.get(name, "")) for value in (values[0], values[-1])]
+        more = f" to {last}, {len(values)} values" if len(values) > 1 else ""
+        parts.append(f"{path} = {first}{more}")
+    return "; ".join(parts) or "the only case"
 
 
-def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+def _shown(value: Any, unit: str, wanted: str) -> str:
+    return shown(value, unit, written=wanted) if isinstance(value, int | float) else str(value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
+from itertools import product, takewhile
 from math import prod
 from typing import TYPE_CHECKING, Any
 
@@ -69,14 +69,16 @@ class Question:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows that come in frames, and the units of their columns.
+    """Rows in frames, and the units of their columns.
 
-    `total` is the number of rows there are, None where that is not known before the last frame.
+    `total` is the number of rows, None if it is not known before the last frame; `keys` is the number of leading
+    columns that identify a row.
     """
 
     frames: Iterator[pd.DataFrame]
     units: dict[str, str]
     total: int | None
+    keys: int = 1
 
 
 def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = warnings.warn) -> Table:
@@ -106,14 +108,15 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
+    keys = maker.keys
     if question.sort:
         order = maker.order()
-        return Table(maker.picked(order[: limit or None]), units, order.size)
+        return Table(maker.picked(order[: limit or None]), units, order.size, keys)
     total = prod(maker.sizes.values())
     if question.where and not question.group_by:
-        return Table(maker.frames(ROWS), units, None)
-    known = None if maker.has_spared else total
-    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, known)
+        return Table(maker.frames(ROWS), units, None, keys)
+    known = None if maker.may_leave_out else total
+    return Table(maker.frames(min(limit, ROWS) or ROWS, whole=not 0 < limit < total), units, known, keys)
 
 
 class _Maker:
@@ -138,12 +141,14 @@ class _Maker:
         own = [str(dim) for dim in self._data.sizes if raw or dim != "realisation"]
         self._dims = [dim for dim in own if dim != "state"]
         self.sizes = {dim: self._data.sizes[dim] for dim in self._dims}
+        self.keys = 0
 
     def units(self) -> dict[str, str]:
         """Return the units of the columns; whatever is wrong with the question is found here."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
+        self.keys = sum(1 for _ in takewhile(lambda name: name in rows.coords, self._names(rows)))
         return self._frame(rows)[1]
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
@@ -187,11 +192,10 @@ class _Maker:
         return (part.stack(row=self._dims, create_index=False) if self._dims else part.expand_dims("row")).load()
 
     @property
-    def has_spared(self) -> bool:
-        """Whether there are cases that no realisation was needed of, as on adaptive axes; they have no row."""
-        if self._raw or self._question.group_by:
-            return False
-        return bool((self._data[STATUS].isel(realisation=0) == Status.NOT_NEEDED).any())
+    def may_leave_out(self) -> bool:
+        """Whether there may be cases without a row, because an adaptive axis did not need them."""
+        adaptive = "adaptive:" in str(self._data.attrs.get("campaign", ""))
+        return adaptive and not (self._raw or self._question.group_by)
 
     def _kept(self, rows: xr.Dataset) -> Any:
         needed = np.ones(rows.sizes["row"], dtype=bool)

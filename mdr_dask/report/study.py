@@ -130,7 +130,9 @@ def _read(url: str) -> Study:
         understood=[table for name, data in groups.items() for table in _understood(name, data)],
         counts=[_count_table(counted)],
         machines=_machines(records, held),
-        failures=progress.grouped([m for name, data in groups.items() for m in progress.messages(url, name, data)]),
+        failures=progress.grouped(
+            [m for name, data in groups.items() for m in progress.messages(url, name, data)], groups
+        ),
         laws=laws,
         not_fitted=not_fitted,
         errors=[table for name, data in groups.items() for table in _errors(name, data)],

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from mdr_dask import models
 from mdr_dask.arrays import IntArray
 from mdr_dask.campaign import Axis, Campaign, Series
+from mdr_dask.campaign.definition import SAME_DIGITS
 from mdr_dask.errors import StoreError
 from mdr_dask.models.data_file import DataFile
 from mdr_dask.store.files import ROOT
@@ -207,12 +208,12 @@ def _axis(series: Series, path: str) -> Axis:
 def _entries(columns: list[list[Any]]) -> dict[tuple[str, int], int]:
     """Return the position of every entry of a dimension, by the text of its values and how often it was there before.
 
-    Designs of whole numbers may have the same case twice.
+    Values that agree to `SAME_DIGITS` are the same. Designs of whole numbers may have the same case twice.
     """
     found: dict[tuple[str, int], int] = {}
     seen: Counter[str] = Counter()
     for position, entry in enumerate(zip(*columns, strict=True)):
-        text = json.dumps(entry, sort_keys=True)
+        text = json.dumps([float(f"{x:.{SAME_DIGITS}g}") if isinstance(x, float) else x for x in entry], sort_keys=True)
         found[text, seen[text]] = position
         seen[text] += 1
     return found
