@@ -1,4 +1,4 @@
-"""Units of campaign files and tables to SI: the one list, and the only module that knows pint."""
+"""Convert the units of campaign files and tables to SI; the only module that uses pint."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from mdr_dask.errors import did_you_mean, distinguishable
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
-#: In pint's language. Its own list has 900 units, takes ten times as long to read, and holds single letters that are
-#: rather mistakes in a campaign (``c``, ``e``, ``M``); here angles have a dimension of their own.
+#: In the language of pint. Pint's own 900 units take ten times as long to read and contain single letters that are
+#: more likely mistakes in a campaign (``c``, ``e``, ``M``). Here angles have a dimension of their own.
 DEFINITIONS = """
 yocto- = 1e-24 = y-
 zepto- = 1e-21 = z-
@@ -77,7 +77,7 @@ ohm = volt / ampere = Ω
 siemens = ampere / volt = S
 """
 
-#: What a quantity of a SI unit is called in messages, with an example of how to write one.
+#: Names of quantities in messages by their SI unit, each with an example.
 _MEANINGS = {
     "1": ("a number", ""),
     "m": ("a length", "20 mm"),
@@ -104,19 +104,19 @@ _MEANINGS = {
     "W": ("a power", "1 W"),
 }
 
-#: What a unit may be: short, and with exponents of at most two digits. Others would keep pint busy for ever.
+#: Units are short and have exponents of at most two digits; others could keep pint busy for ever.
 _MOST_LETTERS = 60
-_UNTOLD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
+_BAD_POWER = re.compile(r"(\*\*|\^)\s*(?!\(?[-+]?\d{1,2}\)?(?![\d.]|\s*(\*\*|\^)))")
 
 _NOT_A_UNIT = re.compile(r"[,._]|\d(?!\s*/)|.*%.*%")
-#: A number with a decimal comma, one with a comma that may be either, and what looks like several numbers.
+#: A number with a decimal comma, one whose comma may separate thousands, and text that looks like several numbers.
 _COMMA = re.compile(r"\s*[+-]?\d*,\d+\s*([eE][+-]?\d+)?\s*[^\d,]*\Z")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3},\d{3}")
 _SEVERAL = re.compile(r"\d.*?(,|;|\.\.|\bto\b|\s-\s)\s*[+-]?[\d.]")
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*\Z", re.DOTALL)
 
 
-#: Units that a misspelt one is compared with.
+#: Units that an unknown one is compared with.
 COMMON = (
     "m mm um nm cm km s ms us min h m/s mm/s km/h N mN kN Pa kPa MPa GPa K degC deg rad Hz kHz kg g J W bar psi rpm "
     "inch percent meter metre millimeter micrometer nanometer kilometer micron second millisecond microsecond minute "
@@ -143,7 +143,7 @@ def to_si(value: str, unit: str) -> float:
     Raises
     ------
     ValueError
-        If it is no number with a unit, the unit is unknown or of another dimension.
+        If the text is not a number with a unit, or the unit is unknown or of another dimension.
     """
     match = _QUANTITY.match(value)
     if match is None or _SEVERAL.search(value) or not _may_be_unit(match[2]):
@@ -163,13 +163,13 @@ def to_si(value: str, unit: str) -> float:
 
 
 def unit_behind(value: str) -> str:
-    """Return the unit behind a number, empty if there is none."""
+    """Return the unit after a number, empty if there is none."""
     match = _QUANTITY.match(value)
     return match[2] if match and match[2] and is_unit(match[2]) else ""
 
 
 def spelt(value: str) -> str:
-    """Return how a number that is none is written: with a decimal point, or several as a list or a range."""
+    """Return a hint for a text that is not a number: a decimal point, or how lists and ranges are written."""
     if _THOUSANDS.fullmatch(value.strip()):
         return f" (write {value.replace(',', '')!r}, or {value.replace(',', '.')!r} with a decimal point)"
     if _COMMA.match(value):
@@ -180,20 +180,20 @@ def spelt(value: str) -> str:
 
 
 def expected(unit: str) -> str:
-    """Return how a message names a quantity of a unit: ``a length (such as '20 mm')``."""
+    """Return the name of a quantity for a message: ``a length (such as '20 mm')``."""
     spaced = unit.replace("*", " ").replace("**", "^")
     other = (f"a quantity in {unit}", f"1 {unit}") if is_unit(unit) else (f"a bare number in {unit}", "")
     name, example = _MEANINGS.get(spaced) or other
     return f"{name} (such as {example!r})" if example else name
 
 
-#: Prefixes of what is shown, with the powers of ten that they stand for.
+#: Prefixes of printed units by their powers of ten.
 _PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _LEADING = re.compile(r"(m|s|N|Pa|J|W|Hz|ohm|S)(?![\w^*])")
 
 
 def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
-    """Return a quantity as a reader writes it: ``0.5 mm/s`` of 5e-4 m/s, ``-20 degC`` of 253.15 K.
+    """Return a quantity for a reader: ``0.5 mm/s`` for 5e-4 m/s, ``-20 degC`` for 253.15 K.
 
     Parameters
     ----------
@@ -202,9 +202,9 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
     unit : str
         The SI unit, ``"1"`` for a pure number.
     digits : int
-        Most digits.
+        Largest number of digits.
     written : str
-        The unit to show it in, the usual one if empty.
+        The unit to print it in; a suitable prefix is chosen if it is empty.
     """
     if written:
         factor, zero = conversion(written, unit)
@@ -223,12 +223,12 @@ def shown(value: float, unit: str, digits: int = 4, written: str = "") -> str:
 
 
 def shown_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a quantity and its limits as a reader writes them, with the digits that tell one from the other."""
+    """Return a quantity and its limits for a reader, with as many digits as distinguish them."""
     return distinguishable(value, *limits, digits=4, write=lambda number, digits: shown(number, unit, digits))
 
 
 def seconds(duration: float) -> str:
-    """Return a duration as a person says it."""
+    """Return a duration for a reader: ``0.5 s``, ``2 min 5 s``, ``3 h 20 min``."""
     if duration < 60:
         return f"{duration:.2g} s" if duration < 10 else f"{duration:.0f} s"
     minutes, rest = divmod(round(duration), 60)
@@ -239,24 +239,7 @@ def seconds(duration: float) -> str:
     return f"{minutes // 60} h {minutes % 60} min"
 
 
-#: Units that people forget to write, by the SI unit that is read in their place.
-_FORGOTTEN = {
-    "m": ("mm", "um", "nm", "km"),
-    "m/s": ("mm/s", "um/s", "km/h"),
-    "s": ("ms", "us", "ns", "min", "h"),
-    "N": ("mN", "uN", "kN"),
-    "N/m": ("N/mm",),
-    "Pa": ("kPa", "MPa", "GPa"),
-    "Pa*s": ("mPa s",),
-    "1/Pa": ("1/MPa", "1/GPa"),
-    "m^2/s": ("mm^2/s",),
-    "rad": ("deg",),
-    "K": ("degC",),
-    "kg/m^3": ("g/cm^3",),
-    "J/mol": ("kJ/mol",),
-    "Hz": ("kHz", "MHz"),
-}
-#: A bare number further than this from the usual value is asked about, in decades; temperatures are never far off.
+#: Distance from the usual value, in decades, from which a bare number is questioned.
 _FAR, _FAR_TEMPERATURE = 3.0, 0.3
 
 
@@ -266,14 +249,11 @@ def is_far(value: float, unit: str, usual: str) -> bool:
 
 
 def likely(value: float, unit: str, usual: str) -> str:
-    """Return a bare number with the unit that was probably meant, empty if none brings it near the usual value."""
-    center = to_si(usual, unit)
-    meant = {}
-    for other in _FORGOTTEN.get(unit, ()):
-        with suppress(ValueError):  # beyond the largest number
-            meant[f"{value:g} {other}"] = to_si(f"{value!r} {other}", unit)
-    near = {text: _decades(size, center) for text, size in meant.items() if not is_far(size, unit, usual)}
-    return min(near, key=lambda text: near[text], default="")
+    """Return a bare number with the unit of the usual value if that brings it near, otherwise an empty text."""
+    meant = f"{value:g} {unit_behind(usual)}"
+    with suppress(ValueError):  # beyond the largest number
+        return "" if is_far(to_si(meant, unit), unit, usual) else meant
+    return ""
 
 
 def _decades(value: float, usual: float) -> float:
@@ -281,23 +261,23 @@ def _decades(value: float, usual: float) -> float:
 
 
 def example_unit(unit: str) -> str:
-    """Return a unit that a user would write for a quantity of a SI unit: MPa for Pa."""
+    """Return a common unit for quantities of a SI unit: MPa for Pa."""
     return _MEANINGS.get(unit, ("", f"1 {unit}"))[1].partition(" ")[2] or unit
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a unit of the list."""
+    """Return whether a text is a known unit."""
     if not _may_be_unit(text):
         return False
     try:
         registry().parse_units(_spelling(text))
-    except Exception:  # whatever its tokens happen to raise
+    except Exception:  # pint's parser raises many types
         return False
     return True
 
 
 def _may_be_unit(text: str) -> bool:
-    return not (_NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _UNTOLD_POWER.search(text))
+    return not (_NOT_A_UNIT.match(text) or len(text) > _MOST_LETTERS or _BAD_POWER.search(text))
 
 
 def _times(number: str, factor: float) -> float:
@@ -309,7 +289,7 @@ def _times(number: str, factor: float) -> float:
 
 @lru_cache(maxsize=1)
 def registry() -> UnitRegistry[Any]:
-    """Return the units of a campaign file; pint is imported here and not before."""
+    """Return the registry of `DEFINITIONS`; pint is imported only here, when it is needed."""
     from pint import UnitRegistry
 
     units: UnitRegistry[Any] = UnitRegistry(None)
@@ -319,7 +299,7 @@ def registry() -> UnitRegistry[Any]:
 
 @lru_cache(maxsize=1024)
 def conversion(given: str, unit: str) -> tuple[float, float]:
-    """Return factor and zero of a unit: a number of `given` times the factor, plus the zero, is one of `unit`.
+    """Return factor and zero of a unit, so that ``number [given] = number * factor + zero [unit]``.
 
     Raises
     ------
@@ -338,7 +318,7 @@ def conversion(given: str, unit: str) -> tuple[float, float]:
     except DimensionalityError:
         weight = " (1 kg weighs 9.81 N)" if source == units.kilogram and target == units.newton else ""
         raise ValueError(f"expected {expected(unit)}{weight}") from None
-    except Exception:  # pint's parser raises what its tokens happen to raise: TypeError, AssertionError, ...
+    except Exception:  # pint's parser raises many types: TypeError, AssertionError, ...
         raise ValueError(f"expected {expected(unit)}") from None
     return (1.0, zero) if zero else (one, 0.0)
 
@@ -349,12 +329,12 @@ _COHERENT = {"length": "m", "mass": "kg", "time": "s", "temperature": "K", "curr
 
 @lru_cache(maxsize=1024)
 def dimension_of(unit: str) -> tuple[Any, str]:
-    """Return the dimension of a unit, as pint knows it, and the coherent SI unit of that dimension.
+    """Return the dimension of a unit, as pint writes it, and the coherent SI unit of that dimension.
 
     Raises
     ------
     ValueError
-        If it is no unit of the list.
+        If it is not a known unit.
     """
     if unit not in ("", "1") and not is_unit(unit):
         raise ValueError(f"unknown unit {unit!r}{_nearest(unit)}")
@@ -369,8 +349,8 @@ def _spelling(unit: str) -> str:
 
 
 def _nearest(word: str, unit: str = "") -> str:
-    """Return what to write in place of an unknown unit; one of the dimension of `unit`, if that is known."""
-    if word in ("C", "F"):  # of degrees, for the coulomb and the farad there is no use here
+    """Return a hint for an unknown unit: the nearest known one, of the dimension of `unit` if that is known."""
+    if word in ("C", "F"):  # nobody means coulomb or farad here
         return ", temperatures are in 'degC', '°C' or 'K'"
     power = re.fullmatch(r"([a-zA-Zµ]+)(\d)", word)
     if power and is_unit(power[1]):

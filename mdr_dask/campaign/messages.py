@@ -1,4 +1,4 @@
-"""Validation errors of pydantic to sentences for the user, each at its place in the file."""
+"""Turn validation errors of pydantic into messages, each with its place in the file."""
 
 from __future__ import annotations
 
@@ -17,13 +17,11 @@ from mdr_dask.models.data_file import DataFile
 from mdr_dask.models.parts.named_by_file import NamedByFile
 from mdr_dask.units import expected, likely, spelt
 
-#: Adds one problem: path into the data, whether the key is meant rather than its value, and the sentence.
+#: Adds one problem: the path into the data, whether it concerns the key rather than its value, and the message.
 Report = Callable[[Path, bool, str], None]
 
 _BOUNDS = {"greater_than": ("gt", "above"), "greater_than_equal": ("ge", "of at least")}
 _BOUNDS |= {"less_than": ("lt", "below"), "less_than_equal": ("le", "of at most")}
-_ROUND = ("sphere", "ball", "spherical")
-_SPHERE = " (a sphere is a parabola of its radius: {shape: parabola, radius: ...})"
 _KINDS = {
     "int_type": "a whole number",
     "int_from_float": "a whole number",
@@ -38,7 +36,7 @@ _KINDS = {
 
 
 def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, report: Report) -> None:
-    """Report every error of a validation; those of the branches of one union become one sentence.
+    """Report every error of a validation; the errors of all branches of a union become one message.
 
     Parameters
     ----------
@@ -49,7 +47,7 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
     data : object
         The plain data that were validated.
     report : callable
-        Receives path, whether the key is meant, and the sentence.
+        Receives each problem.
     """
     groups: dict[Path, list[ErrorDetails]] = {}
     for details in error.errors(include_url=False):
@@ -58,13 +56,13 @@ def report_errors(error: ValidationError, kind: type[BaseModel], data: Any, repo
         groups.setdefault(path_into(data, details), []).append(details)
     for path, group in groups.items():
         inside = any(len(other) > len(path) and other[: len(path)] == path for other in groups)
-        if inside and group[0]["type"] == "too_short":  # a list is short of the entries that are told of themselves
+        if inside and group[0]["type"] == "too_short":  # the missing entries have messages of their own
             continue
         _report_group(path, group, kind, data, report)
 
 
 def path_into(data: Any, details: ErrorDetails) -> Path:
-    """Return the path into the data that an error speaks of, without the names of union branches in its ``loc``."""
+    """Return the path of an error into the data, without the names of union branches in its ``loc``."""
     path: Path = ()
     location = details["loc"]
     for depth, part in enumerate(location):
@@ -79,25 +77,25 @@ def path_into(data: Any, details: ErrorDetails) -> Path:
 
 
 def _is_of_another_branch(details: ErrorDetails, kind: type[BaseModel], data: Any) -> bool:
-    """Return whether an error comes from trying a structure that the value does not claim to be."""
+    """Return whether an error belongs to a structure that the keys of the value exclude."""
     path: Path = ()
     value = data
     for part in details["loc"]:
         if isinstance(value, Mapping) and part in value:
             path, value = (*path, part), value[part]
             continue
-        found = fields.owner(kind, path, data)
-        info = found[0].model_fields[found[1]] if found else None
+        info = _field(kind, path, data)
         claimed = fields.structure(info, value) if info else None
-        if info and claimed and _names_another(str(part), info, claimed):
-            return True
+        if info and claimed:
+            others = {one.__name__ for one in fields.structures(info)} - {claimed.__name__}
+            if part in others or str(part).startswith("literal["):
+                return True
     return False
 
 
-def _names_another(part: str, info: FieldInfo, claimed: type[BaseModel]) -> bool:
-    """Return whether a part of an error's place is a branch of a union that a mapping does not claim to be."""
-    others = {one.__name__ for one in fields.structures(info)} - {claimed.__name__}
-    return part in others or part.startswith("literal[")
+def _field(kind: type[BaseModel], path: Path, data: Any) -> FieldInfo | None:
+    found = fields.owner(kind, path, data)
+    return found[0].model_fields[found[1]] if found else None
 
 
 def _tag_key(data: Mapping[str, Any], tag: str) -> list[str]:
@@ -129,7 +127,7 @@ def _report_group(path: Path, group: list[ErrorDetails], kind: type[BaseModel], 
 
 
 def _entry(value: Any, what: str) -> Path:
-    """Return the index of the entry of a list that a sentence quotes."""
+    """Return the index of the list entry that a message quotes."""
     entries = value if isinstance(value, list) else []
     return tuple(index for index, entry in enumerate(entries) if what.endswith(f"got {entry!r}"))[:1]
 
@@ -137,8 +135,6 @@ def _entry(value: Any, what: str) -> Path:
 def _hint(group: list[ErrorDetails], value: Any) -> str:
     types = {details["type"] for details in group}
     choices = [choice for details in group for choice in _choices(details)]
-    if isinstance(value, str) and value.casefold() in _ROUND and "parabola" in choices:
-        return _SPHERE
     if isinstance(value, str):
         hint = did_you_mean(value, choices)
         return hint if "mean" in hint else spelt(value) if types & {"int_type", "float_type"} else ""
@@ -150,9 +146,9 @@ def _hint(group: list[ErrorDetails], value: Any) -> str:
 
 
 def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return the unit that a bare number out of bounds may lack."""
-    value, found, unit = value_at(data, path), fields.owner(kind, path, data), fields.unit_at(kind, path, data)
-    usual = fields.usual(found[0].model_fields[found[1]]) if found else ""
+    """Return a hint to the unit that a bare number out of bounds may lack."""
+    value, info, unit = value_at(data, path), _field(kind, path, data), fields.unit_at(kind, path, data)
+    usual = fields.usual(info) if info else ""
     if not isinstance(value, int | float) or group[0]["type"] not in _BOUNDS:
         return ""
     if unit == "1" and value in range(1, 101) and next(iter(group[0]["ctx"].values())) == 1:
@@ -162,14 +158,10 @@ def _forgotten_unit(group: list[ErrorDetails], path: Path, kind: type[BaseModel]
 
 
 def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Return how a word is written that stands where a mapping or a list is expected."""
-    value, found = value_at(data, path), fields.owner(kind, path, data)
-    if not found or not isinstance(value, str):
+    """Return a hint how to write a word that was given in place of a mapping or a list."""
+    value, info = value_at(data, path), _field(kind, path, data)
+    if not info or not isinstance(value, str):
         return ""
-    info = found[0].model_fields[found[1]]
-    shapes = [only for one in fields.structures(info) for only in fields.fixed(one).values()]
-    if value.casefold() in _ROUND and "parabola" in shapes:
-        return _SPHERE
     for one in fields.structures(info):
         if value in one.model_fields:
             return f" (write {{{value}: ...}})"
@@ -185,14 +177,14 @@ def _meant(path: Path, kind: type[BaseModel], data: Any) -> str:
 
 
 def _of_file(info: FieldInfo) -> list[str]:
-    """Return the entries of a parameter's structures for which the name of a file stands."""
+    """Return the entries of the structures of a field that take the name of a file."""
     inner = [entry for one in fields.structures(info) for entry in one.model_fields.items()]
     named = (DataFile, NamedByFile)
     return [name for name, entry in inner if any(issubclass(one, named) for one in fields.structures(entry))]
 
 
 def required(kind: type[BaseModel]) -> list[str]:
-    """Return the fields without which a parameter set is none, those with one value apart."""
+    """Return the required fields of a parameter set, without those that have one value only."""
     return [name for name, info in kind.model_fields.items() if info.is_required() and name not in fields.fixed(kind)]
 
 
@@ -223,8 +215,8 @@ def _wanted(details: ErrorDetails, path: Path, kind: type[BaseModel], data: Any)
 
 def _kinds(path: Path, kind: type[BaseModel], data: Any) -> str:
     """Return ``a mapping with shape: 'cone' or 'plane'`` for a parameter that has several structures."""
-    found = fields.owner(kind, path, data)
-    structures = fields.structures(found[0].model_fields[found[1]]) if found else ()
+    info = _field(kind, path, data)
+    structures = fields.structures(info) if info else ()
     keys = [(key, value) for one in structures for key, value in fields.fixed(one).items()]
     if not keys:
         return "a mapping"
@@ -248,18 +240,15 @@ def _listed(words: Iterable[str]) -> str:
 
 
 def _missing(path: Path, kind: type[BaseModel], data: Any) -> str:
-    found = fields.owner(kind, path, data)
-    if found is None:
+    info, unit = _field(kind, path, data), fields.unit_at(kind, path, data)
+    if info is None:
         return "missing"
-    description = found[0].model_fields[found[1]].description
-    unit = fields.unit_at(kind, path, data)
-    return ", ".join(filter(None, ["missing", unit and f"expected {expected(unit)}"])) + (
-        f": {description}" if description else ""
-    )
+    what = f"missing, expected {expected(unit)}" if unit else "missing"
+    return f"{what}: {info.description}" if info.description else what
 
 
 def _unknown(path: Path, kind: type[BaseModel], data: Any) -> str:
-    """Say that the last part of a path is no key: what it is called now, or what it may have been meant to be."""
+    """Return the message about an unknown key: its new name, or the nearest known one."""
     around = _structure_around(path, kind, data)
     instead = getattr(around, "renamed", {}).get(path[-1])
     if instead:
