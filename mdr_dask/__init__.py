@@ -1,6 +1,6 @@
 """A distributed parameter-study runner for tribology with the method of dimensionality reduction.
 
-The names below are loaded when they are first used: importing the package loads neither dask nor numba nor matplotlib.
+The names below are imported when they are first used, so that importing the package is quick.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""The reference of the public functions, made from their docstrings: ``python -m mdr_dask.api > docs/api.md``."""
+"""Write the reference of the public functions from their docstrings: ``python -m mdr_dask.api > docs/api.md``."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from typing import Any
 _HEAD = """\
 # Python reference
 
-Made by `python -m mdr_dask.api > docs/api.md`; do not edit. [Python](python.md) shows how a study is run.
-Physics is arrays in, arrays out: numpy, no files, no campaign, units as each function says. Every example runs with
-the tests.
+Made by `python -m mdr_dask.api > docs/api.md`; do not edit. [Python](python.md) shows how to run a study. The functions
+of the physics take and return numpy arrays in the units that each of them states. All examples are tested.
 """
 
-#: What is public, by subject: module and names.
+#: Public names by subject and module.
 PUBLIC: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "Studies": (
         (

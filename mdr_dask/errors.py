@@ -1,4 +1,4 @@
-"""The exceptions of mdr_dask: every one survives pickling, so that a worker can send it home; and parts of messages."""
+"""The exceptions of mdr_dask, which can be pickled for workers, and parts of messages."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ class MdrDaskError(Exception):
 
 
 class CampaignError(MdrDaskError):
-    """A campaign file that cannot be run; its arguments are all problems found, one sentence each."""
+    """A campaign that cannot be run; its arguments are the messages about all problems."""
 
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.args)
 
 
 class ModelError(MdrDaskError):
-    """A model that is missing, or cannot be loaded."""
+    """A model that does not exist or cannot be loaded."""
 
 
 class StoreError(MdrDaskError):
-    """A store that cannot be read, written or extended as asked."""
+    """A store that cannot be read, written or extended."""
 
 
 class StoreBusyError(StoreError):
-    """Another runner is at work on the store."""
+    """A store that is in use by another run."""
 
 
 class ClusterError(MdrDaskError):
-    """A Dask cluster that does not answer, goes away, or runs another version of the program."""
+    """A Dask cluster that does not answer, disappears, or has another version of mdr_dask."""
 
 
 class MachineError(MdrDaskError):
@@ -38,14 +38,14 @@ class MachineError(MdrDaskError):
 
 
 class DataError(MdrDaskError):
-    """A table, profile or selection that does not hold what was asked of it."""
+    """A table, profile or selection that lacks what is needed."""
 
 
 class FitError(MdrDaskError):
-    """A law that cannot be fitted to the data given."""
+    """A law that cannot be fitted to the data."""
 
 
-#: Digits that tell any two numbers of a computer apart.
+#: Digits that distinguish any two floating-point numbers.
 _ALL_DIGITS = 17
 
 
@@ -56,15 +56,15 @@ def _rounded(number: float, digits: int) -> str:
 def distinguishable(
     value: float, *limits: float, digits: int = 3, write: Callable[[float, int], str] = _rounded
 ) -> tuple[str, ...]:
-    """Return a number and its limits with the fewest digits, some at least, that tell it from those it differs from."""
+    """Return a number and its limits with at least `digits` digits, and as many as distinguish different ones."""
     for more in range(digits, _ALL_DIGITS):
-        told, *others = (write(number, more) for number in (value, *limits))
-        if all(text != told for text, limit in zip(others, limits, strict=True) if limit != value):
-            return told, *others
+        first, *others = (write(number, more) for number in (value, *limits))
+        if all(text != first for text, limit in zip(others, limits, strict=True) if limit != value):
+            return first, *others
     return tuple(write(number, _ALL_DIGITS) for number in (value, *limits))
 
 
-#: What words in a name stand for others that people use.
+#: Parameters and outputs by other common names.
 _SYNONYMS = {
     "load": ("normal_force", "line_load"),
     "speed": ("velocity", "mean_velocity", "rotation_speed"),
@@ -83,7 +83,7 @@ _SYNONYMS = {
 
 
 def did_you_mean(word: Any, known: Sequence[str]) -> str:
-    """Return a hint in parentheses, with a leading blank: the nearest known word, or all of them if they are few."""
+    """Return a hint in parentheses, with a leading blank: the nearest known word, or all words if they are few."""
     from difflib import get_close_matches
 
     folded = {name.casefold(): name for name in known}

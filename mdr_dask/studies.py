@@ -1,6 +1,6 @@
-"""Studies from Python: what the commands do, with dictionaries for campaign files and labelled arrays for tables.
+"""Run and analyse studies from Python, with dictionaries for campaign files and labelled arrays for results.
 
-Importing this module gives every Dataset the accessor ``mdr``.
+Importing this module registers the accessor ``mdr`` of every Dataset.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from mdr_dask import aggregation, campaign, fits, plots, store
 from mdr_dask.bars import reporter
 from mdr_dask.campaign import Campaign
 from mdr_dask.campaign.keys import of_keys
-from mdr_dask.errors import DataError, did_you_mean
+from mdr_dask.errors import CampaignError, DataError, did_you_mean
 from mdr_dask.execute import Resources
 from mdr_dask.execute import run as execute
 from mdr_dask.questions import selection
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 
     from mdr_dask.plots.base import Plot
 
-#: What can be run: the keys of a campaign file, or the path of one.
+#: A campaign: the keys of a campaign file, or its path.
 Source = Mapping[str, Any] | str | Path | Campaign
-#: What can be looked at: the result of `run` or `open_study`, or the path or URL of a store.
+#: A study: the result of `run` or `open_study`, or the path or URL of a store.
 Study = xr.Dataset | xr.DataTree | str | Path
 #: One name or condition, or several.
 Words = str | Sequence[str]
@@ -52,33 +52,35 @@ def read(source: Source) -> Campaign:
     Parameters
     ----------
     source : mapping, str, Path or Campaign
-        The keys of a campaign file, with numbers in SI or strings with units, lists and numpy arrays; the name may be
-        left out. Or the path of a campaign file.
+        The path of a campaign file, or its keys: numbers in SI units, strings with units, pint quantities, lists and
+        numpy arrays. The key ``name`` is optional.
 
     Raises
     ------
     CampaignError
-        With every problem, as ``mdr-dask check`` tells them.
+        With all problems, as in ``mdr-dask check``.
     """
     if isinstance(source, Campaign):
         return source
     if isinstance(source, Mapping):
         return of_keys(source)
+    if not isinstance(source, str | Path):
+        raise CampaignError(f"expected the keys of a campaign file or its path, got {type(source).__name__}")
     return campaign.load(source)
 
 
 def check(source: Source) -> Summary:
-    """Check a campaign, and say what was understood and what it will cost.
+    """Check a campaign, and summarise what it will compute and cost.
 
     Returns
     -------
     Summary
-        Counts, bytes and seconds; printed, or at the end of a cell, it is the lines of ``mdr-dask check``.
+        Counts, bytes and seconds; printed, it shows the lines of ``mdr-dask check``.
 
     Raises
     ------
     CampaignError
-        With every problem at once.
+        With all problems.
 
     Examples
     --------
@@ -97,34 +99,33 @@ def run(
     resources: Resources | None = None,
     retry_failed: bool = False,
 ) -> xr.Dataset | xr.DataTree:
-    """Run a campaign, or what is missing of it, and return the study.
+    """Compute the results of a campaign that are missing, and return the study.
 
-    Interrupt it, and run it again: what is in the store is kept, and only the rest is computed.
+    After an interruption, run it again: finished results are kept.
 
     Parameters
     ----------
     source : mapping, str, Path or Campaign
         As `read` takes it.
     store : str or Path, optional
-        Path or URL of the store. Without it, a file's campaign goes where the command line puts it, a dictionary's
-        where its key ``store`` says. Otherwise it is a temporary place that lasts as long as this process; there
-        the same dictionary finds its results.
+        Path or URL of the store. The default is the store of the campaign file, or the key ``store`` of a dictionary;
+        without it a temporary folder that is kept until the process ends.
     progress : bool
-        Show a bar in a notebook or on a terminal, or a line now and then.
+        Show a progress bar in a notebook or on a terminal, elsewhere a line every few seconds.
     resources : Resources, optional
-        Threads, workers, a scheduler or a cluster; all cores of this machine if there is none.
+        Threads, processes, a scheduler or a cluster; the default is all cores of this machine.
     retry_failed : bool
-        Compute the cases again that failed or did not converge.
+        Compute failed and not converged cases again.
 
     Returns
     -------
     Dataset or DataTree
-        As `open_study` returns it. Warnings ask about bare numbers far from the usual, and say how many results failed.
+        As `open_study` returns it. Failed results and questions about bare numbers are warnings.
 
     Raises
     ------
     MdrDaskError
-        With the sentences of the command line.
+        With the messages of the command line.
 
     Examples
     --------
@@ -151,8 +152,8 @@ def open_study(url: str | Path) -> xr.Dataset | xr.DataTree:
     Returns
     -------
     Dataset or DataTree
-        Outputs over the axes and ``realisation``, with units, companions with errors, and ``status``; a DataTree with a
-        node for each series where there are series. Arrays are read when they are used.
+        Outputs along the axes and ``realisation``, with units, their errors, and ``status``; for a campaign with
+        series a DataTree with a node for each. Arrays are read when they are used.
 
     Raises
     ------
@@ -176,16 +177,16 @@ def aggregate(
     columns: Words = (),
     units: Mapping[str, str] | None = None,
 ) -> xr.Dataset:
-    """Reduce outputs over their realisations, as ``mdr-dask aggregate`` does.
+    """Reduce outputs over realisations, like ``mdr-dask aggregate``.
 
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
-        As `run` or `open_study` returns it, or where its store is.
+        A study, or the path or URL of its store.
     statistics : sequence of str
         Some of `mdr_dask.aggregation.NAMES`.
     series, select, where, group_by, columns, units
-        As on the command line (docs/questions.md).
+        As the options of the command (docs/questions.md).
 
     Returns
     -------
@@ -211,12 +212,12 @@ def table(
     units: Mapping[str, str] | None = None,
     limit: int = 0,
 ) -> pd.DataFrame:
-    """Return a study as a table, as ``mdr-dask show`` does; every result has a row if `statistics` is None.
+    """Return a study as a table, like ``mdr-dask show``; with ``statistics=None`` a row for each result.
 
     Returns
     -------
     pandas.DataFrame
-        The units of its columns are in ``attrs["units"]``.
+        With the units of the columns in ``attrs["units"]``.
     """
     import pandas as pd
 
@@ -232,26 +233,26 @@ def table(
 
 
 def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = None) -> xr.Dataset | xr.DataTree:
-    """Fit a law, each constant with its interval, as ``mdr-dask fit`` does.
+    """Fit a law, each constant with its 95 % interval, like ``mdr-dask fit``.
 
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
         A study, or the path of its store.
     law : str
-        Its name; ``calibration`` explains measured points.
+        Its name; ``calibration`` finds parameters from measured points.
     measured : str, Path or DataFrame, optional
-        Table of measured points, in place of the campaign's; units stand in brackets behind the names of its columns.
+        Table of measured points, in place of that of the campaign; units are in brackets after the column names.
 
     Returns
     -------
     Dataset or DataTree
-        Constants with ``_low`` and ``_high``, and ``law_holds``; a node for each series where they are fitted apart.
+        Constants with ``_low`` and ``_high``, and ``law_holds``; a node for each series that is fitted separately.
 
     Raises
     ------
     FitError
-        If the study has not what the law needs.
+        If the study lacks a quantity that the law needs.
     """
     groups = _groups(study)
     if measured is not None:
@@ -264,29 +265,29 @@ def fit(study: Study, law: str, measured: str | Path | pd.DataFrame | None = Non
 
 
 def plot(study: Study, figure: str, select: Words = (), **view: Any) -> Figure:
-    """Draw a figure by its name, or an output, as ``mdr-dask plot`` does; ``.save`` writes it, and its data beside it.
+    """Draw a named figure or an output, like ``mdr-dask plot``; ``.save`` writes the figure and its data.
 
     Parameters
     ----------
     study : Dataset, DataTree, str or Path
         A study, or the path of its store.
     figure : str
-        Name of a figure, or of an output where `view` says how it is drawn.
+        Name of a figure, or of an output to draw as `view` says.
     select : sequence of str
-        Parts of the study, as in ``--select``.
+        Parts of the study, as for the option ``--select``.
     **view
-        ``over``, an axis or two for a map, ``by``, ``panels`` and ``log``; ``over=()`` draws main effects. See
+        ``over`` (an axis, two for a map, none for main effects), ``by``, ``panels`` and ``log``; see
         :class:`mdr_dask.plots.outputs.View`.
 
     Returns
     -------
     Figure
-        Of matplotlib; ``.table()`` gives the data drawn.
+        A figure of matplotlib; ``.table()`` returns its data.
 
     Raises
     ------
     DataError, FitError
-        If the study has not what the figure needs.
+        If the study lacks a quantity that the figure needs.
     """
     groups = _groups(study)
     model = _model(groups)
@@ -312,7 +313,7 @@ def master_curve(
     reference: float | None = None,
     bootstrap: int = 0,
 ) -> xr.Dataset:
-    """Shift curves into one master curve, as ``mdr-dask master-curve`` does.
+    """Shift curves into one master curve, like ``mdr-dask master-curve``.
 
     Parameters
     ----------
@@ -340,21 +341,21 @@ def master_curve(
 
 @xr.register_dataset_accessor("mdr")  # type: ignore[no-untyped-call]
 class StudyAccessor:
-    """``study.mdr``: what labelled arrays alone do not know of a study."""
+    """The accessor ``study.mdr``: numbers, states and queries of a study."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
         self._dataset = dataset
 
     @property
     def numbers(self) -> xr.Dataset:
-        """The dimensionless numbers of the cases that the study has the ingredients for, of means over realisations."""
+        """The dimensionless numbers of the cases, as far as the study has all parts of their formulas."""
         columns = Columns(self._dataset)
         known = [name for name in numbers(self._dataset) if columns.find(name) is not None]
         return xr.Dataset({name: columns.column(name) for name in known if name not in self._dataset})
 
     @property
     def states(self) -> xr.DataArray:
-        """What became of every case: ``done``, or how many of its realisations are missing, failed, not converged."""
+        """The state of every case: ``done``, or how many realisations are missing, failed or not converged."""
         return states(self._dataset)
 
     def select(self, *selections: str) -> xr.Dataset:
@@ -383,7 +384,7 @@ class StudyAccessor:
 
 
 def _place(found: Campaign, is_temporary: bool) -> str:
-    """Return the store of a campaign; a temporary one is known by all that the campaign says."""
+    """Return the store of a campaign; the name of a temporary one depends on the whole text of the campaign."""
     if not is_temporary:
         return found.store
     digest = hashlib.sha256(found.text.encode()).hexdigest()[:16]
@@ -417,7 +418,7 @@ def _groups(study: Study) -> dict[str, xr.Dataset]:
 
 
 def _several(words: Words) -> tuple[str, ...]:
-    """Return words that were given one alone or in a sequence."""
+    """Return one or several words as a tuple."""
     return (words,) if isinstance(words, str) else tuple(words)
 
 

@@ -27,7 +27,6 @@ VELOCITY = "{geometric: [1 mm/s, 1 m/s, 4]}"
 LENGTH = "expected a length (such as '20 mm'), got"
 VELOCITIES = "13:13: parameters.velocity: expected a velocity (such as '1 mm/s'), got"
 SEVERAL = "(several values are [a, b, c], a range {linear: [a, b, n]} or {geometric: [a, b, n]})"
-SPHERE = "(a sphere is a parabola of its radius: {shape: parabola, radius: ...})"
 
 #: What is changed into what, and the sentence: line and column, key, what was expected, what to do.
 MISTAKES = [
@@ -45,17 +44,17 @@ MISTAKES = [
     ("accuracy: 1 %", "output: [mu]", "14:1: output: unknown key (did you mean 'outputs'?)"),
     ("accuracy: 1 %", "store: a.zarr", "14:8: store: expected a mapping, got 'a.zarr' (write {path: a.zarr})"),
     ("accuracy: 1 %", "sampling: sobol", "expected 'grid' or 'zip', got 'sobol' (write {sobol: ...})"),
-    ("name: study", "name: my study", "1:7: name: expected letters, digits, '-', '_' and '.' only, for it names a fi"),
+    ("name: study", "name: my study", "1:7: name: expected a file name of letters, digits, '-', '_' and '.', got"),
     (
         "realisations: 2",
         "realisations: {at_least: 4, at_most: 40, until: {zone_one.alpha: little}}",
         "4:66: realisations.until.zone_one.alpha: expected a number, got 'little'",
     ),
-    ("name: study", f"name: {'a' * 101}", "1:7: name: expected at most 100 characters, for it names a file of the sto"),
+    ("name: study", f"name: {'a' * 101}", "1:7: name: expected a file name with at most 100 characters, got"),
     (
         "name: study",
         f"name: {'a' * 92}.partial",
-        "name: expected no such ending, for it names a file of the store, got",
+        "name: expected a file name with another ending, got",
     ),
     # numbers
     ("hurst: 0.7", "hurst: 0,7", "8:10: parameters.hurst: expected a number, got '0,7' (write a decimal point: '0.7')"),
@@ -98,11 +97,11 @@ MISTAKES = [
     (VELOCITY, "{linear: [1 mm/s, 1 m/s]}", "expected [first, last, count], got ['1 mm/s', '1 m/s']"),
     (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "expected an end above 0 of a geometric range, got 0"),
     # YAML
-    ("hurst: 0.7", "hurst:0.7", "could not find expected ':' (a blank is missing behind 'hurst:' in line 8)"),
+    ("hurst: 0.7", "hurst:0.7", "could not find expected ':' (a blank is missing after 'hurst:' in line 8)"),
     (
         "geometric: ",
         "geometric:",
-        "expected ',' or '}', but got '[' (a blank is missing behind 'geometric:' in line 13)",
+        "expected ',' or '}', but got '[' (a blank is missing after 'geometric:' in line 13)",
     ),
     ("  points", "\tpoints", "(indent with blanks, not with tabs)"),
     ("  length", "   length", "(entries of one mapping begin in the same column)"),
@@ -117,12 +116,8 @@ MISTAKES = [
     ("hurst: 0.7", "surface: {profile: no.csv}", "no.csv (names begin at the folder of the campaign file)"),
     ("hurst: 0.7", "surface: {profile: README.ms}", "README.ms (did you mean 'README.md'?)"),
     # bodies
-    (
-        "hurst: 0.7",
-        "indenter: {shape: sphere}",
-        f"8:21: parameters.indenter.shape: expected 'plane', 'cone', '|{SPHERE}",
-    ),
-    ("hurst: 0.7", "indenter: ball", f"got 'ball' {SPHERE}"),
+    ("hurst: 0.7", "indenter: {shape: sphere}", "8:21: parameters.indenter.shape: expected 'plane', 'cone', '"),
+    ("hurst: 0.7", "indenter: ball", "expected a mapping with shape: 'plane', 'cone', "),
     ("hurst: 0.7", "indenter: cone", "got 'cone' (write {shape: cone, angle: ...})"),
     ("hurst: 0.7", "indenter: {shape: cone, angle: 30}", "below 1.57079632679 rad, got 30 (write '30 deg' if you mean"),
     ("hurst: 0.7", "material: {kelvin: {}}", "parameters.material.kelvin.shear_modulus: missing, expected a pressure"),

@@ -1,4 +1,4 @@
-"""The campaign file: text to checked, frozen data."""
+"""The campaign file: from text to checked, frozen data."""
 
 from mdr_dask.campaign.definition import Axis, Campaign, Refinement, Replication, Series, Spread, Tolerance
 from mdr_dask.campaign.read import load, loads

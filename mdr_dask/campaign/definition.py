@@ -1,4 +1,4 @@
-"""The nouns of a campaign: checked, in SI, frozen. Nothing here reads a file."""
+"""The data classes of a campaign: checked, in SI units and frozen."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from mdr_dask.models.data_file import DataFile
 _DIGITS = 14
 #: Digits to which two values of an axis differ at least; closer ones are one value, computed once.
 SAME_DIGITS = 12
-#: Most values of an axis that are looked at where all would take long.
+#: Values of an axis that are examined where all of them would take too long.
 SOME = 64
 
 
 @dataclass(frozen=True)
 class Spread:
-    """An interval from which values are taken, evenly in the value or in its logarithm."""
+    """An interval from which values are drawn, uniformly in the value or in its logarithm."""
 
     low: float
     high: float
@@ -29,7 +29,7 @@ class Spread:
     whole: bool
 
     def at(self, shares: Any) -> list[float]:
-        """Return the values at shares of the interval between 0 and 1, with 14 digits, so that decades are decades."""
+        """Return the values at fractions (0 to 1) of the interval, rounded to 14 digits so that decades are exact."""
         if self.geometric:
             values = self.low * (self.high / self.low) ** shares
         else:
@@ -38,7 +38,7 @@ class Spread:
         return [tidy(value, self.whole) for value in values]
 
     def shares(self, values: Any) -> FloatArray:
-        """Return where values lie in the interval: the inverse of `at`."""
+        """Return the fractions of the interval at which values lie: the inverse of `at`."""
         numbers = np.asarray(values, dtype=np.float64)
         if self.geometric:
             found: FloatArray = np.log(numbers / self.low) / np.log(self.high / self.low)
@@ -48,7 +48,7 @@ class Spread:
 
 
 def tidy(value: float, whole: bool, exact: bool = False) -> float:
-    """Return a number as a range holds it: whole, exactly as given, or with 14 digits."""
+    """Return a number of a range: rounded to a whole number, exactly as given, or to 14 digits."""
     if whole:
         return round(value)
     return float(value) if exact else float(f"{value:.{_DIGITS}g}")
@@ -69,13 +69,13 @@ class Axis:
     values : tuple
         Checked values in SI, in the order of the file: numbers, names, or whole parameter sets.
     labels : tuple of str or None
-        What stands in the store for values that are not numbers.
+        Names in the store for values that are not numbers.
     unit : str or None
         SI unit, ``"1"`` for pure numbers, None for names.
     long_name : str
         The parameter's meaning.
     refinement : Refinement or None
-        How more values are chosen, where the study does so itself.
+        How further values are chosen, for an adaptive axis.
     """
 
     path: str
@@ -89,7 +89,7 @@ class Axis:
 
     @property
     def some(self) -> list[Any]:
-        """At most `SOME` of its values, the first and the last among them."""
+        """At most `SOME` of its values, evenly spread, with the first and the last."""
         places = np.linspace(0, len(self.values) - 1, min(len(self.values), SOME)).round().astype(int)
         return [self.values[place] for place in places]
 
@@ -101,7 +101,7 @@ class Series:
     Parameters
     ----------
     name : str
-        Name of its Zarr group; empty for a campaign without series, whose arrays stand at the root.
+        Name of its Zarr group; empty for a campaign without series, whose arrays are at the root.
     parameters : Parameters
         The parameters with every axis at its first value.
     axes : tuple of Axis
@@ -120,7 +120,10 @@ class Series:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How small an error has to be: both parts zero means nothing is enough; where it stands in its file."""
+    """Largest error that is accepted: a part of the value, or an absolute one; either is enough.
+
+    `place` is its position in the campaign file.
+    """
 
     relative: float = 0.0
     absolute: float = 0.0
@@ -129,16 +132,16 @@ class Tolerance:
 
 @dataclass(frozen=True)
 class Refinement:
-    """How a study chooses the values of an axis itself.
+    """How a study chooses the values of an adaptive axis.
 
     Parameters
     ----------
     spread : Spread
         The interval, on the scale on which outputs are interpolated.
     until : mapping of str to Tolerance
-        Error of interpolation allowed, by output; its relative part is one of the largest value along the axis.
+        Largest error of interpolation, by output; its relative part refers to the largest value along the axis.
     at_most : int
-        Most values of the axis.
+        Largest number of values.
     """
 
     spread: Spread
@@ -148,16 +151,16 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Replication:
-    """How many realisations each case gets: ``at_least``, then whole rounds until every tolerance is met.
+    """How many realisations each case gets: `at_least`, then rounds until every tolerance is met.
 
     Parameters
     ----------
     at_least, at_most : int
-        Realisations of the first round, and of the last one that there may be.
+        Number of realisations of the first round, and the largest number.
     until : mapping of str to Tolerance
-        Standard error of the mean of outputs.
+        Largest standard errors of means, by output.
     answers : mapping of str to Tolerance
-        Half of the 95 % interval of fitted constants, by ``fit.constant``; cases go on that narrow it.
+        Largest half widths of the 95 % intervals of fitted constants, by ``fit.constant``.
     """
 
     at_least: int
@@ -192,11 +195,11 @@ class Campaign:
     store : str
         Path (relative to the working directory) or URL of the store.
     blocks : mapping of str to int
-        Chunk lengths asked for by dimension; the others are chosen.
+        Chunk lengths set in the file, by dimension; the others are chosen.
     text, source : str
         The file as written, and where it was read.
     remarks : tuple of str
-        Questions about bare numbers that are far from usual, each with its place.
+        Questions about bare numbers far from the usual values, each with its place.
     measured : DataFile or None
         Table of measurements of an output, for the fit ``calibration``.
     """

@@ -1,4 +1,4 @@
-"""YAML text to plain data that knows where each value stands."""
+"""Read YAML text into plain data, and remember the line and column of each value."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _KEPT_AS_TEXT = ("str", "timestamp", "merge", "value")
 
 @dataclass
 class Document:
-    """The data of a YAML file and the nodes that they came from.
+    """The data of a YAML file and the nodes that they were read from.
 
     Parameters
     ----------
@@ -45,17 +45,17 @@ class Document:
     _keys: dict[Path, Node] = field(default_factory=dict)
 
     def place(self, path: Path) -> Place:
-        """Return where the value of a path begins, or the value of the nearest path above it that exists."""
+        """Return the position of the value at a path, or of the nearest existing one above it."""
         while path not in self._nodes and path:
             path = path[:-1]
         return self._at(self._nodes[path]) if path in self._nodes else Place(self.source, 1, 1)
 
     def key_place(self, path: Path) -> Place:
-        """Return where the key of a path stands; the value for an entry of a list."""
+        """Return the position of the key at a path; for an entry of a list that of its value."""
         return self._at(self._keys[path]) if path in self._keys else self.place(path)
 
     def flow(self, path: Path) -> str:
-        """Return the value of a path as YAML on one line, scalars as they were written."""
+        """Return the value at a path as YAML on one line, scalars as in the file."""
         return _flow(self._nodes[path])
 
     def _at(self, node: Node) -> Place:
@@ -84,9 +84,9 @@ def parse(text: str, source: str, problems: Problems) -> Document:
     Parameters
     ----------
     text, source : str
-        The text and the name it has in messages.
+        The text, and its name in messages.
     problems : Problems
-        Receives what is not YAML, duplicate keys, keys that are not texts and unknown tags.
+        Receives syntax errors, duplicate keys, keys that are not texts and unknown tags.
     """
     document = Document(source, text)
     if len(text) > _LONGEST:
@@ -120,7 +120,7 @@ _COLON_WITHIN = re.compile(r"\s*(?:- )?\w+: +[^\s'\"{\[#][^#]*: ")
 
 
 def _hint(text: str, index: int) -> str:
-    """Return what is probably amiss where a text ceases to be YAML, or in the lines just above."""
+    """Return a hint to the likely mistake at the position of a syntax error, or in the lines just above."""
     if text[index : index + 1] == "\t":
         return " (indent with blanks, not with tabs)"
     end = text.find("\n", index)
@@ -128,7 +128,7 @@ def _hint(text: str, index: int) -> str:
     for back, line in enumerate(reversed(above[-3:])):
         found = _NO_BLANK.search(line)
         if found:
-            return f" (a blank is missing behind '{found[1]}:' in line {len(above) - back})"
+            return f" (a blank is missing after '{found[1]}:' in line {len(above) - back})"
     if text[index : index + 1] == "*":
         return " (put quotation marks around a string that begins with *)"
     if _COLON_WITHIN.match(above[-1] if above else ""):
@@ -137,7 +137,7 @@ def _hint(text: str, index: int) -> str:
 
 
 def _is_indented_otherwise(lines: list[str]) -> bool:
-    """Return whether the last line and the one before it begin in different columns, neither below a key alone."""
+    """Return whether the last two lines begin in different columns, and the first of them is not a key alone."""
     written = [line for line in lines if line.strip() and not line.lstrip().startswith("#")][-2:]
     if len(written) < 2 or written[0].rstrip().endswith(":"):
         return False
@@ -146,18 +146,18 @@ def _is_indented_otherwise(lines: list[str]) -> bool:
 
 
 class _EndlessError(Exception):
-    """A document that has been reported as having no end."""
+    """Stops the reading of a document that refers to itself; the problem has been reported."""
 
 
 class _Reader:
-    """Builds the data of a document, node by node."""
+    """Reads the data of a document node by node."""
 
     def __init__(self, document: Document, problems: Problems) -> None:
         self.document = document
         self.problems = problems
 
     def read(self, node: Node, path: Path) -> Any:
-        """Return the plain data of a node and remember its place."""
+        """Return the plain data of a node and remember its position."""
         if len(path) > _DEEPEST or len(self.document._nodes) > _LARGEST:
             self.problems.add(self.document._at(node), "", _TOO_DEEP)
             raise _EndlessError

@@ -1,4 +1,4 @@
-"""The first campaign of a model: every parameter with a common value, its unit and its meaning, ready to be edited."""
+"""Write a first campaign of a model: every parameter with a common value, its unit and its meaning."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _BOUNDS = ("gt", "ge", "lt", "le")
 
 
 def draft(name: str, model: Model[Any], file: str) -> str:
-    """Return the text of a campaign that passes every check, unless the model cannot do without a file.
+    """Return the text of a campaign that passes every check, unless the model needs a file.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def draft(name: str, model: Model[Any], file: str) -> str:
 
 
 def _entries(parameters: type[Parameters]) -> Iterator[str]:
-    """Yield the lines of all parameters: those that are needed live, the others as comments."""
+    """Yield the lines of all parameters; optional ones are comments."""
     needed = _needed(parameters)
     told: dict[str, None] = {}
     for ways in parameters.alternatives:
@@ -80,7 +80,7 @@ def _entries(parameters: type[Parameters]) -> Iterator[str]:
 
 
 def _needed(parameters: type[BaseModel]) -> set[str]:
-    """Return the parameters without which there is no case, dotted ones of structures among them."""
+    """Return the required parameters, with dotted names for those of structures."""
     ways = getattr(parameters, "alternatives", ())
     required = {name for name, info in parameters.model_fields.items() if info.is_required()}
     return required | {name for each in ways for name in each[0]}
@@ -108,7 +108,7 @@ def _choices(info: FieldInfo) -> list[str]:
 
 
 def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str]:
-    """Return what may be written for a field: one text, or one for each structure that it may be."""
+    """Return the possible texts of a value: one, or one for each structure."""
     info = parameters.model_fields[name]
     kinds = [kind for kind in fields.structures(info) if kind is not DataFile]
     if inner:
@@ -120,7 +120,7 @@ def _values(parameters: type[BaseModel], name: str, inner: set[str]) -> list[str
 
 
 def _structures(kind: type[BaseModel], inner: set[str]) -> list[str]:
-    """Return a structure on one line, once for each way to give it."""
+    """Return a structure on one line, once for each of its alternatives."""
     needed, fixed, ways = _needed(kind), fields.fixed(kind), getattr(kind, "alternatives", ())
     required = {name for name, info in kind.model_fields.items() if info.is_required()}
     alternatives: list[set[str]] = [required.union(way) for way in next(iter(ways), ())] or [needed]

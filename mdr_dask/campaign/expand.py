@@ -1,4 +1,4 @@
-"""Parameters, axes and series of a campaign: every value checked by the model's own parameter set."""
+"""Expand the parameters of a campaign into series with axes, and check every value with the model."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from mdr_dask.campaign.variation import Origin, Variation
 from mdr_dask.models.base import Model, Parameters, with_value
 from mdr_dask.units import to_si
 
-#: Axes that a study refines itself, at most.
+#: Largest number of adaptive axes.
 MOST_ADAPTIVE = 2
 
 
@@ -34,20 +34,20 @@ def expand(
     outputs: Sequence[str],
     problems: Problems,
 ) -> tuple[tuple[Series, ...], tuple[str, ...]]:
-    """Return the series of a campaign, and what is asked about their numbers.
+    """Return the series of a campaign, and questions about their bare numbers.
 
     Parameters
     ----------
     document : Document
         The file.
     model : Model
-        The model that it names.
+        Its model.
     spec : CampaignSpec
         Its keys, checked.
     directory : str
-        Where the files it names are looked for.
+        Folder of the files that it names.
     outputs : sequence of str
-        What it asks for.
+        The outputs that it asks for.
     problems : Problems
         Receives everything wrong with parameters, ranges and tables; series that cannot be built are left out.
     """
@@ -103,7 +103,7 @@ class _Expansion:
     def _require_places(
         self, base: Parameters, axis: Axis, origin: Origin, model: Model[Any], outputs: Sequence[str]
     ) -> None:
-        """Refuse an axis of what sets the places of an output: in one array all cases have the same."""
+        """Report an axis that changes the coordinates of an output, because all cases share one array."""
         wanted = [model.output(name) for name in outputs]
         if not any(output.dims for output in wanted):
             return
@@ -259,7 +259,7 @@ class _Expansion:
     def _refined(
         self, axes: Sequence[Axis], variations: Sequence[Variation], model: Model[Any], outputs: Sequence[str]
     ) -> Iterator[Axis]:
-        """Yield the axes, adaptive ones with how they are refined."""
+        """Yield the axes; adaptive ones get their refinement."""
         for axis, one in zip(axes, variations, strict=True):
             if one.written and one.spread:
                 found = refinement(self.document, one.written, one.spread, model, outputs, self.problems)
@@ -272,7 +272,7 @@ class _Expansion:
 
 
 def _checked(base: Parameters | None, data: Mapping[str, Any], varied: set[str | int]) -> dict[str, Any]:
-    """Return the data with everything that does not vary replaced by what has been checked already."""
+    """Return the data in which fixed parameters are replaced by their checked values."""
     if base is None:
         return dict(data)
     return {name: value if name in varied else getattr(base, name) for name, value in data.items()}

@@ -1,4 +1,4 @@
-"""What the parameter types say about a field: its unit, whether a list is one value of it, what stands below it."""
+"""Properties of the fields of parameter sets: types, units, nested structures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mdr_dask.models.base import unit_of
 
 
 def members(annotation: Any) -> tuple[Any, ...]:
-    """Return the types that a value may have: unions taken apart, annotations removed."""
+    """Return the types that a value may have, without unions and annotations."""
     origin = get_origin(annotation)
     if origin is Annotated:
         return members(get_args(annotation)[0])
@@ -25,7 +25,7 @@ def members(annotation: Any) -> tuple[Any, ...]:
 
 
 def holds_list(info: FieldInfo) -> bool:
-    """Return whether a list in the file is one value of this field and not several."""
+    """Return whether a list is one value of this field, rather than several values."""
     kinds = [get_origin(kind) or kind for kind in members(info.annotation)]
     return any(isinstance(kind, type) and issubclass(kind, Sequence) and kind is not str for kind in kinds)
 
@@ -47,9 +47,9 @@ def structures(info: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
-    """Return the parameter set that a mapping stands for, told by its fixed keys such as ``shape: cone``.
+    """Return the parameter set of a mapping: the one with the same fixed keys, such as ``shape: cone``.
 
-    Sets without such keys are told by the keys they know, well spelt or nearly so.
+    Sets without fixed keys are distinguished by the number of keys in common, also misspelt ones.
     """
     if not isinstance(value, dict):
         return None
@@ -62,7 +62,7 @@ def structure(info: FieldInfo, value: Any) -> type[BaseModel] | None:
 
 
 def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int]:
-    """Return how many keys of a mapping a parameter set knows, and how many look like one of its own."""
+    """Return how many keys of a mapping are fields of a parameter set, and how many resemble one."""
     keys = [str(key) for key in value]
     return (
         sum(key in kind.model_fields for key in keys),
@@ -71,7 +71,7 @@ def _likeness(kind: type[BaseModel], value: Mapping[Any, Any]) -> tuple[int, int
 
 
 def fixed(kind: type[BaseModel]) -> dict[str, Any]:
-    """Return the fields of a parameter set that can have one value only, with that value."""
+    """Return the fields of a parameter set that have one possible value, with that value."""
     return {
         key: get_args(info.annotation)[0]
         for key, info in kind.model_fields.items()
@@ -80,7 +80,7 @@ def fixed(kind: type[BaseModel]) -> dict[str, Any]:
 
 
 def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[BaseModel], str] | None:
-    """Return the parameter set and name of the field at a path into the data, None if there is none."""
+    """Return the parameter set and the name of the field at a path into the data, None if there is no field."""
     kind: type[BaseModel] | None = parameters
     for depth, part in enumerate(path):
         if kind is None or not isinstance(part, str) or part not in kind.model_fields:
@@ -106,7 +106,7 @@ def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
 
 
 def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
-    """Return what a file may say so that there is a field at a path, each such as ``indenter: {shape: power}``."""
+    """Return the structures that have a field at a path, such as ``indenter: {shape: power}``."""
     name, *rest = path
     if name not in parameters.model_fields or not rest:
         return ()

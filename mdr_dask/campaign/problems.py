@@ -1,4 +1,4 @@
-"""Problems of a campaign file: where each stands, what is wrong, and what was probably meant."""
+"""The problems of a campaign file, each with its position and a message."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Place:
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """One thing wrong: its place, the key it concerns and a sentence."""
+    """One problem: its position, the key it concerns and the message."""
 
     place: Place
     where: str
@@ -37,7 +37,7 @@ class Problem:
 
 
 class Problems:
-    """Problems collected so far, at most one for each place and key."""
+    """A collection of problems, with at most one for each position and key."""
 
     def __init__(self) -> None:
         self._found: dict[tuple[Place, str], Problem] = {}
@@ -46,11 +46,11 @@ class Problems:
         return bool(self._found)
 
     def add(self, place: Place, where: str, what: str) -> None:
-        """Note a problem, unless the same key already has one at this place."""
+        """Add a problem, unless there is one for the same key at the same position."""
         self._found.setdefault((place, where), Problem(place, where, what))
 
     def raise_if_any(self) -> None:
-        """Raise one `CampaignError` with all problems, those of the file read first in front, by line."""
+        """Raise one `CampaignError` with all problems, file by file and by line."""
         if self._found:
             sources = list(dict.fromkeys(place.source for place, _ in self._found))
             ordered = sorted(self._found.values(), key=lambda problem: (sources.index(problem.place.source), problem))
@@ -66,7 +66,7 @@ def dotted(path: Iterable[str | int]) -> str:
 
 
 def shown(value: Any) -> str:
-    """Return a value as a message quotes it."""
+    """Return a value for a message, shortened if it is long."""
     if value is None:
         return "nothing"
     if isinstance(value, dict):

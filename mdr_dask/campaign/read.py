@@ -1,4 +1,4 @@
-"""From the text of a campaign file to a checked `Campaign`."""
+"""Read the text of a campaign file into a checked `Campaign`."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def load(path: str | FilePath) -> Campaign:
     Parameters
     ----------
     path : str or Path
-        The YAML file; files that it names are looked for beside it.
+        The YAML file; paths in it are relative to its folder.
 
     Raises
     ------
@@ -47,9 +47,9 @@ def loads(text: str, source: str, directory: str) -> Campaign:
     text : str
         YAML 1.2.
     source : str
-        The name that it has in messages.
+        Its name in messages.
     directory : str
-        Where files that it names are looked for.
+        Folder of the files that it names.
 
     Raises
     ------
@@ -97,7 +97,7 @@ def loads(text: str, source: str, directory: str) -> Campaign:
 
 
 def _spec(document: Document, directory: str, problems: Problems) -> tuple[CampaignSpec, set[str]]:
-    """Return the checked keys and the names of those that are wrong, which then have a stand-in."""
+    """Return the checked keys, with default values in place of wrong ones, and the names of the wrong ones."""
     wrong: set[str] = set()
 
     def report(path: Path, key: bool, what: str) -> None:

@@ -1,4 +1,4 @@
-"""The reference of the campaign file: ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
+"""Write the reference page of the campaign file: ``python -m mdr_dask.campaign.reference > docs/campaign-file.md``."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from mdr_dask.units import DEFINITIONS
 _HEAD = """\
 # The campaign file
 
-A campaign file is YAML 1.2. It names a model, gives its parameters, says which of them vary, and what is wanted.
-Every problem in a file is reported at once as `file:line:column: where: what, got value (hint)`.
-Made by `python -m mdr_dask.campaign.reference > docs/campaign-file.md`; do not edit. `mdr-dask schema` prints the same
-as a JSON schema, with which editors complete and check as you type: put
+A campaign file is YAML 1.2. It names a model, its parameters, which of them vary, and the outputs to compute.
+All problems of a file are reported at once as `file:line:column: key: message, got value (hint)`.
+Made by `python -m mdr_dask.campaign.reference > docs/campaign-file.md`; do not edit. `mdr-dask schema` prints a JSON
+schema, with which editors check and complete campaign files: put
 `# yaml-language-server: $schema=campaign.schema.json` in the first line.
 
 ```yaml
@@ -33,11 +33,11 @@ model: sliding_friction
 seed: 2013
 realisations: 200                  # or {at_least: 20, at_most: 2000, until: {friction_coefficient: 1 %}}
 parameters:
-  length: 20 mm                    # a bare number is SI; or a string with a unit
+  length: 20 mm                    # with a unit; a bare number is in SI units
   hurst: 0.7
   normal_force: {geometric: [1 mN, 100 N, 20]}
   velocity: {geometric: [1e-4, 1e2, 36]}
-series:                            # optional: each replaces some parameters, and has its own group in the store
+series:                            # optional: each replaces some parameters and is a group of the store
   roughness: {rms_roughness: {geometric: [1 nm, 10 um, 20]}}
   spacing: {points: [2000, 5000, 20000]}
 outputs: [friction_coefficient, contact_fraction]
@@ -50,19 +50,18 @@ _VARIATION = """\
 | written | means |
 |---|---|
 | `[1 N, 3 N, 10 N]` | these values, inside structured parameters too |
-| `[[1 ms], [1 ms, 1 s]]` | the same for a parameter that is itself a list, named in the store as they are written |
+| `[[1 ms], [1 ms, 1 s]]` | values of a parameter that is itself a list; the store names them as they are written |
 | `{values: [...]}` | the same |
 | `{linear: [a, b, n]}` | `n` values at equal distances from `a` to `b`, both included |
 | `{geometric: [a, b, n]}` | `n` values at equal ratios; both ends above 0 |
 | `{adaptive: [a, b], until: 1 %, at_most: 60}` | the study [chooses the values itself](adaptive.md) |
-| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | whole structured values, named in the store as they are written |
-| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | one entry of a structure; its axis is `indenter_angle` |
+| `[{shape: cone, angle: 10 deg}, {shape: plane}]` | structures; the store names them as they are written |
+| `{shape: cone, angle: {linear: [5 deg, 75 deg, 20]}}` | an entry of a structure; its axis is called `indenter_angle` |
 
-The ends of a range are exact, the values between are rounded to 14 digits, so that decades are decades. Ranges of
-whole numbers are rounded to whole numbers, each once.
+The ends of a range are exact, the values between are rounded to 14 digits. Values that agree to 12 digits are the same
+value. Ranges of whole numbers are rounded to whole numbers, each once.
 
-With `series`, each series is the `parameters` with some replaced wholly; without, the campaign is one series without
-a name.
+Each of the `series` replaces some of the `parameters`; a campaign without `series` is one series without a name.
 
 | `sampling` | means |
 |---|---|
@@ -73,9 +72,9 @@ a name.
 | `{saltelli: n}` | `n` (inputs + 2) points for [Sobol indices](sensitivity.md) |
 | `{table: cases.csv}` | a case for each line of a CSV file |
 
-All but `grid` have the one dimension `case`. Ranges to draw from have no count: `{linear: [a, b]}` is uniform,
-`{geometric: [a, b]}` uniform in the logarithm. Drawn points depend on the file only, by `seed`; a larger `sobol` keeps
-the points of a smaller one. The headings of a table are names of parameters and perhaps units:
+All except `grid` have the single dimension `case`. Ranges to draw from have no number of values: `{linear: [a, b]}` is
+uniform, `{geometric: [a, b]}` uniform in the logarithm. Drawn points depend on `seed` only; a larger `sobol` keeps
+the points of a smaller one. The headings of a table are names of parameters, with units if needed:
 `velocity [mm/s],indenter.angle [deg]`.
 """
 
@@ -92,8 +91,8 @@ def parameter_rows(model: Model[Any]) -> list[dict[str, str]]:
     return list(_rows(model.parameters, "parameter"))
 
 
-def ways_told(model: Model[Any]) -> list[str]:
-    """Return the parameters that belong together, each thing in one line: ``length with rms_roughness, or profile``."""
+def alternatives_of(model: Model[Any]) -> list[str]:
+    """Return the alternatives of a model, one line for each group: ``length with rms_roughness, or profile``."""
     return list(_ways(model.parameters, ""))
 
 
@@ -128,8 +127,8 @@ def number_rows(model: Model[Any]) -> list[dict[str, str]]:
 def _model(model: Model[Any]) -> str:
     summary = f"{model.summary[:1].upper()}{model.summary[1:].rstrip('.')}."
     tables = [_table(rows) for rows in (parameter_rows(model), output_rows(model), number_rows(model)) if rows]
-    together = [f"* {line}" for line in ways_told(model)]
-    together = ["What belongs together:", "", *together, ""] if together else []
+    together = [f"* {line}" for line in alternatives_of(model)]
+    together = ["Exactly one of these is required:", "", *together, ""] if together else []
     return "\n".join([f"## `{model.name}`", "", summary, "", *together, *tables])
 
 
@@ -149,9 +148,9 @@ def _units() -> str:
         [
             "## Units",
             "",
-            "A number without a unit is in SI. With a unit it is a string, `20 mm`, `10 mPa s`, `870 kg/m^3`; the unit",
-            "has to be of the right dimension. An angle is no pure number: `5 deg`, not `5 %`. A bare number more than",
-            "three decades from a usual value, such as `length: 20`, is read as it stands, and asked about.",
+            "A number without a unit is in SI units. With a unit it is a string: `20 mm`, `10 mPa s`, `870 kg/m^3`. An",
+            "angle is not a pure number: `5 deg`, not `5 %`. `check` asks you to confirm a bare number more than three",
+            "decades from the usual value, such as `length: 20`.",
             "",
             f"Prefixes: {', '.join(f'`{prefix}`' for prefix in prefixes)}, and their names.",
             "",

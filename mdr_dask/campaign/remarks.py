@@ -1,4 +1,4 @@
-"""Bare numbers far from the usual: they are read as SI, and asked about."""
+"""Questions about bare numbers far from the usual values, which are read in SI units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mdr_dask.units import is_far, likely
 
 @dataclass(frozen=True)
 class _Bare:
-    """A number without a unit: the parameter that it is a value of, and where it stands."""
+    """A number without a unit: its parameter, and its position in the file."""
 
     field: Path
     value: float
@@ -31,7 +31,7 @@ def remarks(
     paths: Mapping[str, Path],
     units: Mapping[str, str],
 ) -> Iterator[Problem]:
-    """Yield a question for each parameter with a bare number more than three decades from what is usual.
+    """Yield a question for each parameter with a bare number more than three decades from its usual value.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def remarks(
     data : mapping
         Plain data of the parameters by name.
     paths : mapping of str to path
-        Where in the document each of them stands.
+        Their paths in the document.
     units : mapping of str to str
-        Units that differ from the declared ones, as of a dimensionless campaign.
+        Units that differ from the declared ones, as in a dimensionless campaign.
     """
     told: set[Path] = set()
     for name, value in data.items():
@@ -68,7 +68,7 @@ def _question(value: float, unit: str, usual: str) -> str:
 
 
 def _bare_numbers(field: Path, value: Any, at: Path) -> Iterator[_Bare]:
-    """Yield the numbers of one parameter: its value, those of a list, the ends of a range, and those inside it."""
+    """Yield the numbers of one parameter: its value, the values of a list, the ends of a range, and nested ones."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         yield _Bare(field, value, at)
     elif isinstance(value, list):

@@ -1,4 +1,4 @@
-"""Points of a parameter space that are not a grid: drawn from intervals, or read from a table."""
+"""Cases that are not a grid: drawn from intervals, or read from a table."""
 
 from __future__ import annotations
 
@@ -29,8 +29,7 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
     Parameters
     ----------
     design : SobolSpec, LatinHypercubeSpec or SaltelliSpec
-        The design and its number of points. Points of a Sobol sequence keep their order: a larger number adds some and
-        moves none.
+        The design and its number of points. A longer Sobol sequence begins with the points of a shorter one.
     seed : int
         Seed of the scrambling.
     variations : sequence of Variation
@@ -39,7 +38,7 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
     Returns
     -------
     tuple of Variation
-        The same, each with one value a point.
+        The same, each with one value for each point.
     """
     import numpy as np
     from scipy.stats import qmc
@@ -61,7 +60,7 @@ def drawn(design: Drawn, seed: int, variations: Sequence[Variation]) -> tuple[Va
 
 
 def _exchanged(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return for each pair of points: a, b, and for every input a with that input of b, one behind the other."""
+    """Return for each pair of points a, b: a, b, and for every input the point a with that input of b."""
     import numpy as np
 
     number, inputs = first.shape
@@ -80,7 +79,7 @@ def tabled(
     data: Mapping[str, Any],
     problems: Problems,
 ) -> tuple[Variation, ...] | None:
-    """Return the parameters that vary along the lines of a CSV file, or None if something is wrong with it.
+    """Return the parameters that a CSV file varies line by line, or None if there is a problem.
 
     Parameters
     ----------
@@ -93,7 +92,7 @@ def tabled(
     data : mapping
         Plain data of the other parameters.
     problems : Problems
-        Receives what is wrong with the file: unknown columns, units, missing cells.
+        Receives unknown columns, units and missing cells.
     """
     path = Path(directory, name)
     try:
@@ -168,7 +167,7 @@ def _are_sound(
 
 
 def _unknown(column: Variation, parameters: type[Parameters]) -> str:
-    """Say what is wrong with a column that names no parameter of this campaign."""
+    """Return the message about a column that is not a parameter of this campaign."""
     choices = fields.choices(parameters, column.path)
     if choices:
         return f"expected {' or '.join(choices)} in the campaign file"

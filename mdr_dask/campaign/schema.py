@@ -1,4 +1,4 @@
-"""JSON schema of the campaign file, for editors: made of the keys and of the parameter sets of the models."""
+"""The JSON schema of the campaign file, for editors; made from the keys and the parameter sets of the models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Schema = dict[str, Any]
 
 #: A model of the user's own, ``package.module:NAME``.
 _OWN_MODEL = r"^[A-Za-z_][\w.]*:[A-Za-z_][\w.]*$"
-#: Numbers with units are told from names only; units are checked when the file is read.
+#: A quantity begins like a number; its unit is checked when the file is read.
 _QUANTITY = {"type": "string", "pattern": r"^\s*[+-]?(\d|\.\d)", "description": "a number with its unit"}
 _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 
@@ -21,8 +21,7 @@ _QUANTITY_REFERENCE = {"$ref": "#/$defs/quantity"}
 def json_schema() -> Schema:
     """Return the JSON schema (draft 2020-12) of campaign files of all models.
 
-    It accepts every valid file. It refuses what can be told without units: unknown keys, wrong kinds, numbers out of
-    bounds.
+    It accepts every valid file and refuses unknown keys, wrong types and numbers out of bounds; units are not checked.
     """
     root = _readable(CampaignSpec.model_json_schema())
     definitions = {**root.pop("$defs"), **_ranges()}
@@ -42,14 +41,14 @@ def json_schema() -> Schema:
 
 
 def parameters_schema(parameters: type[Parameters], references: str = "#/$defs/{model}") -> Schema:
-    """Return the schema of the ``parameters`` of a model: each a value, or something that varies.
+    """Return the schema of the ``parameters`` of a model: each is a value, a list or a range.
 
     Parameters
     ----------
     parameters : type
         The parameter set.
     references : str
-        Where nested parameter sets stand.
+        Reference to nested parameter sets.
     """
     own: Schema = _readable(parameters.model_json_schema(ref_template=references))
     own.pop("required", None)

@@ -1,4 +1,4 @@
-"""The keys of a campaign file, as far as they do not depend on the model."""
+"""The keys of a campaign file that do not depend on the model."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _LONGEST_NAME = 100
 
 def _usable_as_file_name(name: str) -> str:
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name) or name.endswith("."):
-        raise ValueError(f"expected letters, digits, '-', '_' and '.' only, for it names a file, got {name!r}")
+        raise ValueError(f"expected a file name of letters, digits, '-', '_' and '.', got {name!r}")
     if len(name) > _LONGEST_NAME or name.endswith((".partial", ".json")):
-        what = f"at most {_LONGEST_NAME} characters" if len(name) > _LONGEST_NAME else "no such ending"
-        raise ValueError(f"expected {what}, for it names a file of the store, got {name[:60]!r}")
+        what = f"at most {_LONGEST_NAME} characters" if len(name) > _LONGEST_NAME else "another ending"
+        raise ValueError(f"expected a file name with {what}, got {name[:60]!r}")
     return name
 
 
@@ -26,14 +26,14 @@ FileName = Annotated[str, AfterValidator(_usable_as_file_name)]
 
 
 class ToleranceSpec(Parameters):
-    """How small the error of an output has to be; either part is enough."""
+    """Largest error of an output; it is enough to meet one part."""
 
     relative: float = quantity("1", "part of the mean, such as 1 %", default=0.0, ge=0)
     absolute: float | str = Field(0.0, description="in the unit of the output, such as 2 um")
 
 
 class AdaptiveSpec(Parameters):
-    """Realisations until the standard errors are narrow enough."""
+    """Realisations until the standard errors are small enough."""
 
     at_least: int = Field(20, ge=2, description="realisations that every case gets")
     at_most: int = Field(description="realisations after which a case is left as it is", ge=2)
@@ -45,7 +45,7 @@ class AdaptiveSpec(Parameters):
 
 
 class RefinedSpec(Parameters):
-    """An axis whose values the study chooses itself."""
+    """An adaptive axis, whose values the study chooses."""
 
     adaptive: list[Any] = Field(description="first and last value")
     until: float | str | dict[str, float | str | ToleranceSpec] = Field(

@@ -1,4 +1,4 @@
-"""How precise a campaign wants its outputs: tolerances by name, checked against the outputs it asks for."""
+"""The tolerances of a campaign, checked against its outputs."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ def tolerances(
     outputs: Sequence[str],
     problems: Problems,
 ) -> dict[str, Tolerance]:
-    """Return the tolerance of every output named at a path of a document; errors of outputs have none.
+    """Return the tolerance of every output named at a path of a document.
 
     Parameters
     ----------
     document : Document
         The file.
     path : path
-        Where the mapping stands.
+        Path of the mapping.
     given : mapping
         Tolerances as written, by output.
     model : Model
-        The model, which knows units.
+        The model, with the units of its outputs.
     outputs : sequence of str
-        What the campaign asks for.
+        The outputs of the campaign.
     problems : Problems
-        Receives unknown names and malformed tolerances.
+        Receives unknown names and wrong tolerances.
     """
     known = [output.name for output in model.outputs if output.name in outputs]
     found = {}
@@ -59,12 +59,12 @@ def tolerances(
 
 
 def is_of_fit(name: str, model: Model[Any]) -> bool:
-    """Return whether a tolerance is meant for a fitted constant: ``zone_one.alpha``, and no output or nearly one."""
+    """Return whether a name is meant as a fitted constant such as ``zone_one.alpha``, rather than a misspelt output."""
     return "did you mean" not in did_you_mean(name, [output.name for output in model.outputs])
 
 
 def answers(document: Document, path: Path, given: Mapping[str, Written], problems: Problems) -> dict[str, Tolerance]:
-    """Return the tolerances of fitted constants, by fit and constant: a part with ``%``, else as it is."""
+    """Return the tolerances of fitted constants by ``fit.constant``: relative with ``%``, otherwise absolute."""
     found = {}
     for name, written in given.items():
         constant = name if "." in name else f"{name}.{name}"
@@ -86,7 +86,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
     Raises
     ------
     ValueError
-        If it is none, or not in a unit of the output.
+        If it is not a tolerance, or its unit does not fit the output.
     """
     if isinstance(given, ToleranceSpec):
         absolute = to_si(given.absolute, unit) if isinstance(given.absolute, str) else given.absolute
@@ -101,7 +101,7 @@ def tolerance(given: Written, unit: str) -> Tolerance:
 def refinement(
     document: Document, path: Path, spread: Spread, model: Model[Any], outputs: Sequence[str], problems: Problems
 ) -> Refinement | None:
-    """Return how an adaptive axis at a path of a document is refined, None if something is wrong with that."""
+    """Return the refinement of an adaptive axis at a path of a document, None if there is a problem."""
     data = value_at(document.data, path)
 
     def report(inner: Path, key: bool, what: str) -> None:

@@ -1,4 +1,4 @@
-"""How one parameter varies: ranges, lists and spreads, found in the data and turned into SI values."""
+"""Find the parameters that vary, and turn their lists and ranges into values in SI units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mdr_dask.units import expected, to_si
 #: More values than this on one axis are a mistake in the file, not a study.
 MOST_VALUES = 10**6
 RANGES = ("linear", "geometric", "values", "adaptive")
-#: Values with which an axis begins that the study refines itself: of twice as many spaces, every second one is known.
+#: Number of values with which an adaptive axis begins.
 FIRST = 5
 #: Ratio of the ends of an adaptive axis beyond which its natural scale is logarithmic.
 DECADE = 10.0
@@ -27,7 +27,7 @@ DECADE = 10.0
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a value came from: a path of the document, or a cell of a table; and the name that messages give it."""
+    """The origin of a value for messages: its name and position, and its path if it is in the document."""
 
     name: str
     place: Place
@@ -50,9 +50,9 @@ class Item(NamedTuple):
 
 @dataclass(frozen=True)
 class Variation:
-    """A varied parameter: its path in the parameters, and its values or the interval that they are taken from.
+    """A varied parameter: its path in the parameters, and its values or the interval from which they are drawn.
 
-    With both, the study chooses more values itself; `written` is where the document says how.
+    An adaptive axis has both; `written` is its path in the document.
     """
 
     path: tuple[str, ...]
@@ -62,7 +62,7 @@ class Variation:
     written: Path = ()
 
     def drawn(self, shares: Any) -> Variation:
-        """Return this variation with values drawn at shares of its interval."""
+        """Return this variation with the values at fractions (0 to 1) of its interval."""
         assert self.spread is not None
         return replace(self, items=tuple(Item(value, self.origin) for value in self.spread.at(shares)))
 
@@ -86,18 +86,18 @@ def find(
     data : mapping
         Plain data of the parameters by name.
     paths : mapping of str to path
-        Where in the document each of them stands.
+        Their paths in the document.
     drawn : bool
-        Whether ranges are intervals to draw from, written without a count.
+        Whether ranges are intervals to draw from, without a number of values.
     problems : Problems
-        Receives malformed ranges and empty lists; what varies so has neither items nor an interval.
+        Receives wrong ranges and empty lists; their variations have neither items nor an interval.
     """
     search = _Search(document, parameters, data, drawn, problems)
     return tuple(found for name, value in data.items() for found in search.below((name,), value, paths[name]))
 
 
 class _MalformedError(Exception):
-    """A range that has been reported."""
+    """Stops the reading of a wrong range; the problem has been reported."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class _Search:
     problems: Problems
 
     def below(self, path: tuple[str, ...], value: Any, at: Path) -> Iterator[Variation]:
-        """Yield what varies in one parameter, or in those inside it."""
+        """Yield the variations of one parameter and of those nested in it."""
         info = self._field(path)
         if info is None:
             return
@@ -138,7 +138,7 @@ class _Search:
         return Variation(path, origin, tuple(content))
 
     def _adaptive(self, path: tuple[str, ...], ends: Any, name: Path) -> Variation:
-        """Return an axis of a few values on the natural scale of an interval, which the study refines itself."""
+        """Return an adaptive axis with its first values."""
         origin, at = self._origin(name, name), (*name, "adaptive")
         try:
             if self.drawn:
@@ -238,12 +238,12 @@ class _Search:
 
 
 def spaced(spread: Spread, count: int) -> list[float]:
-    """Return values from one end to the other: the ends exact, the others to 14 digits, so that decades are decades.
+    """Return values from one end to the other: the ends exact, the others rounded to 14 digits.
 
     Parameters
     ----------
     spread : Spread
-        The interval; a whole one gives whole numbers, each once, perhaps fewer than `count`.
+        The interval; one of whole numbers gives each of them once, perhaps fewer than `count`.
     count : int
         Number of values, at least 2.
     """

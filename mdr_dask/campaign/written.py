@@ -1,4 +1,4 @@
-"""The units that a campaign file is written in, for whoever shows its parameters to a reader."""
+"""The units in which a campaign file is written, for tables and figures."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from mdr_dask.units import unit_behind
 
 @lru_cache(maxsize=16)
 def written_units(text: str) -> dict[str, str]:
-    """Return the unit of every parameter whose values are all written in the same one.
+    """Return the unit of every parameter whose values are all written in the same unit.
 
     Parameters
     ----------
     text : str
-        A campaign file, as a store holds it; one that is damaged has no units.
+        The text of a campaign file; a damaged one gives no units.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def written_units(text: str) -> dict[str, str]:
 
 
 def _below(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    """Yield parameter and unit of every quantity; what stands in lists and ranges belongs to the parameter varied."""
+    """Yield parameter and unit of every quantity; lists and ranges belong to the parameter that they vary."""
     if isinstance(value, dict):
         for key, inner in value.items():
             yield from _below(name if key in RANGES else f"{name}_{key}".strip("_"), inner)

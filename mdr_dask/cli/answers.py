@@ -1,4 +1,4 @@
-"""Answers to questions on a terminal, in a pipe, or in a file; rows are written as they are made."""
+"""Print or write the answer to a question; rows are written as they are computed."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ FILES = (".csv", ".json", ".jsonl", ".parquet", ".nc", ".zarr")
 
 
 def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
-    """Print a table: aligned and at most so many rows of it, or all of it as CSV, JSON or lines of JSON.
+    """Print a table: aligned and at most `limit` rows, or all rows as CSV, JSON or lines of JSON.
 
-    `join` puts means and their errors into one column for a reader.
+    `join` combines means and their errors in one column.
     """
     if form == "table":
         _print_aligned(answer, limit, join)
@@ -40,7 +40,7 @@ def print_answer(answer: Table, form: str, limit: int, join: bool) -> None:
 
 
 def write_answer(answer: Table, path: Path) -> int:
-    """Write a table into a file, whose end says in which form; return the number of rows."""
+    """Write a table to a file in the format of its suffix; return the number of rows."""
     rows = 0
 
     def counted() -> Iterator[pd.DataFrame]:
@@ -60,7 +60,7 @@ def write_answer(answer: Table, path: Path) -> int:
 
 
 def check_target(path: Path) -> None:
-    """Refuse a file of another kind, the store of a study, and Parquet where it cannot be written."""
+    """Raise an error for another suffix, the store of a study, or Parquet without pyarrow."""
     from mdr_dask.store import is_study
 
     require_suffix(path, FILES)
@@ -161,14 +161,14 @@ def _write_text(answer: Table, form: str, stream: TextIO) -> None:
 
 
 def _frame(answer: Table) -> pd.DataFrame:
-    """Return a frame without rows."""
+    """Return an empty frame with the columns of an answer."""
     import pandas as pd
 
     return pd.DataFrame(columns=list(answer.units))
 
 
 def _json_lines(frame: pd.DataFrame) -> Iterator[str]:
-    """Yield every row as an object of JSON, made of columns of texts."""
+    """Yield every row as a JSON object."""
     template = "{" + ", ".join(json.dumps(str(name)).replace("%", "%%") + ": %s" for name in frame) + "}"
     return (template % values for values in zip(*(_json_texts(frame[name].tolist()) for name in frame), strict=True))
 
@@ -189,7 +189,7 @@ def _pyarrow() -> Any:
 
 
 def _write_parquet(answer: Table, path: Path) -> None:
-    """Write row groups as the frames come, the unit of every column in the metadata of its field."""
+    """Write a row group for each frame, with the unit of every column in the metadata of its field."""
     arrow = _pyarrow()
     first = next(answer.frames, _frame(answer))
     schema = arrow.Schema.from_pandas(first, preserve_index=False).remove_metadata()

@@ -1,24 +1,21 @@
-"""Commands around a campaign file: models, check, run, schema."""
+"""Commands for campaign files: models, init, check, schema."""
 
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from mdr_dask.bars import at_work
-from mdr_dask.cli.printing import print_json, printable
+from mdr_dask.cli.printing import print_json, say, terminal_width
 from mdr_dask.cli.writing import writing
 
 if TYPE_CHECKING:
     from mdr_dask.campaign import Campaign
     from mdr_dask.models.base import Model
 
-#: Columns of a terminal: the fewest that tables are made for, and those of a pipe.
-NARROWEST, WIDEST = 80, 100
 CAMPAIGN = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
@@ -33,7 +30,7 @@ def models(name: str | None, form: str | None) -> None:
     mdr-dask models sliding_friction
     """
     from mdr_dask import models as room
-    from mdr_dask.campaign.reference import number_rows, output_rows, parameter_rows, ways_told
+    from mdr_dask.campaign.reference import alternatives_of, number_rows, output_rows, parameter_rows
 
     if name is None:
         rows = [{"model": known, "summary": room.load(known).summary} for known in room.names()]
@@ -41,14 +38,14 @@ def models(name: str | None, form: str | None) -> None:
         return
     model = _model(name)
     if form == "json":
-        parts = {"parameters": parameter_rows(model), "together": ways_told(model), "outputs": output_rows(model)}
+        parts = {"parameters": parameter_rows(model), "together": alternatives_of(model), "outputs": output_rows(model)}
         print_json({"model": name, **parts, "numbers": number_rows(model)})
         return
     click.echo(f"{name}: {model.summary}\n\nparameters")
     _print_left([row | {"parameter": _indented(row["parameter"])} for row in parameter_rows(model)], None)
-    if ways_told(model):
-        lines = (click.wrap_text(line, _width(), subsequent_indent="    ") for line in ways_told(model))
-        click.echo("\n".join(["", "what belongs together", *lines]))
+    if alternatives_of(model):
+        lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in alternatives_of(model))
+        click.echo("\n".join(["", "exactly one of these is required", *lines]))
     click.echo("\noutputs")
     _print_left([row | {"error": "yes" if row["error"] else ""} for row in output_rows(model)], None)
     if model.numbers:
@@ -57,7 +54,7 @@ def models(name: str | None, form: str | None) -> None:
 
 
 def _model(name: str) -> Model[Any]:
-    """Return a model; a wrong name is a wrong call."""
+    """Return a model; raise UsageError for an unknown name."""
     from mdr_dask import models as room
     from mdr_dask.errors import ModelError, did_you_mean
 
@@ -72,7 +69,7 @@ def _model(name: str) -> Model[Any]:
 @click.argument("model")
 @click.option("--output", "-o", type=click.Path(path_type=Path), help="Write it to a new file instead of stdout.")
 def init(model: str, output: Path | None) -> None:
-    """Write a first campaign of a model, with units, meanings and choices; it passes check as it stands.
+    """Write a first campaign of a model, with units, meanings and choices. It passes `check` without changes.
 
     \b
     mdr-dask init sliding_friction -o rubber.yaml
@@ -87,7 +84,7 @@ def init(model: str, output: Path | None) -> None:
         raise click.UsageError(f"{output}: exists already, expected the name of a new file")
     with writing(output):
         output.write_text(text)
-    click.echo(f"{output}: edit it, then mdr-dask check {output}")
+    click.echo(f"{output}: edit it, then run mdr-dask check {output}")
 
 
 def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
@@ -103,23 +100,19 @@ def _print_left(rows: list[dict[str, str]], form: str | None) -> None:
         table.add_column(key, no_wrap=place == 0, overflow="fold")
     for row in rows:
         table.add_row(*(Text(_brief(cell)) for cell in row.values()))
-    console = Console(width=_width(), color_system=None)
+    console = Console(width=terminal_width(), color_system=None)
     with console.capture() as written:
         console.print(table)
     click.echo("\n".join(line.rstrip() for line in written.get().splitlines()))
 
 
-def _width() -> int:
-    return max(NARROWEST, shutil.get_terminal_size((WIDEST, 24)).columns)
-
-
 def _indented(path: str) -> str:
-    """Return the name of a parameter below the structures that it belongs to."""
+    """Return the last part of a dotted name, indented by the number of the others."""
     return "  " * path.count(".") + path.rpartition(".")[2]
 
 
 def _brief(cell: str) -> str:
-    """Return a cell without the entries of structures, which have rows of their own, and the middle of lists."""
+    """Return a cell without the entries of structures, which have their own rows, and without the middle of lists."""
     words = re.sub(r"\{[^{}]*\}", "{...}", cell).split(" or ")
     return re.sub(r"\[([^\]]{9})[^\]]{30,}, ([^,\]]*)\]", r"[\1..., \2]", " or ".join(dict.fromkeys(words)))
 
@@ -128,9 +121,9 @@ def _brief(cell: str) -> str:
 @click.argument("campaigns", nargs=-1, required=True, type=CAMPAIGN)
 @click.option("--json", "form", flag_value="json", help="Print one JSON document.")
 def check(campaigns: tuple[Path, ...], form: str | None) -> None:
-    """Check campaign files and say what was understood: axes, tables, sizes, times.
+    """Check campaign files; print their axes, data, sizes and times.
 
-    All problems are told at once, with exit code 2 if there are any.
+    All problems are reported at once, with exit code 2.
 
     \b
     mdr-dask check campaigns/*.yaml
@@ -153,7 +146,7 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
         row = {"campaign": str(path), "model": campaign.model, **costs_row(costs)}
         rows.append(row | {"axes": axes_rows(campaign), "questions": list(campaign.remarks)})
         if form != "json":
-            click.echo("\n".join([f"{path}: {campaign.model}", *study_lines(campaign, costs)]))
+            say("\n".join([f"{path}: {campaign.model}", *study_lines(campaign, costs)]))
             ask(campaign)
     if rows and form == "json":
         units = {"bytes": "B", "bytes_at_most": "B", "seconds": "s", "seconds_at_most": "s", "compiling": "s"}
@@ -163,9 +156,9 @@ def check(campaigns: tuple[Path, ...], form: str | None) -> None:
 
 
 def ask(campaign: Campaign) -> None:
-    """Print what is asked about bare numbers."""
+    """Print the questions about bare numbers."""
     for question in campaign.remarks:
-        click.echo(printable(question), err=True)
+        say(question, err=True)
 
 
 @click.command()

@@ -26,31 +26,35 @@ def _listed(_: click.Context, __: click.Parameter, texts: tuple[str, ...]) -> tu
     return tuple(name.strip().replace(".", "_") for text in texts for name in text.split(",") if name.strip())
 
 
-series_option = click.option("--series", help="Name of the series, where the campaign has any.")
+series_option = click.option("--series", help="Name of a series of the campaign.")
 select_option = click.option(
     "--select",
     "selections",
     multiple=True,
     metavar="NAME=VALUES",
-    help="Values and ranges of an axis: 'velocity=1 mm/s..1 m/s', hurst=0.3,0.7; repeat.",
+    help="Values or ranges of an axis: 'velocity=1 mm/s..1 m/s', hurst=0.3,0.7; may be repeated.",
 )
 units_option = click.option(
     "--units",
     multiple=True,
     callback=_units,
     metavar="NAME=UNIT,...",
-    help="Units of columns: velocity=km/h,temperature=degC; repeat.",
+    help="Units of columns: velocity=km/h,temperature=degC; may be repeated.",
 )
 where_option = click.option(
     "--where",
     default="",
     metavar="CONDITION",
-    help="Keep rows where it holds: 'friction_coefficient > 0.5 and velocity < 3 km/h'.",
+    help="Only rows that meet a condition: 'friction_coefficient > 0.5 and velocity < 3 km/h'.",
 )
 json_option = click.option("--json", "form", flag_value="json", help="Print one JSON document, with units.")
 csv_option = click.option("--csv", "form", flag_value="csv", help="Print comma-separated values.")
 limit_option = click.option(
-    "--limit", type=click.IntRange(min=0), default=40, show_default=True, help="Most rows of a table; 0 for all."
+    "--limit",
+    type=click.IntRange(min=0),
+    default=40,
+    show_default=True,
+    help="Largest number of printed rows; 0 for all.",
 )
 _QUESTION = (
     series_option,
@@ -64,14 +68,17 @@ _QUESTION = (
         help="A row for each value of these axes, averaged over all other cases.",
     ),
     click.option(
-        "--sort", multiple=True, metavar="[-]COLUMN", help="Order of the rows, - for the largest first; repeat."
+        "--sort",
+        multiple=True,
+        metavar="[-]COLUMN",
+        help="Order of the rows, with - the largest first; may be repeated.",
     ),
     click.option(
         "--columns",
         multiple=True,
         callback=_listed,
         metavar="NAME,...",
-        help="Only these: axes, parameters, outputs, dimensionless numbers, realisations, status.",
+        help="Only these columns: axes, parameters, outputs, dimensionless numbers, realisations, status.",
     ),
     units_option,
     limit_option,
@@ -93,7 +100,7 @@ _QUESTION = (
 
 
 def question_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add what show and aggregate have in common: the parts of a question, and the forms of its answer."""
+    """Add the options that show and aggregate have in common."""
     for option in reversed(_QUESTION):
         command = option(command)
     return command

@@ -1,4 +1,4 @@
-"""The command reference, made from the commands themselves: ``python -m mdr_dask.cli.reference > docs/commands.md``."""
+"""Write the command reference: ``python -m mdr_dask.cli.reference > docs/commands.md``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def commands_page() -> str:
 
 
 def _text(help_text: str) -> list[str]:
-    """Turn click's paragraphs into Markdown; those that click keeps as they are become code."""
+    """Turn the help text of click into Markdown; paragraphs that click does not wrap become code."""
     lines: list[str] = []
     for paragraph in help_text.split("\n\n"):
         kept = paragraph.strip().startswith("\b")

@@ -1,4 +1,4 @@
-"""Commands around a store: status, show, aggregate."""
+"""Commands that read a store: status, show, aggregate."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from mdr_dask.cli.writing import writing
 
 
 class Reading(click.Command):
-    """A command that reads a store, its first argument."""
+    """A command whose first argument is a store."""
 
     def invoke(self, context: click.Context) -> Any:
-        """Run it; what Zarr has to say of chunks that cannot be read is one error."""
+        """Run the command; a chunk that cannot be read is one error."""
         from mdr_dask.store import readable
 
         with readable(context.params[str(self.params[0].name)]):
@@ -37,12 +37,14 @@ store_argument = click.argument("store")
 
 @click.command(cls=Reading)
 @store_argument
-@click.option("--failures", is_flag=True, help="List what failed, why, and which values the failures share.")
-@click.option("--messages", is_flag=True, help="List warnings of results that are done, too.")
-@click.option("--watch", is_flag=True, help="Show it again and again, until nobody is at work any more.")
+@click.option(
+    "--failures", is_flag=True, help="List failed results with their reasons and the ranges of their parameters."
+)
+@click.option("--messages", is_flag=True, help="List also the warnings of finished results.")
+@click.option("--watch", is_flag=True, help="Refresh until no run is active.")
 @json_option
 def status(store: str, failures: bool, messages: bool, watch: bool, form: str | None) -> None:
-    """Show the progress of a store, during a run too, and who is at work on it.
+    """Show the progress of a study and its active runs, also during a run.
 
     \b
     mdr-dask status results/quickstart.zarr
@@ -88,14 +90,16 @@ def _print_counts(rows: list[dict[str, Any]], at_work: list[str], form: str | No
 @click.command(cls=Reading)
 @store_argument
 @click.argument("outputs", nargs=-1)
-@click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Over realisations; repeat.")
-@click.option("--realisations", "raw", is_flag=True, help="Show every realisation, not a statistic.")
+@click.option(
+    "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Statistic over realisations; may be repeated."
+)
+@click.option("--realisations", "raw", is_flag=True, help="Show single realisations.")
 @question_options
 def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: bool, **asked: Any) -> None:
     """Show results as a table: means with their errors, or every realisation.
 
-    A mean stands with the standard error of the realisations and, behind a second +-, with the discretisation error.
-    `status` says what became of the realisations: done, or how many of them are missing, failed or not_converged.
+    A mean is followed by the standard error of the realisations and the discretisation error. `status` is done, or how
+    many realisations are missing, failed or not_converged. What is the same in all rows is printed above the table.
 
     \b
     mdr-dask show results/quickstart.zarr friction_coefficient
@@ -110,12 +114,14 @@ def show(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], raw: 
 @click.command(cls=Reading)
 @store_argument
 @click.argument("outputs", nargs=-1)
-@click.option("--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these; repeat.")
+@click.option(
+    "--statistic", type=click.Choice(STATISTICS), multiple=True, help="Only these statistics; may be repeated."
+)
 @question_options
 def aggregate(store: str, outputs: tuple[str, ...], statistic: tuple[str, ...], **asked: Any) -> None:
     """Reduce outputs over realisations: mean, scatter, standard error, quantiles, bootstrap interval.
 
-    Without --statistic, a table for reading has mean, interval and scatter; all other forms have all of them.
+    Without --statistic, the printed table has mean, standard deviation and interval; files have all statistics.
 
     \b
     mdr-dask aggregate results/quickstart.zarr -o quickstart-means.nc
@@ -165,7 +171,7 @@ def _answer(
 
 
 def list_names(model: str, summaries: dict[str, str]) -> None:
-    """Print what there is for a model, with a line about each."""
+    """Print names with a line about each."""
     if not summaries:
         click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)
@@ -174,7 +180,7 @@ def list_names(model: str, summaries: dict[str, str]) -> None:
 
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
-    """Refuse a name that is not known."""
+    """Raise UsageError for an unknown name."""
     for name in names:
         if name not in known:
             raise click.UsageError(f"no {what} is called {name!r}; known: {', '.join(known) or 'none'}")

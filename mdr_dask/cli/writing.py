@@ -18,7 +18,7 @@ format_option = click.option(
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Make the folder of a file to be written; if that fails, name the file, and leave nothing where nothing was."""
+    """Make the folder of a file to be written; after an error remove what was made, and name the file in the error."""
     require_outside(path)
     there = path.exists()
     missing = [folder for folder in path.parents if not folder.exists()]
@@ -29,7 +29,7 @@ def writing(path: Path) -> Iterator[None]:
     except BaseException as error:
         if not there and path.exists():
             shutil.rmtree(path) if path.is_dir() else path.unlink()
-        with suppress(OSError):  # it was never made, or somebody else uses it
+        with suppress(OSError):  # the folder was never made, or is in use
             for folder in missing:
                 folder.rmdir()
         if isinstance(error, OSError) and error.filename is None:
@@ -38,7 +38,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def require_outside(path: Path) -> None:
-    """Refuse a file in the folder of a store, where it would be taken for a damage."""
+    """Raise UsageError for a file inside a store, which would count as damage."""
     for folder in path.absolute().parents:
         if (folder / "zarr.json").is_file() and _is_study(folder):
             raise click.UsageError(f"expected a file outside of stores, got {str(path)!r} in the store {folder.name}")
@@ -51,13 +51,7 @@ def _is_study(folder: Path) -> bool:
 
 
 def require_suffix(path: Path | None, known: tuple[str, ...]) -> None:
-    """Refuse the name of a file that does not end in any of these.
-
-    Raises
-    ------
-    click.UsageError
-        If there is a name, with another end.
-    """
+    """Raise UsageError for a file with another suffix."""
     if path is not None and path.suffix not in known:
         raise click.UsageError(
             f"expected a file that ends in {', '.join(known[:-1])} or {known[-1]}, got {str(path)!r}"

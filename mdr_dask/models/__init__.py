@@ -1,7 +1,7 @@
 """The models by name; each is imported only when a campaign names it.
 
-A model is one of the package (`NAMES`), one that an installed package offers in the entry point group `GROUP`, or any
-object ``package.module:NAME`` of the user's own. Code of one's own runs only because the campaign names it.
+A model is one of this package (`NAMES`), one in the entry point group `GROUP` of an installed package, or an object
+``package.module:NAME`` of the user.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ NAMES: tuple[str, ...] = (
     "mixed_lubrication",
 )
 
-#: Entry point group in which packages offer models.
+#: Entry point group for models of other packages.
 GROUP = "mdr_dask.models"
 
 
 def names() -> tuple[str, ...]:
-    """Return the names of all models that are installed: those of the package, then those of others."""
-    return (*NAMES, *(name for name in _offered() if name not in NAMES))
+    """Return the names of all installed models: those of this package, then those of others."""
+    return (*NAMES, *(name for name in _installed() if name not in NAMES))
 
 
 def load(name: str) -> Model[Any]:
@@ -42,7 +42,7 @@ def load(name: str) -> Model[Any]:
     Raises
     ------
     ModelError
-        If there is no such model, or what is found there is none.
+        If there is no such model, or the object is not a model.
     """
     if name in NAMES:
         model: Model[Any] = import_module(f"mdr_dask.models.{name}").MODEL
@@ -50,8 +50,8 @@ def load(name: str) -> Model[Any]:
     module, colon, _ = name.partition(":")
     if colon:
         return _own(name, EntryPoint(name, name, GROUP), module)
-    if name in _offered():
-        return _own(name, _offered()[name], _offered()[name].module)
+    if name in _installed():
+        return _own(name, _installed()[name], _installed()[name].module)
     raise ModelError(f"unknown model {name!r}")
 
 
@@ -61,12 +61,12 @@ def is_own(name: str) -> bool:
 
 
 @lru_cache(maxsize=1)
-def _offered() -> dict[str, EntryPoint]:
+def _installed() -> dict[str, EntryPoint]:
     return {entry.name: entry for entry in entry_points(group=GROUP)}
 
 
 def _own(name: str, entry: EntryPoint, module: str) -> Model[Any]:
-    """Import a model of the user's own; whatever goes wrong there is one sentence."""
+    """Import a model from outside this package; any error becomes a ModelError."""
     try:
         found = entry.load()
     except ModuleNotFoundError as error:

@@ -1,4 +1,4 @@
-"""What a campaign can name: a model is data about a computation and one pure function from a block to arrays."""
+"""The interface of models: a declaration of parameters and outputs, and one pure function from a block to arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mdr_dask.errors import distinguishable
 
 
 class Status(IntEnum):
-    """What became of one case in one realisation; the values of the ``status`` array of a store."""
+    """The state of one case in one realisation; the values of the ``status`` array of a store."""
 
     MISSING = 0
     DONE = 1
@@ -94,7 +94,7 @@ def _looks_numeric(value: Any) -> bool:
     return isinstance(value, str) and value.strip()[:1] in "+-.0123456789" and value.strip() != ""
 
 
-#: Smallest size of a quantity other than 0, in SI; its reciprocal is the largest.
+#: Smallest and largest size of a quantity other than 0, in SI units.
 LEAST, MOST = 1e-30, 1e30
 
 
@@ -104,14 +104,14 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     Parameters
     ----------
     unit : str
-        The coherent SI unit in which the value is held, ``"1"`` for a pure number.
+        The coherent SI unit of the value, ``"1"`` for a pure number.
     description : str
-        One line that tells a user what it is.
+        One line about its meaning.
     usual : str
-        A common value with its unit, ``"10 MPa"``: what ``mdr-dask init`` writes. A bare number that lies more than
-        three decades off is asked about.
+        A common value with its unit, ``"10 MPa"``, for ``mdr-dask init``. A bare number more than three decades away
+        from it is questioned.
     **bounds
-        ``default``, ``gt``, ``ge``, ``lt``, ``le`` and whatever else :func:`pydantic.Field` takes.
+        ``default``, ``gt``, ``ge``, ``lt``, ``le`` and other arguments of :func:`pydantic.Field`.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     """
 
     def to_si(value: Any, info: ValidationInfo) -> Any:
-        """Convert ``'20 mm'`` with the converter of the campaign layer; leave names such as ``auto`` alone."""
+        """Convert ``'20 mm'`` to SI with the converter in the context; keep names such as ``auto``."""
         if info.context is None:
             return value
         convert = info.context["to_si"]
@@ -131,55 +131,55 @@ def quantity(unit: str, description: str, usual: str = "", **bounds: Any) -> Any
     examples = [usual] if usual else None
     field = Field(description=description, json_schema_extra={"unit": unit}, examples=examples, **bounds)
     field.metadata.append(BeforeValidator(to_si))
-    if unit != "m^(1-n)":  # of a body r^50 any number may be meant
+    if unit != "m^(1-n)":  # a body r^50 may have any prefactor
         field.metadata.append(AfterValidator(partial(_conceivable, 0.0 if unit == "1" else LEAST)))
     return field
 
 
 def _conceivable(least: float, value: Any) -> Any:
-    """Refuse numbers that no quantity has in SI, and that a computer cannot multiply a few times."""
+    """Raise ValueError for sizes that no quantity has, and that overflow in products."""
     for number in value if isinstance(value, tuple) else (value,):
         if isinstance(number, float) and number != 0 and not least <= abs(number) <= MOST:
-            told, low, high = distinguishable(number, least, MOST, digits=6)
-            raise ValueError(f"expected a size between {low} and {high} in SI units, got {told}")
+            got, low, high = distinguishable(number, least, MOST, digits=6)
+            raise ValueError(f"expected a size between {low} and {high} in SI units, got {got}")
     return value
 
 
 def unit_of(parameters: type[BaseModel], name: str) -> str | None:
-    """Return the SI unit that a field was declared with, or None for a field that is not a quantity."""
+    """Return the SI unit of a field, or None if it is not a quantity."""
     extra = parameters.model_fields[name].json_schema_extra
     return str(extra["unit"]) if isinstance(extra, dict) and "unit" in extra else None
 
 
 def notes_of(parameters: Any) -> tuple[str, ...]:
-    """Return what a parameter set and the parts in it tell of themselves: tables, measured lines, fits."""
-    told: tuple[str, ...] = ()
+    """Return the notes of a parameter set and its parts, about tables, measured lines and fits."""
+    notes: tuple[str, ...] = ()
     if isinstance(parameters, list | tuple):
         return tuple(note for part in parameters for note in notes_of(part))
     if isinstance(parameters, BaseModel):
-        told = tuple(note for name in type(parameters).model_fields for note in notes_of(getattr(parameters, name)))
+        notes = tuple(note for name in type(parameters).model_fields for note in notes_of(getattr(parameters, name)))
         own = getattr(type(parameters), "notes", None)
-        told += own(parameters) if callable(own) else ()
-    return told
+        notes += own(parameters) if callable(own) else ()
+    return notes
 
 
-#: Dimensionless numbers that agree to 6e-14 are the same case.
+#: Bits of dimensionless numbers: those that agree to 6e-14 are the same case.
 CANONICAL_BITS = 44
 
 
 def canonical(number: ArrayLike) -> Any:
-    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers are equal however they were computed."""
+    """Round to `CANONICAL_BITS`, so that equal dimensionless numbers do not differ by rounding errors."""
     mantissa, exponent = np.frexp(number)
     return np.ldexp(np.rint(np.ldexp(mantissa, CANONICAL_BITS)), exponent - CANONICAL_BITS)
 
 
 def deferred(module: str, name: str) -> Callable[..., Any]:
-    """Return a function that is imported when it is first called, so that declarations stay light to import.
+    """Return a function that is imported when it is first called, so that declarations import quickly.
 
     Parameters
     ----------
     module, name : str
-        Where it is, such as ``"mdr_dask.models.ehl_line.solve"`` and ``"compute"``.
+        Module and name of the function: ``"mdr_dask.models.ehl_line.solve"``, ``"compute"``.
     """
 
     def call(*arguments: Any) -> Any:
@@ -198,16 +198,16 @@ class Output:
     Parameters
     ----------
     name, unit, long_name : str
-        As they stand in the store; a pure number has the unit ``"1"``.
+        Name, SI unit and meaning in the store; a pure number has the unit ``"1"``.
     dims : tuple of str
-        Dimensions that every single case has (``("radius",)``); their coordinates come from ``Model.coordinates``.
+        Dimensions of a single case (``("radius",)``); their coordinates come from ``Model.coordinates``.
     default : bool
         Whether it is computed when the campaign names no outputs.
     has_error : bool
-        Whether the solver estimates its discretisation error: then its companion `error` comes with it, unless the
-        campaign says ``errors: false``.
+        Whether the solver estimates its discretisation error: it is stored as the companion `error`, unless the
+        campaign has ``errors: false``.
     comment : str
-        What it does not tell, for its attribute ``comment`` in the store.
+        A limitation, for its attribute ``comment`` in the store.
     scatter : str
         Name of the output that estimates the standard error from one realisation alone; it is stored with the errors.
     floor : float
@@ -237,15 +237,15 @@ class Output:
 
 @dataclass(frozen=True)
 class Number:
-    """A dimensionless number that a user can ask for beside the outputs of a model.
+    """A dimensionless number of the cases of a model, for tables and conditions.
 
     Parameters
     ----------
     name, meaning : str
-        As in conditions and tables; the meaning in one line.
+        Its name and its meaning in one line.
     formula : str
-        In names of parameters (nested ones joined by ``_``), outputs and other numbers, as
-        `mdr_dask.questions.expression` reads it.
+        A formula of parameters (nested names joined by ``_``), outputs and other numbers, for
+        `mdr_dask.questions.expression`.
     """
 
     name: str
@@ -269,19 +269,19 @@ class Block(Generic[P]):
     Parameters
     ----------
     parameters : Parameters
-        The parameters that all cases share; a varied one holds the value of some case, so read those by `column`.
+        The fixed parameters. A varied parameter has the value of some case here; read it with `column`.
     columns : mapping of str to array, shape (cases,)
-        The varied parameters by dotted path (``velocity``, ``indenter.angle``), one entry a case, SI.
+        The varied parameters by dotted path (``velocity``, ``indenter.angle``), one value for each case, in SI units.
     cases : int
         Number of cases.
     realisations : tuple of int
-        Indices of the realisations; with `seed` they key every random number.
+        Indices of the realisations; together with `seed` they determine every random number.
     seed : int
         Seed of the campaign.
     outputs : tuple of str
-        Names of the arrays wanted, companions with errors among them; nothing else need be computed.
+        Names of the arrays to compute, including the companions with errors.
     accuracy : float or None
-        Relative discretisation error allowed for every output that has a companion.
+        Largest relative discretisation error of every output that has a companion (see `Output.floor`).
     """
 
     parameters: P
@@ -293,7 +293,7 @@ class Block(Generic[P]):
     accuracy: float | None = None
 
     def column(self, path: str) -> NDArray[Any]:
-        """Return one parameter for every case, shape (cases,), whether it varies or not."""
+        """Return the values of one parameter, varied or fixed; shape (cases,)."""
         if path in self.columns:
             return self.columns[path]
         value: Any = reduce(getattr, path.split("."), self.parameters)
@@ -304,7 +304,7 @@ class Block(Generic[P]):
         return column
 
     def case(self, index: int) -> P:
-        """Return the whole parameter set of one case."""
+        """Return the parameter set of one case."""
         case = self.parameters
         for path, column in self.columns.items():
             value = column[index]
@@ -312,7 +312,7 @@ class Block(Generic[P]):
         return case
 
     def part(self, index: int, realisation: int) -> Block[P]:
-        """Return the block that holds one case in one realisation only."""
+        """Return the block of one case in one realisation."""
         columns = {path: column[index : index + 1] for path, column in self.columns.items()}
         return Block(self.parameters, columns, 1, (realisation,), self.seed, self.outputs, self.accuracy)
 
@@ -332,13 +332,13 @@ class Result:
     Parameters
     ----------
     values : dict of str to array, shape (cases, realisations, ...)
-        The arrays asked for, NaN where a case failed.
+        The requested arrays, NaN where a case failed.
     status : int8 array, shape (cases, realisations)
         Values of `Status`.
     messages : dict of (case, realisation position) to str
-        One sentence for every case that failed or needs a warning.
+        The reason or the warning of a case that failed or needs one.
     solves : int
-        Number of solutions really computed; the rest shared one.
+        Number of solutions computed; other cases shared one of them.
     """
 
     values: dict[str, FloatArray]
@@ -356,34 +356,34 @@ class Model(Generic[P]):
     name : str
         As in ``model:`` of a campaign file.
     version : int
-        Raised whenever a change of code changes a number; part of the identity of a store.
+        Raised when a change of code changes a number; part of the identity of a store.
     summary : str
         One line for ``mdr-dask models``.
     parameters : type
         Its parameter set.
     outputs : tuple of Output
-        All arrays it can compute. ``status`` is implied, and so are the companions of outputs that have errors.
+        All arrays it can compute, without ``status`` and the companions with errors.
     compute : callable, Block -> Result
-        Pure: the value of a case depends on its parameters, the seed and its realisation, never on its neighbours in
-        the block. It does not raise for a case that fails.
+        A pure function: the value of a case depends on its parameters, the seed and its realisation, not on the other
+        cases of the block. It does not raise an exception for a case that fails.
     seconds : callable, Block -> float
         Estimated time of `compute`; cheap, vectorised over the cases.
     whole : tuple of str
-        Parameters whose axes stay whole inside a block, because cases share work along them; those named last are cut
-        first where a block becomes too large.
+        Parameters whose axes are not divided among blocks, because their cases share work. If a block becomes too
+        large, the axis of the last one is divided first.
     coordinates : callable, Parameters -> dict of str to Coordinate
-        Coordinates of the dimensions that outputs have beyond case and realisation.
+        Coordinates of the dimensions of outputs beyond case and realisation.
     distinct : callable, Block -> int, optional
-        Number of different solutions among the cases of a block, for ``--dry-run``; None if cases share nothing.
+        Number of different solutions among the cases of a block, for ``check``; None if cases share nothing.
     units : callable, Parameters -> dict of str to str
         Units of outputs and parameters that differ from the declared ones, as in a campaign of dimensionless numbers.
     memory : callable, Block -> float
         Estimated peak memory of `compute` in bytes, beyond its outputs.
     notes : callable, sequence of Parameters -> tuple of str
-        What a user should know of a study before it is run, from its parameter sets with one axis varied at a time.
-        What one part of a parameter set has to say by itself is told by its method `notes`.
+        Notes for ``check`` about a study, from its parameter sets with one axis varied at a time. Notes about a single
+        part of a parameter set come from the method `notes` of that part.
     compiling : float
-        Seconds that its kernels take to compile, the first time on a machine.
+        Seconds to compile its kernels, the first time on a machine.
     numbers : tuple of Number
         Dimensionless numbers of its cases.
     """
@@ -414,7 +414,7 @@ class Model(Generic[P]):
         return {output.name: output for output in (*self.outputs, *self.companions.values())}[name]
 
     def with_companions(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Return names of outputs with their scatter, each followed by that of its companion where it has one."""
+        """Return names of outputs with their scatter outputs, each followed by its companion if it has one."""
         companions = self.companions
         asked = {*names, *(self.output(name).scatter for name in names)}
         kept = [output.name for output in self.outputs if output.name in asked]

@@ -1,4 +1,4 @@
-"""What a name means in a question: an axis, parameter, output or dimensionless number, or the state of results."""
+"""The columns of a study by name: axes, parameters, outputs, dimensionless numbers, and the state of results."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from mdr_dask.questions.expression import Column, Value, evaluate, parse
 if TYPE_CHECKING:
     import xarray as xr
 
-#: Columns that tell what became of the results of a row.
+#: Columns with the state of the results of a row, and with the number of finished ones.
 STATUS, REALISATIONS = "status", "realisations"
-#: Counts of states along a dimension of their own, where a row stands for several cases.
+#: Number of results in each state, for a row that combines several cases.
 COUNTS = "state_counts"
-#: States that leave nothing to be wished for in a row of several results.
+#: States of results that need no further work.
 COMPLETE = (Status.DONE, Status.NOT_NEEDED)
 WORDS = np.array([state.name.lower() for state in Status], dtype=object)
 
 
 def numbers(dataset: xr.Dataset) -> dict[str, Number]:
-    """Return the dimensionless numbers of the study's model by name; none where the model is not at hand."""
+    """Return the dimensionless numbers of the model of a study by name; none if the model cannot be loaded."""
     try:
         return {number.name: number for number in models.load(str(dataset.attrs.get("model"))).numbers}
     except ModelError:
@@ -36,7 +36,7 @@ def numbers(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def fixed_words(dataset: xr.Dataset) -> dict[str, str]:
-    """Return the words among the parameters that do not vary, nested names joined by ``_``."""
+    """Return the fixed parameters that are words, nested names joined by ``_``."""
     import pandas as pd
 
     flat = pd.json_normalize(_parameters(dataset.attrs.get("parameters", "{}")), sep="_")
@@ -51,7 +51,7 @@ def _parameters(text: str) -> dict[str, object]:
 
 
 class Columns:
-    """The columns that can be made of a part of a study, each once.
+    """The columns of a part of a study; each is computed once.
 
     Parameters
     ----------
@@ -66,14 +66,14 @@ class Columns:
 
     @property
     def known(self) -> list[str]:
-        """All names, for hints."""
+        """All names, for hints in messages."""
         data = self.dataset
         return [*map(str, data.data_vars), *map(str, data.coords), *self._numbers, REALISATIONS]
 
     def find(self, name: str) -> Column | None:
         """Return the values of a column, an output by its mean over realisations; None if there is no such name."""
         if name not in self._found:
-            self._found[name] = None  # for a formula that comes back to itself
+            self._found[name] = None  # for a formula that refers to itself
             self._found[name] = self._make(name)
         return self._found[name]
 
@@ -83,7 +83,7 @@ class Columns:
         Raises
         ------
         DataError
-            If there is no such column, or what it needs is not in the study.
+            If there is no such column, or the study lacks a part of its formula.
         """
         from xarray import DataArray
 
@@ -98,7 +98,7 @@ class Columns:
         return array
 
     def unknown(self, name: str) -> DataError:
-        """Return what to say of a name that is none, or whose ingredients are missing."""
+        """Return the error for an unknown column, or for one of which a part is missing."""
         from mdr_dask.errors import did_you_mean
 
         if name in self._numbers:
@@ -109,7 +109,7 @@ class Columns:
         return DataError(f"no column {name!r}{hint}")
 
     def evaluate(self, text: str) -> Value:
-        """Return what a condition or a formula comes to."""
+        """Return the value of a condition or a formula."""
         expression = parse(text)
         for name in expression.names & self._numbers.keys():
             if self.find(name) is None:
@@ -117,7 +117,7 @@ class Columns:
         return evaluate(expression, self.find, self.known)
 
     def truth(self, condition: str) -> xr.DataArray:
-        """Return where a condition holds."""
+        """Return the truth values of a condition."""
         from xarray import DataArray
 
         array = self.evaluate(condition).array
@@ -151,7 +151,7 @@ def _unit(array: xr.DataArray) -> str | None:
 
 
 def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
-    """Return the outputs that columns need, numbers by what is in their formulas."""
+    """Return the outputs that columns need, also those in the formulas of numbers."""
     known, found = numbers(dataset), []
     for name in names:
         if name in dataset.data_vars:
@@ -162,7 +162,7 @@ def needed(dataset: xr.Dataset, names: Iterable[str]) -> list[str]:
 
 
 def counts(dataset: xr.Dataset) -> xr.DataArray:
-    """Return how many results of every row are in each state, along the dimension ``state``."""
+    """Return the number of results of every row in each state, along the dimension ``state``."""
     import xarray as xr
 
     if COUNTS in dataset:
@@ -183,11 +183,11 @@ def states(dataset: xr.Dataset) -> xr.DataArray:
     kinds, of = np.unique(
         number.transpose(..., "state").to_numpy().reshape(-1, len(Status)), axis=0, return_inverse=True
     )
-    words = np.array([_told(kind) for kind in kinds], dtype=object)[of.ravel()]
+    words = np.array([_described(kind) for kind in kinds], dtype=object)[of.ravel()]
     like = number.isel(state=0, drop=True)
     return DataArray(words.reshape(like.shape), like.coords, like.dims)
 
 
-def _told(kind: np.ndarray) -> str:
+def _described(kind: np.ndarray) -> str:
     parts = [f"{count} {WORDS[state]}" for state, count in enumerate(kind) if count and state not in COMPLETE]
     return ", ".join(parts) or str(WORDS[Status.DONE])

@@ -1,4 +1,4 @@
-"""Means over cases: one row for each value, or each combination of values, of the axes that are kept."""
+"""Average over cases: one row for each combination of values of some axes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
     by : sequence of str
         Axes, or columns of a sampled study.
     kept : DataArray of bool, optional
-        The cases that take part.
+        The cases to include; all by default.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def averaged(dataset: xr.Dataset, by: Sequence[str], kept: xr.DataArray | None =
 
 @dataclass(frozen=True)
 class _Members:
-    """The cases of every group: all of them, sorted by group, and where each group begins."""
+    """All cases sorted by group, and the position where each group begins."""
 
     order: NDArray[np.intp]
     starts: NDArray[np.intp]
@@ -87,7 +87,7 @@ class _Members:
         return np.diff(self.starts, append=self.order.size)
 
     def sums(self, values: NDArray[Any], dtype: type = float) -> NDArray[Any]:
-        """Return the sums over the cases of every group, from values with the cases first."""
+        """Return the sums over the cases of every group; the first dimension of the values is the case."""
         if not self.order.size:
             return np.zeros((0, *values.shape[1:]), dtype)
         return np.asarray(np.add.reduceat(values[self.order], self.starts, axis=0, dtype=dtype))

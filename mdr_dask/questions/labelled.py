@@ -1,4 +1,4 @@
-"""A study as labelled arrays: the answer to a question as it goes into NetCDF and Zarr."""
+"""Answer a question with labelled arrays, for NetCDF and Zarr."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from mdr_dask.questions.table import Question
 
 
-#: Bytes of an array that are worked on at a time, by each core.
+#: Bytes of the pieces of an array, one for each core.
 PIECE = 2**20
 
 
 def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn) -> xr.Dataset:
-    """Answer a question with arrays; cases that the condition leaves out are NaN.
+    """Answer a question with arrays; cases that do not meet the condition are NaN.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
     Raises
     ------
     DataError
-        If the question names what is not there, or asks for an order, which arrays have not.
+        If a name is unknown, or the question asks for sorted rows.
     """
     if question.sort:
         raise DataError("expected a table for rows in an order: .csv, .jsonl or .parquet, got labelled arrays")
@@ -67,7 +67,7 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
 
 
 def _in_pieces(dataset: xr.Dataset) -> xr.Dataset:
-    """Return lazy arrays whose pieces are small and hold all realisations."""
+    """Return lazy arrays in small pieces, each with all realisations."""
     import dask
 
     with dask.config.set({"array.chunk-size": PIECE}):

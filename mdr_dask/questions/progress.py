@@ -1,4 +1,4 @@
-"""How far a study has come: results in each state, and what failed results and warnings have in common."""
+"""The progress of a study: the number of results in each state, and messages grouped by text."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 
 
 class Group(NamedTuple):
-    """Messages of one series that say the same.
+    """Messages of one series that differ in their numbers only.
 
     Attributes
     ----------
     series, kind, reason : str
-        Where, ``warning`` or the state of the results, and the message.
+        The series, ``warning`` or the state of the results, and the message.
     results : int
-        How many it was said of.
+        Number of results.
     cases : str
-        The range that each varied parameter takes among them.
+        The range of each varied parameter.
     """
 
     series: str
@@ -53,11 +53,11 @@ def counts(look: Look) -> dict[str, Any]:
 
 
 def messages(url: str, series: str, dataset: xr.Dataset) -> list[dict[str, Any]]:
-    """Return what still holds of the messages of a series: the last attempt's, where the ledger says the same."""
+    """Return the current messages of a series: those of the last attempt at each result, if the ledger agrees."""
     last: dict[tuple[int, ...], dict[str, Any]] = {}
     telling = [record for record in store.records(url, series) if record["messages"]]
     for record in sorted(telling, key=lambda record: record["attempt"]):
-        for message in (told for told in record["messages"] if "place" in told):  # as since version 0.2
+        for message in (each for each in record["messages"] if "place" in each):  # since version 0.2
             last[tuple(message["place"])] = {"series": series, "attempt": record["attempt"], **message}
     ledger = store.ledger(url, series, dataset["status"].shape)
     inside = [place for place in last if len(place) == ledger.ndim and np.less(place, ledger.shape).all()]

@@ -1,4 +1,4 @@
-"""Parts of a study as a user types them: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
+"""Select parts of a study as a user types them: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``wear_rule=exact``."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from mdr_dask.errors import DataError, did_you_mean, distinguishable
 from mdr_dask.models.base import Status
 from mdr_dask.questions.columns import Columns, fixed_words
+from mdr_dask.questions.expression import SAME
 from mdr_dask.units import to_si
 
 if TYPE_CHECKING:
     import xarray as xr
 
 FORM = "NAME=VALUE, NAME=VALUE,VALUE or NAME=FROM..TO"
-#: Values that agree to this part are the same: six digits of a number on a screen choose it again.
-SAME = 1e-5
 
 Tell = Callable[[str], object]
 
@@ -30,23 +29,23 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
     Parameters
     ----------
     dataset : Dataset
-        A group of a study, or what was made of one.
+        A group of a study, or a Dataset derived from it.
     selections : sequence of str
         Each names an axis, a column of a sampled study, ``case`` or ``realisation``, and behind ``=`` values and
         ranges, separated by commas: ``velocity=1 mm/s..1 m/s``, ``hurst=0.3,0.7``, ``radius=..2``. Ends of a range
         belong to it; a bare number is SI. A number between two values of the axis takes the nearest.
     tell : callable, str -> object
-        Told when a value is taken that is not the one asked for.
+        Receives a message when the nearest value differs from the given one.
 
     Returns
     -------
     Dataset
-        With all its dimensions; a parameter that the study holds fixed changes nothing.
+        With all its dimensions; a fixed parameter selects everything.
 
     Raises
     ------
     DataError
-        If there is no such name, or nothing there.
+        If the name is unknown, or no value is selected.
     """
     for text in selections:
         name, wanted = _parsed(text)
@@ -60,7 +59,7 @@ def select(dataset: xr.Dataset, selections: Sequence[str], tell: Tell = warnings
 def select_all(
     datasets: Mapping[str, xr.Dataset], selections: Sequence[str], tell: Tell = warnings.warn
 ) -> dict[str, xr.Dataset]:
-    """Apply selections to every series that varies what is selected; a series that does not stays as it is."""
+    """Apply selections to every series that varies the selected parameter."""
     chosen = dict(datasets)
     for text in selections:
         name, _ = _parsed(text)
@@ -71,7 +70,7 @@ def select_all(
 
 
 def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
-    """Keep the cases for which a condition on means over realisations holds; the others become NaN, and not needed."""
+    """Keep the cases that meet a condition on means over realisations; the others become NaN and not needed."""
     truth = Columns(dataset).truth(condition)
     masked = {name: array.where(truth) for name, array in dataset.data_vars.items() if name != "status"}
     status = dataset["status"].where(truth, Status.NOT_NEEDED.value).astype(dataset["status"].dtype)
@@ -79,7 +78,7 @@ def where(dataset: xr.Dataset, condition: str) -> xr.Dataset:
 
 
 def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.Dataset]:
-    """Keep the cases of all groups for which a condition holds; refuse one that holds nowhere."""
+    """Keep the cases of all groups that meet a condition; DataError if there are none."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
         raise DataError(f"--where {condition}: no result fulfils it")
@@ -87,7 +86,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
 
 
 def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
-    """Return the group of a series; the only one if none is named."""
+    """Return the group of a series; the only one if no name is given."""
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
@@ -99,7 +98,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
 
 
 def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
-    """Keep the outputs named, with their errors; all that have no dimension of their own if none is."""
+    """Keep the named outputs with their errors; without names all outputs that have one number for each result."""
     known = [str(name) for name in dataset.data_vars if name != "status"]
     for name in names:
         if name not in known:
@@ -112,14 +111,14 @@ def outputs(dataset: xr.Dataset, names: Sequence[str]) -> xr.Dataset:
 
 
 def written(value: Any, unit: str | None, digits: int = 6) -> str:
-    """Return a value with its unit as a selection would take it."""
+    """Return a value with its unit as in a selection."""
     if not isinstance(value, int | float | np.number):
         return str(value)
     return f"{value:.{digits}g}" if unit in (None, "1", "") else f"{value:.{digits}g} {unit}"
 
 
 def written_apart(unit: str, value: float, *limits: float) -> tuple[str, ...]:
-    """Return a value and its limits with their unit and the digits that tell one from the other."""
+    """Return a value and its limits with their unit, with as many digits as distinguish them."""
     return distinguishable(value, *limits, digits=6, write=lambda number, digits: written(number, unit, digits))
 
 
@@ -132,7 +131,7 @@ def _parsed(text: str) -> tuple[str, str]:
 
 
 def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Return the values that a name stands for; that of a fixed parameter lies along no dimension of the data."""
+    """Return the values of a name; the value of a fixed parameter has a dimension of its own."""
     from xarray import DataArray
 
     if name in dataset.dims and name not in dataset.coords:
@@ -151,7 +150,7 @@ def _axis(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _chosen(axis: xr.DataArray, name: str, wanted: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return which values of an axis a selection asks for."""
+    """Return which values of an axis are selected."""
     values = axis.to_numpy()
     if values.dtype.kind not in "fiu":
         return _chosen_words([str(value) for value in values.tolist()], name, wanted)
@@ -181,7 +180,7 @@ def _chosen_words(labels: list[str], name: str, wanted: str) -> NDArray[np.bool_
 
 
 def _words(text: str) -> list[str]:
-    """Take words apart at commas; lists and structures keep their own."""
+    """Split words at commas, except inside lists and structures."""
     words, depth = [""], 0
     for mark in text:
         depth += (mark in "[{") - (mark in "]}")
@@ -193,7 +192,7 @@ def _words(text: str) -> list[str]:
 
 
 def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Tell) -> NDArray[np.bool_]:
-    """Return where the value nearest to a number is, nowhere for a number beyond the axis."""
+    """Return which value is nearest to a number; none for a number outside the axis."""
     distance = np.abs(values - wanted)
     slack = SAME * max(abs(wanted), np.abs(values).max())
     if not values.min() - slack <= wanted <= values.max() + slack:
@@ -205,7 +204,7 @@ def _nearest(values: NDArray[Any], wanted: float, name: str, unit: str, tell: Te
 
 
 def _intervals(wanted: str, name: str, unit: str) -> Iterator[tuple[float, float]]:
-    """Yield the ends of every range of a selection; those of a single value are the same."""
+    """Yield the ends of every range of a selection; both are equal for a single value."""
     pieces = [[end.strip() for end in piece.split("..")] for piece in wanted.split(",")]
     numbers = [end for piece in pieces for end in piece if end]
     bare = [_is_bare(end) for end in numbers]
@@ -235,7 +234,7 @@ def _number(text: str, name: str, unit: str) -> float:
 
 
 def _extent(values: NDArray[Any], unit: str) -> str:
-    """Say which values an axis has."""
+    """Return a text about the values of an axis."""
     if values.size == 1:
         return f"it is {written(values[0], unit)} everywhere"
     if values.size <= 6:

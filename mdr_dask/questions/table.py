@@ -1,4 +1,4 @@
-"""A study as a table: rows made a box at a time, so that forty of a million cost what forty cost."""
+"""Answer a question with rows, computed box by box, so that the first rows of a large study are cheap."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
     import xarray as xr
 
 MEANS = ("mean", "standard_error", "grid_error")
-#: Rows that are made at a time, and a study of how many bytes is read as a whole.
+#: Rows computed at a time, and the largest size in bytes of a study that is read at once.
 ROWS, WHOLE = 2**16, 2**26
 
 
 @dataclass(frozen=True)
 class Question:
-    """What a user wants to see of a group of a study.
+    """A question about a group of a study.
 
     Parameters
     ----------
     outputs : tuple of str
-        Outputs; all that have no dimension of their own if none is named.
+        Names of outputs; without names all outputs that have one number for each result.
     selections : tuple of str
         As `mdr_dask.questions.selection.select` takes them.
     where : str
@@ -45,7 +45,7 @@ class Question:
     group_by : tuple of str
         Axes: one row for each combination of their values, averaged over all other cases.
     sort : tuple of str
-        Columns or formulas, the first one first; a leading ``-`` is descending. What is not there comes last.
+        Columns or formulas; a leading ``-`` is descending. Missing values come last.
     columns : tuple of str
         Axes, parameters, outputs, dimensionless numbers, ``status``, ``realisations``; all axes and outputs if none.
     units : mapping of str to str
@@ -53,7 +53,7 @@ class Question:
     statistics : tuple of str, optional
         Over realisations; None for a row for each result.
     written : bool
-        Whether axes and parameters without one of `units` are in the unit that the campaign writes them in.
+        Whether axes and parameters that are not in `units` are in the unit of the campaign file.
     """
 
     outputs: tuple[str, ...] = ()
@@ -89,22 +89,21 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
     dataset : Dataset
         A group of a study, as :func:`mdr_dask.store.datasets` opens it.
     question : Question
-        What is wanted.
+        The question.
     limit : int
-        Most rows that will be looked at, 0 for all: no more work is done than they need.
+        Number of rows that are needed, 0 for all.
     tell : callable, str -> object
         As in `mdr_dask.questions.selection.select`.
 
     Returns
     -------
     Table
-        Rows are made while the frames are read. Without an order asked for, memory does not grow with them; with one,
-        it holds the numbers of the columns.
+        Rows are computed while the frames are read, in constant memory unless they are sorted.
 
     Raises
     ------
     DataError
-        If the question names what is not there, before any row is made.
+        If a name is unknown, before any row is computed.
     """
     maker = _Maker(dataset, question, tell)
     units = maker.units()
@@ -120,7 +119,7 @@ def table(dataset: xr.Dataset, question: Question, limit: int = 0, tell: Tell = 
 
 
 class _Maker:
-    """Makes frames of one question, box by box."""
+    """Computes the frames of one question box by box."""
 
     def __init__(self, dataset: xr.Dataset, question: Question, tell: Tell) -> None:
         raw = question.statistics is None
@@ -144,7 +143,7 @@ class _Maker:
         self.keys = 0
 
     def units(self) -> dict[str, str]:
-        """Return the units of the columns; whatever is wrong with the question is found here."""
+        """Return the units of the columns; errors of the question are found here."""
         rows = self._rows(self._data, dict.fromkeys(self._dims, slice(0, 1)))
         self._kept(rows)
         self._keys(rows)
@@ -152,13 +151,13 @@ class _Maker:
         return self._frame(rows)[1]
 
     def frames(self, most: int, whole: bool = True) -> Iterator[pd.DataFrame]:
-        """Yield the rows in the order of the axes, so many at a time or somewhat more."""
+        """Yield the rows in the order of the axes, about `most` at a time."""
         for _, rows in self._boxes(self._data, most, whole):
             if rows.sizes["row"]:
                 yield self._frame(rows)[0]
 
     def order(self) -> NDArray[np.intp]:
-        """Return the places of the rows among all rows, in the order asked for."""
+        """Return the positions of the rows in sorted order."""
         question = self._question
         named = {name for text in (question.where, *question.sort) if text for name in parse(text).names}
         needs = self._data[[*needed(self._data, named), *({STATUS, COUNTS, CASES} & self._data.data_vars.keys())]]
@@ -168,7 +167,7 @@ class _Maker:
         return ordered
 
     def picked(self, places: NDArray[np.intp]) -> Iterator[pd.DataFrame]:
-        """Yield the rows at these places, in their order."""
+        """Yield the rows at some positions, in their order."""
         data = self._data.load() if places.size > ROWS else self._data
         for start in range(0, places.size, ROWS):
             along = np.unravel_index(places[start : start + ROWS], tuple(self.sizes.values()))
@@ -176,7 +175,7 @@ class _Maker:
             yield self._frame(data.isel(at) if at else self._rows(data, {}))[0]
 
     def _boxes(self, data: xr.Dataset, most: int, whole: bool) -> Iterator[tuple[NDArray[np.intp], xr.Dataset]]:
-        """Yield the rows that the condition keeps, with their places among all rows."""
+        """Yield the rows that meet the condition, with their positions among all rows."""
         if whole and data.nbytes <= WHOLE:
             data = data.load()
         chunks = next((array.encoding.get("chunks") for array in data.data_vars.values()), None) or ()
@@ -243,20 +242,20 @@ class _Maker:
 
 
 def _ranks(key: NDArray[Any]) -> NDArray[Any]:
-    """Return numbers in the order of a key: of words, their places in the alphabet."""
+    """Return numbers with the order of a key; words are ordered alphabetically."""
     import pandas as pd
 
     return pd.factorize(key, sort=True)[0] if key.dtype.kind == "O" else key
 
 
 def _numbered(dataset: xr.Dataset) -> xr.Dataset:
-    """Give a dimension without values, such as the cases of a sampled study, numbers from 0."""
+    """Give a dimension without values, such as the cases of a sampled study, the numbers from 0."""
     bare = [dim for dim in dataset.dims if dim not in dataset.coords]
     return dataset.assign_coords({dim: np.arange(dataset.sizes[dim]) for dim in bare})
 
 
 def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
-    """Return the columns of a statistic that has several numbers."""
+    """Return the columns of a statistic with several numbers."""
     if "bound" in array.dims:
         return {f"{name.removesuffix('interval')}{end}": array.isel(bound=k) for k, end in enumerate(("low", "high"))}
     if "quantile" in array.dims:
@@ -265,16 +264,16 @@ def _flattened(array: xr.DataArray, name: str) -> dict[str, xr.DataArray]:
 
 
 def boxes(sizes: Mapping[str, int], most: int, chunks: Sequence[int] = ()) -> Iterator[dict[str, slice]]:
-    """Cut a grid into boxes that follow each other as its rows do.
+    """Cut a grid into boxes in the order of its rows.
 
     Parameters
     ----------
     sizes : mapping of str to int
         Lengths of the dimensions, the slowest first.
     most : int
-        Most points of a box.
+        Largest number of points of a box.
     chunks : sequence of int
-        Lengths of the chunks; boxes that are longer end with one.
+        Lengths of the chunks; longer boxes end at the end of a chunk.
     """
     dims, inner = list(sizes), 1
     cut = len(dims)

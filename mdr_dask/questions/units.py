@@ -1,4 +1,4 @@
-"""Columns in the units that a user asks for: ``velocity=km/h,wear_volume=um^3``."""
+"""Convert columns to other units: ``velocity=km/h,wear_volume=um^3``."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from mdr_dask.units import conversion
 if TYPE_CHECKING:
     import xarray as xr
 
-#: What stands behind the name of an output in the unit of the output.
+#: Suffixes of statistics in the unit of their output.
 _OF_OUTPUTS = ("mean", "interval", "quantile")
-#: The same for differences, for which the zero of a temperature scale does not count.
+#: The same for differences, which are converted without the zero of a temperature scale.
 _DIFFERENCES = ("error", "standard_deviation", "standard_error", "grid_error")
 
 
 def parse_units(texts: Sequence[str]) -> dict[str, str]:
-    """Return the units wanted by name, from texts such as ``velocity=km/h,temperature=degC``.
+    """Return units by name from texts such as ``velocity=km/h,temperature=degC``.
 
     Raises
     ------
     DataError
-        If a part is no ``NAME=UNIT``.
+        If a part is not ``NAME=UNIT``.
     """
     wanted = {}
     for part in (part for text in texts for part in text.split(",")):
@@ -36,13 +36,13 @@ def parse_units(texts: Sequence[str]) -> dict[str, str]:
 
 
 def as_written(study: xr.Dataset) -> dict[str, str]:
-    """Return the units in which the campaign of a study writes its axes and parameters, words and lists left out."""
+    """Return the units of numerical axes and parameters in the campaign file of a study."""
     written = written_units(str(study.attrs.get("campaign", "")))
     return {name: unit for name, unit in written.items() if name in study.coords and study[name].dtype.kind in "fiu"}
 
 
 def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
-    """Convert variables and coordinates; an output's statistics and errors go with it.
+    """Convert variables and coordinates, outputs together with their statistics and errors.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def in_units(dataset: xr.Dataset, wanted: Mapping[str, str]) -> xr.Dataset:
     Raises
     ------
     DataError
-        If nothing is called so, or the unit is unknown or of another dimension.
+        If a name or a unit is unknown, or the unit has another dimension.
     """
     for name, unit in wanted.items():
         own = {name, *(f"{name}_{ending}" for ending in (*_OF_OUTPUTS, *_DIFFERENCES))}
