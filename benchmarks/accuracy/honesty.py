@@ -105,7 +105,7 @@ def wear(cases: int, seed: int) -> Iterator[Honest]:
 def films(cases: int, seed: int) -> Iterator[Honest]:
     for box in ehl.BOXES:
         pairs = [
-            (ehl.films(solve_film(case, 1e-3)), ehl.films(solve_film(case, 0.0, ehl.FINEST)))
+            (ehl.films(solve_film(case, 1e-3)), ehl.films(solve_film(case, ehl.REFERENCE)))
             for case in ehl.cases(box, cases, seed)
         ]
         errors, stated = np.array(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.models.base import Block, Result, Status
@@ -20,14 +19,18 @@ from mdr_dask.physics.lubrication.film_formulas import (
     square_of_half_width,
     thick_film,
 )
-from mdr_dask.physics.lubrication.limits import Limit
-from mdr_dask.physics.lubrication.line_contact import LineContact, LineSolution, line_contact, solve_film
+from mdr_dask.physics.lubrication.line_contact import (
+    Estimate,
+    LineContact,
+    LineSolution,
+    Reading,
+    line_contact,
+    solve_film,
+)
 from mdr_dask.physics.outcome import Outcome
 
 #: Outputs whose errors count relative to the half width, in which they are given.
 _POSITIONS = {"minimum_position", "rupture_position", "spike_position"}
-#: Number of neighbouring positions of a profile that share their largest error.
-_AROUND = 5
 
 
 def _groups(block: Block[EhlLineParameters]) -> Groups:
@@ -53,50 +56,59 @@ def _line_contacts(block: Block[EhlLineParameters]) -> list[LineContact]:
     ]
 
 
-def _estimates(case: EhlLineParameters, W: float, solution: LineSolution, outputs: tuple[str, ...]) -> dict[str, Limit]:
-    """Return those outputs asked for that the solution decides, each with its error, in their units."""
-    film, p0 = square_of_half_width(W), 2 * case.contact_modulus * float(np.sqrt(W / (2 * np.pi)))
-    metres = film * (np.nan if case.radius is None else case.radius)
+def _readings(case: EhlLineParameters, W: float, contact: LineContact) -> dict[str, Reading]:
+    """Return how each output is read from a grid, in Hertz units."""
+    p0 = highest_pressure(case.contact_modulus, W)
     stress = case.eyring_stress / p0 if case.shear_law == "eyring" else None
     place = positions(case)
-    read = solution.estimate
-    ways: dict[str, Callable[[], Limit]] = {
+    return {
+        "film": lambda grid: grid.film_between(place),
+        "pressure": lambda grid: grid.pressure_between(place),
+        "minimum_position": lambda grid: grid.minimum[0],
+        "rupture_position": lambda grid: grid.rupture,
+        "spike_position": lambda grid: grid.spike[0],
+        "spike_pressure": lambda grid: grid.spike[1],
+        "traction_coefficient": lambda grid: traction.sliding_coefficient(
+            contact, grid, W, case.slide_roll_ratio, stress
+        ),
+        "rolling_coefficient": lambda grid: traction.rolling_coefficient(grid, W),
+    }
+
+
+def highest_pressure(contact_modulus: float, W: float) -> float:
+    """Return Hertz' highest pressure p0 in Pa."""
+    return 2 * contact_modulus * float(np.sqrt(W / (2 * np.pi)))
+
+
+def _estimates(
+    case: EhlLineParameters, W: float, solution: LineSolution, outputs: Collection[str]
+) -> dict[str, Estimate]:
+    """Return the requested outputs that the solution gives, each with its error, in their units."""
+    film, p0 = square_of_half_width(W), highest_pressure(case.contact_modulus, W)
+    metres = film * (np.nan if case.radius is None else case.radius)
+    place, readings = positions(case), _readings(case, W, solution.case)
+    found: dict[str, Callable[[], Estimate]] = {
         "central_film": lambda: solution.central_film.scaled(film),
         "minimum_film": lambda: solution.minimum_film.scaled(film),
         "central_film_thickness": lambda: solution.central_film.scaled(metres),
         "minimum_film_thickness": lambda: solution.minimum_film.scaled(metres),
-        "film": lambda: _profile(read(lambda grid: grid.film_between(place)).scaled(film)),
-        "pressure": lambda: _profile(read(lambda grid: grid.pressure_between(place)).scaled(p0)),
-        "minimum_position": lambda: solution.position(lambda grid: grid.minimum[0]),
-        "rupture_position": lambda: solution.position(lambda grid: grid.rupture),
-        "spike_position": lambda: solution.position(lambda grid: grid.spike[0]),
-        "spike_pressure": lambda: read(lambda grid: grid.spike[1]).scaled(p0),
-        "traction_coefficient": lambda: read(
-            lambda grid: traction.sliding_coefficient(solution.case, grid, W, case.slide_roll_ratio, stress)
-        ),
-        "rolling_coefficient": lambda: read(lambda grid: traction.rolling_coefficient(grid, W)),
+        "film": lambda: solution.profile(lambda grid, x: grid.film_between(x), place).scaled(film),
+        "pressure": lambda: solution.profile(lambda grid, x: grid.pressure_between(x), place).scaled(p0),
+        "minimum_position": lambda: solution.position(readings["minimum_position"]),
+        "rupture_position": lambda: solution.position(readings["rupture_position"]),
+        "spike_position": lambda: solution.spike()[0],
+        "spike_pressure": lambda: solution.spike()[1].scaled(p0),
+        "traction_coefficient": lambda: solution.estimate(readings["traction_coefficient"]),
+        "rolling_coefficient": lambda: solution.estimate(readings["rolling_coefficient"]),
     }
-    return {name: way() for name, way in ways.items() if name in outputs}
+    return {name: estimate() for name, estimate in found.items() if name in outputs}
 
 
-def _profile(found: Limit) -> Limit:
-    """Give each position the largest error around it: where grids cross each other, they agree by chance."""
-    return found._replace(error=maximum_filter1d(found.error, _AROUND))
-
-
-def _relative_error(name: str, found: Limit) -> float:
-    """Return the largest relative error of an output: of a position in half widths, of a pressure in its maximum."""
-    error = found.error[np.isfinite(found.value)]
-    scale = np.ones_like(found.value) if name in _POSITIONS else np.abs(found.value)
-    if name == "pressure":
-        scale = np.full_like(scale, np.max(scale))
-    return float(np.max(share(error, scale[np.isfinite(found.value)]), initial=0.0))
-
-
-def _missed(solution: LineSolution, estimates: dict[str, Limit], accuracy: float) -> str:
-    """Say which outputs miss the accuracy and by how much; an empty string if none does."""
-    errors = {name: _relative_error(name, found) for name, found in estimates.items()}
-    return missed(errors, accuracy, f" on {solution.finest.nodes.size} nodes")
+def _relative_error(name: str, found: Estimate) -> float:
+    """Return the largest error of an output over its largest value, or over the half width if it is a position."""
+    known = np.isfinite(found.value)
+    size = 1.0 if name in _POSITIONS else np.max(np.abs(found.value), initial=0.0, where=known)
+    return float(share(np.max(found.error, initial=0.0, where=known), size))
 
 
 def compute(block: Block[EhlLineParameters]) -> Result:
@@ -115,21 +127,29 @@ def compute(block: Block[EhlLineParameters]) -> Result:
         name: np.full(shape + tuple(lengths[dim] for dim in MODEL.output(name).dims), np.nan) for name in block.outputs
     }
     result = Result(values, np.full(shape, Status.DONE, dtype=np.int8))
-    solved: dict[LineContact, LineSolution] = {}
+    solved: dict[tuple[object, ...], LineSolution] = {}
     accuracy = block.accuracy or ACCURACY
-    for index, case in enumerate(_line_contacts(block)):
-        if case not in solved:
-            solved[case] = solve_film(case, accuracy)
-        solution = solved[case]
+    for index, contact in enumerate(_line_contacts(block)):
+        case, W = block.case(index), float(parameters.W[index])
+        readings = {} if block.accuracy is None else _readings(case, W, contact)
+        readings = {name: reading for name, reading in readings.items() if name in block.outputs}
+        sliding = (W, case.slide_roll_ratio, case.shear_law, case.eyring_stress)
+        key = (contact, *(sliding if "traction_coefficient" in readings else ()))
+        if key not in solved:
+            floors = [1.0 if name in _POSITIONS else 0.0 for name in readings]
+            solved[key] = solve_film(contact, accuracy, [*readings.values()], floors)
+        solution = solved[key]
         found: dict[str, FloatArray | float] = {name: float(column[index]) for name, column in given.items()}
         notes = [solution.reason]
         if solution.outcome == Outcome.CONVERGED:
-            estimates = _estimates(block.case(index), float(parameters.W[index]), solution, block.outputs)
+            estimates = _estimates(case, W, solution, block.outputs)
             for name, estimate in estimates.items():
                 found |= {name: estimate.value, f"{name}_error": estimate.error}
             found["load_error"] = solution.load_error
-            film = float(solution.central_film.value) * square_of_half_width(float(parameters.W[index]))
-            notes += [_missed(solution, estimates, accuracy), thick_film(film)]
+            film = float(solution.central_film.value) * square_of_half_width(W)
+            errors = {name: _relative_error(name, estimate) for name, estimate in estimates.items()}
+            nodes = f" on {solution.finest.nodes.size} nodes"
+            notes += [missed(errors, accuracy, nodes), thick_film(film)]
         else:
             result.status[index] = Status.NOT_CONVERGED
         notes += _warnings(block, index, [float(group[index]) for group in parameters])

@@ -96,6 +96,13 @@ class GridSolution:
         peak, _ = self._spike
         return (float(self.nodes[peak]), float(self.pressure[peak])) if peak else (float("nan"), float("nan"))
 
+    @property
+    def resolves_spike(self) -> bool:
+        """Whether the pressure behind the spike takes two cells at least to lose half of the spike's height."""
+        peak, lowest = self._spike
+        behind = self.pressure[peak:]
+        return peak > 0 and int(np.argmax(behind <= 0.5 * (lowest + behind[0]))) > 1
+
     @cached_property
     def front(self) -> float:
         """Where the pressure behind its spike is down to the lowest before it; NaN if there is no spike.
@@ -130,13 +137,6 @@ class GridSolution:
         end = _at_zero(root.tolist(), x.tolist()) + _TOO_EARLY * cell
         return float(np.clip(end, x[2], behind + cell))
 
-    @cached_property
-    def cut(self) -> float:
-        """Distance of the film's end from the nearest node, in cells: a half at most."""
-        before, behind = _cell_around(self.nodes, self.rupture)
-        share = (self.rupture - before) / (behind - before)
-        return float(min(abs(share), abs(1 - share)))
-
 
 def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
     """Return the two nodes on either side of a position."""
@@ -145,18 +145,14 @@ def _cell_around(nodes: FloatArray, position: float) -> FloatArray:
 
 
 def expected(
-    before: Sequence[GridSolution],
-    reading: Callable[[GridSolution], float | FloatArray],
-    spacing: float,
-    order: float,
+    before: Sequence[GridSolution], reading: Callable[[GridSolution], float | FloatArray], spacing: float
 ) -> FloatArray:
-    """Return what the last two grids let expect of a reading at another spacing, or what the only one has."""
+    """Return a reading on a grid of another spacing, extrapolated at second order from two grids, or that of one."""
     last = np.asarray(reading(before[-1]))
     if len(before) == 1:
         return last
-    coarse, fine = before[-2].spacing ** order, before[-1].spacing ** order
-    share = (fine - spacing**order) / (coarse - fine)
-    return np.asarray(last + share * (last - reading(before[-2])))
+    coarse, fine = before[-2].spacing ** 2, before[-1].spacing ** 2
+    return np.asarray(last + (fine - spacing**2) / (coarse - fine) * (last - reading(before[-2])))
 
 
 @jit

