@@ -12,7 +12,6 @@ from mdr_dask.fits.base import law_holds
 from mdr_dask.fits.sensitivity import NARROW, _advice
 from mdr_dask.models.parts.sliding_problem import refuse_immense
 from mdr_dask.models.parts.temperature import Wlf
-from mdr_dask.physics.lubrication.film_formulas import PAN_HAMROCK_CENTRAL, THICKEST_FILM, thick_film
 from mdr_dask.physics.solids import wlf_factor
 from mdr_dask.physics.surfaces.maps import MOST_MISSING, SurfaceMap, filled
 from mdr_dask.questions.selection import written_apart
@@ -61,8 +60,6 @@ ENDS = {"low": 0.0, "high": 2 * NARROW * JUST}
 SAID = {
     "bytes of a table": lambda: refused(lambda: require_readable("x" * (LARGEST + 1), "rig.csv", "toy", (), ())),
     "holes of a map": lambda: refused(lambda: filled(holes())),
-    "a thick film": lambda: thick_film(THICKEST_FILM * JUST),
-    "a film formula": lambda: PAN_HAMROCK_CENTRAL.outside(PAN_HAMROCK_CENTRAL.load_range[1] * JUST, 1e-11, 5e3),
     "an immense number": immense,
     "a law that holds": lambda: law_holds(np.array([0.03, np.sqrt(0.0041)]) / JUST, 1.0),
     "an interval": lambda: _advice(indices()),

@@ -13,7 +13,7 @@ import numpy as np
 from benchmarks.measures import alone, print_table
 from mdr_dask.models.mixed_lubrication import MODEL, declaration
 from mdr_dask.models.mixed_lubrication.operation import operation_of
-from mdr_dask.models.mixed_lubrication.points import first
+from mdr_dask.models.mixed_lubrication.revolution import with_first_points
 from mdr_dask.physics.lubrication.breakthrough import EDGE_RULES
 
 OUTPUTS = "breakthrough_probability", "contact_length"
@@ -49,7 +49,7 @@ def judged(number, seed, points, accuracy=None):
         case = rollers(points, random)
         if accuracy:
             case = case.model_copy(update={"points": "auto", "shortest_wavelength": 20 * PERIMETER / points})
-            finest = 2 * FINER * first(operation_of(case, accuracy), accuracy).source.points
+            finest = 2 * FINER * with_first_points(operation_of(case, accuracy), accuracy).source.points
         else:
             finest = FINER * points
         realisation = len(rows)

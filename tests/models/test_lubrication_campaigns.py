@@ -221,5 +221,5 @@ def test_turns_that_know_their_own_scatter_end_a_campaign_early(errors, turns):
     probability = dataset.breakthrough_probability
     assert probability.sizes["realisation"] == turns
     assert 0 < float(probability.mean()) < 1
-    assert ("turn_error" in dataset) == (errors == "true")
+    assert ("revolution_error" in dataset) == (errors == "true")
     assert float(probability.std(ddof=1)) / np.sqrt(turns) < 0.1

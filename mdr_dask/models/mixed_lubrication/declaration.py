@@ -46,6 +46,7 @@ class MixedLubrication(Parameters):
         "poisson_ratio": "write contact_modulus, E* = E/(2 (1 - nu^2)) of two rollers of one material",
         "measured": "write measured: {table: ...} beside parameters, and fit calibration",
         "load_share": "write asperity_load_share",
+        "turn_error": "write revolution_error",
         "profile_1": "write surface_1: {profile: ...}",
         "profile_2": "write surface_2: {profile: ...}",
         "discretisation_error": "breakthrough_probability comes with breakthrough_probability_error",
@@ -121,7 +122,7 @@ class MixedLubrication(Parameters):
     viscosity_law: Literal["barus", "roelands"] = Field(
         default="barus", description="viscosity under pressure, for the friction of the film and the EHL solution"
     )
-    trace_points: int = quantity("1", "angles of contact_length_trace in a turn", default=3600, ge=2, le=10**6)
+    trace_points: int = quantity("1", "angles of contact_length_trace in one revolution", default=3600, ge=2, le=10**6)
 
     @model_validator(mode="before")
     @classmethod
@@ -228,7 +229,7 @@ OUTPUTS = (
         "1",
         "share of time with the boundary layer broken anywhere on one line (P of the thesis)",
         has_error=True,
-        scatter="turn_error",
+        scatter="revolution_error",
     ),
     Output("contact_length", "m", "mean length in intimate contact on one line", has_error=True, comment=NO_AREA),
     Output("film", "m", "film thickness h0", has_error=True),
@@ -239,7 +240,12 @@ OUTPUTS = (
         "1",
         "squares with the longest wavelength as edge, side by side in the width of the rollers; one line is one square",
     ),
-    Output("turn_error", "1", "standard error of the probability of one turn, from parts of it", default=False),
+    Output(
+        "revolution_error",
+        "1",
+        "standard error of the probability of one revolution, from its parts",
+        default=False,
+    ),
     Output(
         "contact_conductance",
         "S",
@@ -262,7 +268,7 @@ OUTPUTS = (
         has_error=True,
     ),
     Output("contact_half_width", "m", "half width a of the Hertzian contact", default=False),
-    Output("contact_length_trace", "m", "length in intimate contact over the turn", ("angle",), default=False),
+    Output("contact_length_trace", "m", "length in intimate contact during one revolution", ("angle",), default=False),
     Output("upper_profile", "m", "surface of roller 1 where contact is greatest", ("position",), default=False),
     Output("lower_profile", "m", "surface of roller 2 where contact is greatest", ("position",), default=False),
 )

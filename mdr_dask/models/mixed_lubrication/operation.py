@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.models.mixed_lubrication.declaration import MixedLubrication
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.physics.lubrication import breakthrough, film_formulas, line_contact, oil
@@ -157,8 +156,7 @@ def _shared_load(
 
     if case.film_thickness is not None:
         share = asperity_share(case.film_thickness)
-        times = distinguishable(share, 1.0, digits=2)[0]
-        warning = "" if share <= 1 else f"asperities apart by the given film would carry {times} times the load"
+        warning = "" if share <= 1 else "at the given film the asperities would carry more than the load"
         return SharedLoad(case.film_thickness, max(0.0, 1 - share), min(share, 1.0)), 0.0, warning
     film_at, warning = film_of
     tolerance = accuracy / 10 if case.film_formula == "ehl" else accuracy / 1e6

@@ -1,8 +1,8 @@
-"""From a block of rough rollers on a film of oil to arrays."""
+"""Compute the outputs of a block of rough rollers on an oil film."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -10,34 +10,25 @@ from typing import Any
 import numpy as np
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.mixed_lubrication import points
+from mdr_dask.models.mixed_lubrication import revolution
 from mdr_dask.models.mixed_lubrication.declaration import MODEL, MixedLubrication, coordinates
 from mdr_dask.models.mixed_lubrication.lines import Source
 from mdr_dask.models.mixed_lubrication.operation import NoFilmError, Operation, fixed_values, operation_of
-from mdr_dask.models.mixed_lubrication.turn import (
-    SETTINGS,
-    Turn,
-    creeping,
-    profiles,
-    rolling,
-    trace,
-    turn_values,
-)
+from mdr_dask.models.mixed_lubrication.revolution import Revolution
 from mdr_dask.models.parts.accuracy import missed, share
 
 #: Film ratio below which overlapping asperities merge into clusters that no longer break.
-FILM_RATIO_WARNING = 0.5
-#: Outputs of the turn of two lines, beside traces and profiles.
-_OF_TURN = {"breakthrough_probability", "turn_error"} | points.OF_LENGTH
-#: What a value that is zero within its error is a part of.
-_WHOLE = {"asperity_load_share": 1.0}
+LEAST_FILM_RATIO = 0.5
+#: Outputs that need the rough lines.
+_OF_LINES = {"breakthrough_probability", "revolution_error"} | revolution.OF_LENGTH
+#: Absolute size below which an error is not relative to its output.
+_FLOORS = {"asperity_load_share": 1.0}
 _PROFILES = {"upper_profile", "lower_profile"}
 
 
 def compute(block: Block[MixedLubrication]) -> Result:
-    """Return the values of a block; one realisation is one turn of the rollers with lines of its own.
+    """Return the values of a block; one realisation is one revolution of the rollers with its own lines.
 
     Cases that differ in load, speed, temperature, rms height or layer share the lines of a realisation.
     """
@@ -50,7 +41,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
             _refuse(result, index, Status.FAILED, problem)
             continue
         try:
-            operation = points.first(operation_of(case, block.accuracy), block.accuracy)
+            operation = revolution.with_first_points(operation_of(case, block.accuracy), block.accuracy)
         except NoFilmError as error:
             _refuse(result, index, Status.NOT_CONVERGED, str(error))
             continue
@@ -61,7 +52,7 @@ def compute(block: Block[MixedLubrication]) -> Result:
         for position in range(len(block.realisations)):
             _note(result, index, position, _missed(block, fixed))
         result.status[index] = Status.DONE
-    if _OF_TURN & set(block.outputs):
+    if _OF_LINES & set(block.outputs):
         for source, members in groups.items():
             for position in range(len(block.realisations)):
                 _realise(result, block, source, members, position)
@@ -78,7 +69,7 @@ def _empty(block: Block[MixedLubrication]) -> Result:
 
 
 def _refuse(result: Result, index: int, status: Status, why: str) -> None:
-    """Give up a case in all its realisations."""
+    """Set the status of a case in all its realisations, with the reason."""
     result.status[index] = status
     result.messages.update({(index, position): why for position in range(result.status.shape[1])})
 
@@ -91,7 +82,7 @@ def _store(
 
 
 def _note(result: Result, index: int, position: int, note: str) -> None:
-    """Add a sentence to the message of one case in one realisation."""
+    """Add to the message of one case in one realisation."""
     if note:
         before = result.messages.get((index, position))
         result.messages[index, position] = f"{before}; {note}" if before else note
@@ -101,22 +92,22 @@ def _missed(
     block: Block[MixedLubrication],
     found: Mapping[str, float],
     advice: str = "",
-    judged_by: Mapping[str, float] | None = None,
+    sizes: Mapping[str, float] | None = None,
 ) -> str:
-    """Say which outputs asked for miss the accuracy of the campaign and by how much; an empty string if none does.
+    """Return which requested outputs miss the accuracy of the campaign, empty if none does.
 
-    Some are judged by another value than their own.
+    `sizes` has the values relative to which errors count, where it is not the output itself.
     """
     if block.accuracy is None:
         return ""
-    values = {**found, **(judged_by or {})}
+    values = {**found, **(sizes or {})}
     known = {name: values[name] for name in block.outputs if np.isfinite(values.get(name, np.nan))}
     shares = {
-        name: float(share(found.get(f"{name}_error", 0.0), value, _WHOLE.get(name, 0.0)))
+        name: float(share(found.get(f"{name}_error", 0.0), value, _FLOORS.get(name, 0.0)))
         for name, value in known.items()
     }
-    told = missed(shares, block.accuracy)
-    return f"{told}{advice}" if told else ""
+    text = missed(shares, block.accuracy)
+    return f"{text}{advice}" if text else ""
 
 
 def _realise(
@@ -126,62 +117,44 @@ def _realise(
     members: list[tuple[int, Operation]],
     position: int,
 ) -> None:
-    """Compute the cases of one pair of lines in one realisation.
-
-    Those that miss the accuracy, where it chooses the points, follow on finer lines.
-    """
+    """Compute the cases of one pair of lines in one realisation; those that miss the accuracy again on more points."""
     drawn = block.seed, block.realisations[position]
     lines, together = cache(partial(source.lines, *drawn)), cache(partial(source.together, *drawn))
 
-    def solve(operation: Operation, compared: int = 0) -> Turn:
+    def solve(operation: Operation, sample: bool = False) -> Revolution:
         if operation.case.slide_roll_ratio == 0:
-            return rolling(operation, together(compared > 0), compared)
-        return creeping(operation, lines(compared > 0), compared)
+            return revolution.rolling(operation, together(sample), sample)
+        return revolution.creeping(operation, lines(sample), sample)
+
+    def errors_of(operation: Operation, found: Revolution) -> FloatArray:
+        return found.errors(solve(operation, sample=True))
 
     again: dict[Source, list[tuple[int, Operation]]] = {}
     for index, operation in members:
-        turn = solve(operation)
-        errors = cache(partial(_errors, turn, partial(solve, operation), block))
-        finer = points.finer(operation, turn, errors, block.accuracy, block.outputs)
+        window = solve(operation)
+        errors = cache(partial(errors_of, operation, window))
+        finer = revolution.with_more_points(operation, window, errors, block.accuracy, block.outputs)
         if finer is not None:
             again.setdefault(finer.source, []).append((index, finer))
             continue
-        found = turn_values(operation, turn, errors, block.outputs)
-        _store(result, block, index, position, found)
+        found: dict[str, Any] = revolution.values(operation, window, errors, block.outputs)
         advice = "" if operation.case.points == "auto" else "; raise points"
-        _note(result, index, position, _missed(block, found, advice, points.judged_by(turn)))
+        _note(result, index, position, _missed(block, found, advice, window.sizes()))
         if "contact_length_trace" in block.outputs:
-            _store(
-                result, block, index, position, {"contact_length_trace": trace(operation, turn, partial(lines, False))}
-            )
+            found["contact_length_trace"] = revolution.trace(operation, window, partial(lines, False))
         if _PROFILES & set(block.outputs):
-            _store(result, block, index, position, profiles(operation, turn, lines(False)))
+            found |= revolution.profiles(operation, window, lines(False))
+        _store(result, block, index, position, found)
     for finer_source, members_again in again.items():
         _realise(result, block, finer_source, members_again, position)
 
 
-def _errors(turn: Turn, solve: Callable[[int], Turn], block: Block[MixedLubrication]) -> FloatArray:
-    """Return the errors of a turn from its first parts on other lines, or from all parts where those miss the accuracy.
-
-    All parts know change and scatter better, and cost less than a turn on more points.
-    """
-    other = solve(SETTINGS.sample)
-    errors = turn.errors(other)
-    if block.accuracy is None or other.parts == turn.parts:
-        return errors
-    if points.miss(turn, errors, block.accuracy, block.outputs) <= 1:
-        return errors
-    return turn.errors(solve(1))
-
-
 def _warn(result: Result, block: Block[MixedLubrication], index: int, operation: Operation) -> None:
-    """Say once a case, at realisation 0, where an assumption behind it fails, whatever outputs are asked for."""
+    """Add a message, at realisation 0, where an assumption of the model fails."""
     if 0 not in block.realisations:
         return
     position = block.realisations.index(0)
-    ratio = operation.film / operation.rms
     _note(result, index, position, operation.warning)
-    if ratio < FILM_RATIO_WARNING:
-        told, least = distinguishable(ratio, FILM_RATIO_WARNING, digits=2)
-        what = f"film ratio {told} is below {least}: overlaps merge into clusters that do not break"
-        _note(result, index, position, f"{what}, the probability is too low")
+    if operation.film / operation.rms < LEAST_FILM_RATIO:
+        text = f"the film ratio is below {LEAST_FILM_RATIO}: overlaps merge into clusters that do not break, and the "
+        _note(result, index, position, f"{text}probability is too low")

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray
-from mdr_dask.errors import distinguishable
 
 
 class HertzLine(NamedTuple):
@@ -105,9 +104,8 @@ def thick_film(film: float) -> str:
     """Say that a film h/R is too thick for lubrication theory; an empty string if it is not."""
     if not film > THICKEST_FILM:
         return ""
-    told, most = distinguishable(film, THICKEST_FILM, digits=2)
     return (
-        f"the film is {told} of the radius, more than {most}: rollers are no parabolas there, and "
+        f"the film is thicker than {THICKEST_FILM} of the radius: rollers are no parabolas there, and "
         "Reynolds' equation does not hold"
     )
 
@@ -185,12 +183,12 @@ class FilmFormula:
     def outside(self, W: float, U: float, G: float) -> str:
         """Say which of W, U, G lie outside the range of the formula; an empty string if none does."""
         ranges = (("W", W, self.load_range), ("U", U, self.speed_range), ("G", G, self.material_range))
-        parts = [
-            f"{symbol} = {distinguishable(value, low, high)[0]} is outside {low:g} to {high:g}"
+        outside = [
+            f"{symbol} lies outside {low:g} to {high:g}"
             for symbol, value, (low, high) in ranges
             if not low <= value <= high
         ]
-        return f"film formula {self.name}: {', '.join(parts)}" if parts else ""
+        return f"film formula {self.name} is extrapolated: {', '.join(outside)}" if outside else ""
 
 
 # Ranges as remembered from the papers; no open copy was at hand (docs/evidence/mixed-lubrication.md).

@@ -44,9 +44,9 @@ def test_formula_is_a_power_law_and_says_where_it_is_extrapolated(formula):
         moved[i] *= 2
         assert formula(*moved) / formula(*point) == pytest.approx(2**exponent, rel=1e-12)
     assert formula.outside(*point) == ""
-    assert "W = 1e-06 is outside" in formula.outside(1e-6, 5e-12, 4000.0)
-    assert "U = 1e-08 is outside" in formula.outside(5e-5, 1e-8, 4000.0)
-    assert "G = 300 is outside" in formula.outside(5e-5, 5e-12, 300.0)
+    assert "extrapolated: W lies outside" in formula.outside(1e-6, 5e-12, 4000.0)
+    assert "extrapolated: U lies outside" in formula.outside(5e-5, 1e-8, 4000.0)
+    assert "extrapolated: G lies outside" in formula.outside(5e-5, 5e-12, 300.0)
 
 
 def test_formulas_lie_near_the_full_solution():
