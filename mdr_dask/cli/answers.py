@@ -121,7 +121,9 @@ def _joined(columns: dict[str, list[Any]]) -> tuple[dict[str, list[Any]], str]:
             join = with_error if errors else with_interval
             joined[output] = [join(*each) for each in zip(values, *(columns[part] for part in parts), strict=True)]
             if errors and parts:
-                kinds[output] = tuple(part.removeprefix(f"{output}_").replace("_", " ") for part in parts)
+                kinds[output] = tuple(f" +- {part.removeprefix(f'{output}_').replace('_', ' ')}" for part in parts)
+            elif parts:
+                kinds[output] = (" (95 % interval)",)
         elif name not in left_out:
             joined[name] = values
     return joined, _meaning(kinds)
@@ -131,8 +133,8 @@ def _meaning(kinds: dict[str, tuple[str, ...]]) -> str:
     """Return what the errors of means are, once if it is the same for all outputs that have both."""
     longest = max(kinds.values(), key=len, default=())
     if all(longest[: len(kind)] == kind for kind in kinds.values()):
-        return "".join(["mean", *(f" +- {kind}" for kind in longest)]) if longest else ""
-    return "; ".join(f"{output} +- {' +- '.join(kind)}" for output, kind in kinds.items())
+        return f"mean{''.join(longest)}" if longest else ""
+    return "; ".join(f"{output}{''.join(kind)}" for output, kind in kinds.items())
 
 
 def _is_known(value: Any) -> bool:

@@ -41,7 +41,7 @@ def models(name: str | None, form: str | None) -> None:
         parts = {"parameters": parameter_rows(model), "together": alternatives_of(model), "outputs": output_rows(model)}
         print_json({"model": name, **parts, "numbers": number_rows(model)})
         return
-    click.echo(f"{name}: {model.summary}\n\nparameters")
+    say(f"{name}: {model.summary}\n\nparameters")
     _print_left([row | {"parameter": _indented(row["parameter"])} for row in parameter_rows(model)], None)
     if alternatives_of(model):
         lines = (click.wrap_text(line, terminal_width(), subsequent_indent="    ") for line in alternatives_of(model))

@@ -134,7 +134,7 @@ def _print_table(titles: Sequence[str], cells: Sequence[Sequence[str]], keys: in
     if len(cells[0]) == 1:
         size = max(map(len, titles))
         for title, column in zip(titles, cells, strict=True):
-            click.echo(_hanging(f"{title.ljust(size)}  ", column[0]))
+            click.echo(hanging(f"{title.ljust(size)}  ", column[0]))
         return
     for part in _parts(widths, keys):
         _print_block([heads[k] for k in part], [cells[k] for k in part], [widths[k] for k in part])
@@ -164,10 +164,10 @@ def _print_block(heads: Sequence[Sequence[str]], cells: Sequence[Sequence[str]],
             for cell, width, is_left in zip(line, widths, left, strict=True)
         ]
         before = "".join(cell + " " * GAP for cell in aligned[:-1])
-        click.echo(_hanging(before, aligned[-1].rstrip()) if left[-1] else (before + aligned[-1]).rstrip())
+        click.echo(hanging(before, aligned[-1].rstrip()) if left[-1] else (before + aligned[-1]).rstrip())
 
 
-def _hanging(before: str, text: str) -> str:
+def hanging(before: str, text: str) -> str:
     """Return a text behind something, wrapped below its own beginning if it is too long."""
     room = max(terminal_width() - len(before), NARROWEST // 2)
     if len(before) + len(text) <= terminal_width() or room <= NARROWEST // 2:

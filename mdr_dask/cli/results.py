@@ -15,7 +15,7 @@ from mdr_dask.cli.options import (
     question_options,
     tell,
 )
-from mdr_dask.cli.printing import print_json, print_rows, say
+from mdr_dask.cli.printing import hanging, print_json, print_rows, say
 from mdr_dask.cli.writing import writing
 
 
@@ -176,7 +176,7 @@ def list_names(model: str, summaries: dict[str, str]) -> None:
         click.echo(f"none for {model}")
     width = max(map(len, summaries), default=0)
     for name, summary in summaries.items():
-        click.echo(f"{name.ljust(width)}  {summary}")
+        click.echo(hanging(f"{name.ljust(width)}  ", summary))
 
 
 def require_known(names: Sequence[str], known: Sequence[str], what: str) -> None:
