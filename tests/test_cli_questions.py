@@ -157,7 +157,7 @@ def test_a_study_with_series_says_which_there_are(tmp_path, capsys):
     store = str(tmp_path / "study.zarr")
     for command in ("show", "aggregate"):
         assert main([command, store]) == 2
-        assert capsys.readouterr().err == "this study has series, choose one: --series with one of a, b\n"
+        assert capsys.readouterr().err == "expected --series with one of a, b, because this study has series\n"
     assert len(rows(told(capsys, "show", store, "rms_slope", "--series", "a").out)) == 2
 
 

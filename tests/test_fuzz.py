@@ -20,6 +20,7 @@ def whole(tmp_path_factory):
         yield fuzzing.sound_store(tmp_path_factory.mktemp("whole"))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of libraries that read tables
 @pytest.mark.parametrize("kind", fuzzing.CASES)
 def test_what_strangers_send_is_run_or_refused_in_a_sentence(kind, whole):

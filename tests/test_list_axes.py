@@ -104,7 +104,7 @@ def test_what_sets_the_places_of_an_output_is_no_axis_of_it():
     text = WEAR.replace("history: LISTS", "extent: [1.2, 1.6]")
     assert len(loads(text, "", ".").series[0].axes) == 1
     message = (
-        "parameters.extent: expected one value, for it sets at which radius worn_profile is stored "
+        "parameters.extent: expected one value, because it sets the values of radius for worn_profile "
         r"\(give each value a series of its own\)"
     )
     with pytest.raises(CampaignError, match=message):

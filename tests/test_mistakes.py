@@ -95,7 +95,7 @@ MISTAKES = [
     (VELOCITY, "1 mm/s - 1 m/s", f"{VELOCITIES} '1 mm/s - 1 m/s' {SEVERAL}"),
     (VELOCITY, "{logspace: [1 mm/s, 1 m/s, 4]}", f"{VELOCITIES} a mapping (a range is {{linear: [a, b, n]}} or"),
     (VELOCITY, "{linear: [1 mm/s, 1 m/s]}", "expected [first, last, count], got ['1 mm/s', '1 m/s']"),
-    (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "expected an end above 0 of a geometric range, got 0"),
+    (VELOCITY, "{geometric: [0, 1 m/s, 4]}", "expected an end above 0 for a geometric range, got 0"),
     # YAML
     ("hurst: 0.7", "hurst:0.7", "could not find expected ':' (a blank is missing after 'hurst:' in line 8)"),
     (

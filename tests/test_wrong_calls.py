@@ -60,9 +60,9 @@ WRONG = [
     ("show STORE --units velocity=N", "velocity: expected a velocity (such as '1 mm/s'), got 'N'"),
     ("show STORE --limit -1", "-1 is not in the range x>=0"),
     ("aggregate STORE -o means.xls", "expected a file that ends in .csv, .json, .jsonl, .parquet, .nc or .zarr, got"),
-    ("aggregate STORE -o STORE", "expected a place for the answer, got the store of a study: 'STORE'"),
+    ("aggregate STORE -o STORE", "expected a new file, got the store of a study: 'STORE'"),
     ("show STORE -o x.csv --json", "expected one of --json and --output, got both"),
-    ("show STORE -o x.nc --sort velocity", "expected a table for rows in an order: .csv, .jsonl or .parquet"),
+    ("show STORE -o x.nc --sort velocity", "expected a table (.csv, .jsonl or .parquet) with --sort"),
     ("show STORE --where velocity>1kg", "'velocity>1kg': expected quantities of one dimension"),
     (
         "show STORE --where velocity=1",

@@ -175,7 +175,7 @@ class _Reader:
             key = key_node.value if isinstance(key_node, ScalarNode) else "?"
             place = self.document._at(key_node)
             if key_node.tag not in (_TAG + "str", _TAG + "merge") or _NO_TEXT.search(key):
-                self.problems.add(place, dotted((*path, key)), "expected a name as key (quote it)")
+                self.problems.add(place, dotted((*path, key)), "expected a text as key (put it in quotation marks)")
             elif key in data:
                 first = self.document.key_place((*path, key)).line
                 self.problems.add(place, dotted((*path, key)), f"this key was already given in line {first}")
@@ -196,7 +196,7 @@ class _Reader:
             self.problems.add(self.document._at(node), dotted(path), what)
             return None
         if _NO_TEXT.search(text):
-            what = "expected text without null characters and halves of characters"
+            what = "expected text without null or incomplete characters"
             self.problems.add(self.document._at(node), dotted(path), what)
             return None
         if kind == "int":

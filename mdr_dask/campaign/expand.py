@@ -111,7 +111,7 @@ class _Expansion:
         for output in wanted:
             for dim in first.keys() & set(output.dims):
                 if any(not np.array_equal(first[dim].values, other[dim].values) for other in others):
-                    what = f"expected one value, for it sets at which {dim} {output.name} is stored"
+                    what = f"expected one value, because it sets the values of {dim} for {output.name}"
                     self._complain(origin, f"{what} (give each value a series of its own)")
                     return
 
@@ -122,7 +122,7 @@ class _Expansion:
         origin = Origin("sampling", self.document.place(("sampling",)))
         if isinstance(design, TableSpec):
             for one in found:
-                self._complain(one.origin, f"expected one value, for {design.table} says what varies")
+                self._complain(one.origin, f"expected one value, because {design.table} has the parameters that vary")
             return found or sampling.tabled(
                 design.table, self.directory, origin, self.parameters, self.data, self.problems
             )

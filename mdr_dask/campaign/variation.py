@@ -194,7 +194,9 @@ class _Search:
             count = int(count)  # in quotes, as any number may be
         if isinstance(count, bool) or not isinstance(count, int) or not 2 <= count <= MOST_VALUES:
             self._complain(
-                (*at, 2), f"expected a whole number from 2 to {MOST_VALUES} of values, got {shown(count)}", name
+                (*at, 2),
+                f"expected a whole number from 2 to {MOST_VALUES} as the number of values, got {shown(count)}",
+                name,
             )
         numbers = spaced(spread, count)
         if len(numbers) < (2 if spread.whole else count):
@@ -222,7 +224,7 @@ class _Search:
         if not np.isfinite(number):
             self._complain(at, f"expected a finite number, got {shown(value)}", name)
         if kind == "geometric" and number <= 0:
-            self._complain(at, f"expected an end above 0 of a geometric range, got {shown(value)}", name)
+            self._complain(at, f"expected an end above 0 for a geometric range, got {shown(value)}", name)
         return number
 
     def _field(self, path: tuple[str, ...]) -> FieldInfo | None:

@@ -65,7 +65,7 @@ def check_target(path: Path) -> None:
 
     require_suffix(path, FILES)
     if path.suffix == ".zarr" and is_study(str(path)):
-        raise click.UsageError(f"expected a place for the answer, got the store of a study: {str(path)!r}")
+        raise click.UsageError(f"expected a new file, got the store of a study: {str(path)!r}")
     if path.suffix == ".parquet":
         _pyarrow()
 

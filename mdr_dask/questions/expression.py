@@ -246,7 +246,7 @@ class _Evaluation:
             names = (_name(left), _name(right))
             first, second = (side or Value(name) for side, name in zip(sides, names, strict=True))
             if not (first.kind in "OUT" and second.kind in "OUT"):
-                raise DataError(f"{self.text!r}: expected words beside words, and numbers beside numbers")
+                raise DataError(f"{self.text!r}: expected words compared with words, or numbers with numbers")
             return first.array == second.array
         first, second = self._number(left), self._number(right)
         self._require_alike(first, second)

@@ -42,9 +42,9 @@ def labelled(dataset: xr.Dataset, question: Question, tell: Tell = warnings.warn
         If a name is unknown, or the question asks for sorted rows.
     """
     if question.sort:
-        raise DataError("expected a table for rows in an order: .csv, .jsonl or .parquet, got labelled arrays")
+        raise DataError("expected a table (.csv, .jsonl or .parquet) with --sort, got labelled arrays")
     if question.group_by and question.statistics is None:
-        raise DataError("expected statistics of groups, got single realisations; leave out one of the two")
+        raise DataError("expected statistics with --group-by, got single realisations (leave out one of the two)")
     columns = [name for name in question.columns if name not in dataset.coords]
     shown = outputs(dataset, [*question.outputs, *(name for name in columns if name in dataset.data_vars)])
     used = needed(dataset, [*columns, *(parse(question.where).names if question.where else ())])

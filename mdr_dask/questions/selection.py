@@ -81,7 +81,7 @@ def where_all(groups: Mapping[str, xr.Dataset], condition: str) -> dict[str, xr.
     """Keep the cases of all groups that meet a condition; DataError if there are none."""
     kept = {name: where(dataset, condition) for name, dataset in groups.items()}
     if all((dataset["status"] == Status.NOT_NEEDED.value).all() for dataset in kept.values()):
-        raise DataError(f"--where {condition}: no result fulfils it")
+        raise DataError(f"--where {condition}: no result meets the condition")
     return kept
 
 
@@ -90,7 +90,7 @@ def group(datasets: Mapping[str, xr.Dataset], series: str | None) -> xr.Dataset:
     names = ", ".join(datasets)
     if series is None:
         if len(datasets) > 1:
-            raise DataError(f"this study has series, choose one: --series with one of {names}")
+            raise DataError(f"expected --series with one of {names}, because this study has series")
         return next(iter(datasets.values()))
     if series not in datasets:
         raise DataError(f"no series {series!r}; known: {names or 'none, leave --series out'}")

@@ -78,7 +78,7 @@ REFUSED = [
     ("velocity and hurst", "expected a comparison such as 'hurst < 0.7'"),
     ("not hurst", "expected a comparison such as 'hurst < 0.7'"),
     ("wear_rule > 3", "expected numbers, got 'wear_rule'"),
-    ("wear_rule == 3", "expected words beside words"),
+    ("wear_rule == 3", "expected words compared with words"),
     ("velocity ** velocity > 1", "expected + - * / **"),
     ("", "expected a condition such as"),
     ("(" * 300, "expected a condition such as"),

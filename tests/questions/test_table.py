@@ -248,7 +248,7 @@ REFUSED = [
     ({"where": "velocity"}, "expected a comparison"),
     ({"sort": ("velocty",)}, "no column 'velocty' (did you mean 'velocity'?)"),
     ({"group_by": ("velocty",)}, "expected axes to group by, got 'velocty' (did you mean 'velocity'?)"),
-    ({"group_by": ("velocity",), "statistics": None}, "expected statistics of groups"),
+    ({"group_by": ("velocity",), "statistics": None}, "expected statistics with --group-by"),
     ({"units": {"velocity": "N"}}, "velocity: expected a velocity"),
     ({"selections": ("velocity=9",)}, "no velocity 9 m/s"),
 ]
@@ -268,5 +268,5 @@ def test_a_number_without_its_ingredients_names_them(study):
 
 
 def test_an_order_of_arrays_is_refused(study):
-    with pytest.raises(DataError, match="expected a table for rows in an order"):
+    with pytest.raises(DataError, match="with --sort"):
         labelled(study, Question(sort=("velocity",)), silent)
