@@ -94,14 +94,11 @@ def owner(parameters: type[BaseModel], path: Path, data: Any) -> tuple[type[Base
 
 def is_independent(parameters: type[BaseModel], path: Path, data: Any) -> bool:
     """Return whether the field at a path is checked by its own bounds alone, not together with other parameters."""
-    found = [
-        parameters,
-        *(pair[0] for depth in range(1, len(path) + 1) if (pair := owner(parameters, path[:depth], data))),
-    ]
-    return all(
-        validator.info.mode == "before"
-        for kind in found
-        for validator in kind.__pydantic_decorators__.model_validators.values()
+    pairs = (owner(parameters, path[:depth], data) for depth in range(1, len(path) + 1))
+    decorators = [kind.__pydantic_decorators__ for kind in (parameters, *(pair[0] for pair in pairs if pair))]
+    return not any(
+        each.field_validators or any(check.info.mode != "before" for check in each.model_validators.values())
+        for each in decorators
     )
 
 
