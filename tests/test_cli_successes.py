@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import sys
 import threading
 import urllib.request
@@ -56,11 +57,10 @@ def test_what_is_printed_is_what_a_file_would_hold(command, tmp_path, monkeypatc
 
 def test_laws_of_a_store_are_listed_each_with_its_sentence(store, capsys):
     assert main(["fit", store]) == 0
-    printed = capsys.readouterr().out.splitlines()
+    printed = capsys.readouterr().out
     known = fits.available("sliding_friction")
-    assert [line.split("  ", 1)[0] for line in printed] == list(known)
-    assert [line.split("  ", 1)[1].strip() for line in printed] == [law.summary for law in known.values()]
-    assert len({line.index(law.summary) for line, law in zip(printed, known.values(), strict=True)}) == 1
+    assert [line.split()[0] for line in printed.splitlines() if not line.startswith(" ")] == list(known)
+    assert all(law.summary in " ".join(printed.split()) for law in known.values())
     list_names("toy", {})
     assert capsys.readouterr().out == "none for toy\n"
 
@@ -101,6 +101,7 @@ def test_options_of_verify_that_do_not_go_together_are_refused(store, options, m
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_master_curve_of_a_store_is_that_of_its_table(store, capsys):
     """Friction against velocity at each force, from the store and from a table of its means."""
     data = xr.open_zarr(store)
@@ -135,15 +136,14 @@ def test_a_surface_is_told_as_a_table_with_intervals(tmp_path, monkeypatch, caps
     place, height = np.arange(400) * 1e-2, np.random.default_rng(0).standard_normal(400).cumsum()
     np.savetxt("scan.csv", np.column_stack([place, height]), delimiter=",", header="x [mm],z [um]", comments="")
     assert main(["surface", "scan.csv"]) == 0
-    table = capsys.readouterr().out.splitlines()
+    out = capsys.readouterr().out
     assert main(["surface", "scan.csv", "--json"]) == 0
     (row,) = json.loads(capsys.readouterr().out)["rows"]
     unknown = [name for name, value in row.items() if value is None]
     assert unknown
-    assert not set(unknown) & set(table[0].split())
-    assert f"{row['rms_height']:.6g}" in table[1].split()
-    if "hurst" in table[0].split():
-        assert f"{row['hurst']:.4g} ({row['hurst_low']:.4g}, {row['hurst_high']:.4g})" in table[1]
+    assert not any(re.search(rf"\b{name}\b", out) for name in unknown)
+    known = [name for name, value in row.items() if isinstance(value, float) and f"{name}_low" not in row]
+    assert all(f"{row[name]:.6g}" in out for name in known if not name.endswith(("_low", "_high")))
 
 
 def test_an_interrupted_command_says_that_nothing_is_lost(monkeypatch, capsys):
@@ -170,6 +170,7 @@ def test_a_reader_that_has_read_enough_is_no_error(monkeypatch, tmp_path):
         monkeypatch.undo()
 
 
+@pytest.mark.slow
 def test_a_page_is_served_until_ctrl_c(store, monkeypatch, capsys):
     served = []
 

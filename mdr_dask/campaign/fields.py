@@ -112,8 +112,8 @@ def choices(parameters: type[BaseModel], path: Path) -> tuple[str, ...]:
         if rest[0] in kind.model_fields:
             needed = [key for key, info in kind.model_fields.items() if info.is_required() and key != rest[0]]
             only = fixed(kind)
-            said = [f"{key}: {only.get(key, '...')}" for key in dict.fromkeys([*only, *needed])]
-            deeper = [[*said, one] for one in choices(kind, tuple(rest))] if len(rest) > 1 else [said]
+            keys = [f"{key}: {only.get(key, '...')}" for key in dict.fromkeys([*only, *needed])]
+            deeper = [[*keys, one] for one in choices(kind, tuple(rest))] if len(rest) > 1 else [keys]
             found.extend(f"{name}: {{{', '.join(parts)}}}" for parts in deeper)
     return tuple(found)
 
