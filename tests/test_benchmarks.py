@@ -69,15 +69,6 @@ def test_the_page_of_accuracy_is_what_its_table_says(benchmark_script):
     assert script.text(script.read(), script.kept_apart.read()) == script.PAGE.read_text()
 
 
-def test_what_was_asked_for_is_compared_with_the_cheapest_that_is_as_good(benchmark_script):
-    script = benchmark_script("accuracy.page")
-    settings = {"grid 1": (1.0, 0.2), "grid 2": (2.0, 0.005), "auto, 0.01": (3.0, 0.002), "auto, 0.1": (1.5, 0.05)}
-    points = [script.Point("s", "c", "m", setting, *both) for setting, both in settings.items()]
-    assert "| s | c | 0.01: 1.50, 0.1: 1.00 | 0.5 |" in script.picked(points)
-    missing = script.Point("s", "c", "m", "asked 0.001", 4.0, 0.005)  # judged by those that are as good as it is
-    assert "0.001: 2.00 | 5 |" in script.picked([*points, missing])
-
-
 def test_the_comparison_of_solvers_is_what_its_table_says(benchmark_script):
     script = benchmark_script("peers.page")
     assert script.PAGE.read_text().endswith(script.text(script.read(script.TABLE)))

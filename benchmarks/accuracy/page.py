@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterable
 from itertools import groupby
@@ -101,35 +100,13 @@ ABOUT = {
 def text(points: Iterable[Point], judged: Iterable[Honest]) -> str:
     """Return the page."""
     points = list(points)
-    parts = [HEAD, picked(points), honesty(judged)]
+    parts = [HEAD, honesty(judged)]
     for solver, group in groupby(points, lambda point: point.solver):
         parts.append(
             f"## {solver[0].upper()}{solver[1:]}\n\n{ABOUT[solver]}\n\n![{solver}](pictures/accuracy/{_file(solver)})\n"
         )
         parts.append(_table(list(group)))
     return "\n".join(parts)
-
-
-def picked(points: list[Point]) -> str:
-    """Return a table of what it costs to ask for an accuracy, over the cheapest setting whose error is that small."""
-    rows, ratios = [], []
-    for (solver, case), group in groupby(sorted(points, key=_place), key=_place):
-        chosen = [point for point in group if not point.method.startswith(OWN_EQUATION)]
-        cells, missed = [], []
-        for point in chosen:
-            if found := ASKED.search(point.setting):
-                asked = float(found[1])
-                missed.append(point.error / asked)
-                ratios.append(point.seconds / cheapest(chosen, max(asked, point.error)))
-                cells.append(f"{asked:g}: {ratios[-1]:.2f}")
-        if cells:
-            rows.append(f"| {solver} | {case} | {', '.join(cells)} | {max(missed):.2g} |")
-    within = sum(ratio <= 1.3 for ratio in ratios)
-    return PICKED.format(rows="\n".join(rows), within=within, number=len(ratios), most=max(ratios))
-
-
-def _place(point: Point) -> tuple[str, str]:
-    return point.solver, point.case
 
 
 def honesty(judged: Iterable[Honest]) -> str:
@@ -145,8 +122,11 @@ def _file(solver: str) -> str:
 
 
 def _table(points: list[Point]) -> str:
-    """Return what each method takes for errors of a tenth to a ten-thousandth, and what it states."""
+    """Return the time that each method takes for errors of 0.1 to 0.0001, and what it states."""
+    dates = sorted({point.measured for point in points})
     rows = [
+        f"Measured {' and '.join(dates)}.",
+        "",
         "| case | method | " + " | ".join(f"{goal:.2g}" for goal in GOALS) + " | smallest error | stated over error |",
         "|---|---|" + "---|" * (len(GOALS) + 2),
     ]
@@ -183,32 +163,11 @@ def draw(points: Iterable[Point]) -> None:
 
 
 FLOOR = 1e-12
-OWN_EQUATION = "fast rule", "limit rule"  # errors are those of their equation
-#: A setting that asks for an accuracy.
-ASKED = re.compile(r"(?:auto, |accuracy |asked )([\d.e-]+)$")
-PICKED = """## What asking for an accuracy costs
-
-For each accuracy asked for: time over that of the cheapest setting tried that is adequate, whatever the method; 1 if it
-is the cheapest itself. A setting is judged by ten like cases, a campaign by the worst case of ten seeds, or of ten like
-campaigns where nothing is random. It is adequate if the errors of nine are no larger than what was asked for, or than
-what was found by asking. Every setting states its errors too, as asking does. A user does not know the cheapest one
-beforehand. Then the largest error over the accuracy, of nine in ten.
-{within} of {number} are at most 1.3 times the cheapest; the largest is {most:.2g} times.
-
-Like cases are other lines, depths, speeds, exponents and amounts of wear about the one named. A campaign asks for a
-standard error in every case: the worst of 8 to 16 independent cases lies within 2.5 to 2.7 times that in nine of ten
-seeds. It takes seven lines: fewer do not know their own scatter, but turns of rollers do. The fast rule and the limit
-of wear are left out: their errors are those of their equations, and no setting lowers them.
-
-| solver | case | accuracy: times the cheapest | error over accuracy, most |
-|---|---|---|---|
-{rows}
-"""
 HONESTY = """## Whether stated errors hold
 
-Random cases on seeds that nothing was tuned on, against much finer solutions or closed forms. The columns: the share
-whose error is below the stated one, and the median of stated over error. The judgements are
-[a table](evidence/honesty.csv). Shares of 20 cases are known to ten per cent.
+Random cases, each compared with a much finer solution or a closed form; the factors of the estimates were not chosen on
+these cases. The columns give the share of cases whose error is below the stated one, and the median of the stated error
+over the true error. The data are [a table](evidence/honesty.csv). With 20 cases a share is known to about ten per cent.
 
 | solver | cases | number | held | stated over error |
 |---|---|---|---|---|
@@ -216,8 +175,8 @@ whose error is below the stated one, and the median of stated over error. The ju
 """
 HEAD = """# Accuracy and speed
 
-What an error costs, for every solver: processor time of one solution against its error, beside the methods of the
-papers and of the thesis. Each part says what it is compared with. Three commands make the page again:
+The processor time of one solution against its error, for every solver of the package and for the methods of the papers
+and of the thesis. These commands measure everything again:
 
 ```console
 $ python -m benchmarks accuracy honesty
@@ -225,11 +184,11 @@ $ python -m benchmarks accuracy measure
 $ python -m benchmarks accuracy page
 ```
 
-The points are [a table](evidence/accuracy-and-speed.csv). Times were measured on two cores that other programs used
-too: compare them within one table, as ratios. The tables give the least time of a setting whose error is at most that
-of the column; `-` is beyond what was tried. Where the doubt of a reference is known, no error below it is told.
-*Stated over error* is the error that a method states over its true error, from the least to the most of its
-settings. Below 1 the statement was too small.
+The data are [a table](evidence/accuracy-and-speed.csv), with the date of each measurement. Times depend on the machine
+and on what else it does: compare them within one table, as ratios. Each table gives the least time of a setting whose
+error is at most that of the column; `-` means that no setting tried was that accurate. *Stated over error* is the
+stated error over the true error, from the smallest to the largest among the settings; below 1 the stated error was too
+small.
 """
 
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator
+from datetime import date
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+
+from mdr_dask.version import __version__
 
 FILE = Path(__file__).parents[2] / "docs/evidence/accuracy-and-speed.csv"
 LIKE = 10  # cases that one setting is judged by, and seeds of a campaign
@@ -16,7 +19,8 @@ LIKE = 10  # cases that one setting is judged by, and seeds of a campaign
 class Point(NamedTuple):
     """One entry of a work-precision diagram; `stated` is NaN where a method states no error.
 
-    `covered` is the share of cases whose error is at most the stated one, NaN where it was not counted.
+    `covered` is the share of cases whose error is at most the stated one, NaN where it was not counted. `measured` is
+    the date and the version of the package.
     """
 
     solver: str
@@ -27,25 +31,27 @@ class Point(NamedTuple):
     error: float
     stated: float = np.nan
     covered: float = np.nan
+    measured: str = ""
 
 
 def read(path: Path = FILE) -> list[Point]:
     """Return the points of a table."""
     with path.open() as file:
         rows = list(csv.reader(line for line in file if not line.startswith("#")))
-    return [Point(*row[:4], *map(float, row[4:])) for row in rows[1:]]
+    return [Point(*row[:4], *map(float, row[4:8]), row[8]) for row in rows[1:]]
 
 
 def write(points: Iterable[Point], path: Path = FILE) -> None:
-    """Write points as a table, the solvers measured now in place of what stood there of them."""
+    """Write points as a table; the solvers measured now replace their earlier rows."""
     points = list(points)
     measured = {point.solver for point in points}
     kept = [point for point in read(path) if point.solver not in measured] if path.exists() else []
+    today = f"{date.today()} with version {__version__}"
     with path.open("w") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(Point._fields)
-        for point in [*kept, *points]:
-            writer.writerow([*point[:4], *(f"{number:.3e}" for number in point[4:])])
+        for point in [*kept, *(point._replace(measured=today) for point in points)]:
+            writer.writerow([*point[:4], *(f"{number:.3e}" for number in point[4:8]), point.measured])
 
 
 def neighbours(short: bool) -> Iterator[tuple[int, float, float]]:
