@@ -79,7 +79,7 @@ def test_stepping_all_springs_ends_at_the_scheme_of_the_thesis(benchmark_script)
     script = benchmark_script("peers.friction")
     line, _ = script.sliding.rough(0.7)
     for nodes in (256, 512):
-        aim = script.Aim(("drag",), 0.01, nodes // 128, "backward_euler")
+        aim = script.Request(0.01, nodes // 128, "backward_euler")
         steady, _ = script.solve(line, None, np.array([0.01]), np.array([0.2]), aim)
         assert script.stepped(line, 0.01, 0.2, nodes) == pytest.approx(steady.drag[0] / 0.2, rel=1e-4)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.accuracy.points import Point, neighbours
 from benchmarks.measures import timed_in_turns
-from mdr_dask.physics.sliding.problem import Aim, Arms, solve
+from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw
@@ -33,9 +33,9 @@ SCHEMES = {
     "hermite": "cubic cells",
 }
 SOLIDS = {
-    "one arm": Arms((9.0,), (0.01,)),
-    "five arms": Arms((1.0, 2.0, 4.0, 8.0, 16.0), (1.0, 0.1, 1e-2, 1e-3, 1e-4)),
-    "fifty arms, 20 decades": Arms(tuple(np.geomspace(0.1, 10, 50)), tuple(np.geomspace(1e-16, 1e4, 50))),
+    "one arm": PronyTerms((9.0,), (0.01,)),
+    "five arms": PronyTerms((1.0, 2.0, 4.0, 8.0, 16.0), (1.0, 0.1, 1e-2, 1e-3, 1e-4)),
+    "fifty arms, 20 decades": PronyTerms(tuple(np.geomspace(0.1, 10, 50)), tuple(np.geomspace(1e-16, 1e4, 50))),
 }
 #: Exponent and coefficient of bodies under no roughness, over the line's length.
 BODIES = {"parabola": (2.0, 5.0), "cone": (1.0, 1.0), "flat: n = 6": (6.0, 500.0)}
@@ -66,13 +66,10 @@ def ladder(
 ) -> Iterator[tuple[str, float, float, float]]:
     """Yield setting, processor time, error of the friction and its stated error, for every grid or accuracy."""
     case = np.array([deborah]), np.array([truth.load])
-    aims = [
-        Aim(("drag",), 0.01, grid, scheme) if isinstance(grid, int) else Aim(("drag",), grid, "auto", scheme)
-        for grid in grids
-    ]
+    aims = [Request(0.01, grid, scheme) if isinstance(grid, int) else Request(grid, "auto", scheme) for grid in grids]
     solved = timed_in_turns([partial(solve, line, arms, *case, aim) for aim in aims], repeats)
     for grid, ((steady, errors), seconds) in zip(grids, solved, strict=True):
-        friction, stated = steady.drag[0] / truth.load, float(errors.drag[0] / steady.drag[0])
+        friction, stated = steady.drag[0] / truth.load, float(errors[0][0] / steady.drag[0])
         setting = f"grid {grid}" if isinstance(grid, int) else f"auto, {grid:g}"
         # below its own doubt the reference cannot judge
         error = max(float(abs(friction / truth.friction - 1)), truth.doubt)
@@ -102,7 +99,7 @@ def solids(short: bool) -> Iterator[Point]:
             continue
         for number, higher, faster in neighbours(short):
             line, reference = rough(hurst, 1 + number)
-            arms = Arms(solid.moduli, tuple(1.5**faster * each for each in solid.deborah))
+            arms = PronyTerms(solid.moduli, tuple(1.5**faster * each for each in solid.deborah))
             body = slow.Body(np.array(arms.moduli), np.array(arms.deborah), 0.0)
             truth = exact(reference, depth + 0.1 * higher, body, True, short)
             tried = (4, 16, 0.05) if short else (4, 8, 16, 32, 64, 0.05, 0.01, 0.001)

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.friction.lines import FAMILIES, rough, samples
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Aim, Arms, solve
+from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.sliding.steady import steady_sliding
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw
@@ -60,7 +60,7 @@ def general_cases(family, cases, seed):
             )
         number = random.integers(1, 5)
         times = np.sort(10 ** random.uniform(-6, 3, number))
-        arms = Arms(tuple(10 ** random.uniform(-2, 2, number)), tuple(times))
+        arms = PronyTerms(tuple(10 ** random.uniform(-2, 2, number)), tuple(times))
         dashpot = 10 ** random.uniform(-6, 0) if random.uniform() < 0.3 else 0.0
         yield RoughLine(waves, body), arms, np.array([dashpot]), np.array([load])
 
@@ -79,7 +79,7 @@ def kelvin(cases, seed, accuracy):
     rows = []
     for family in FAMILIES:
         for _, line, deborah, load in kelvin_cases(family, cases, seed):
-            found = solve(line, None, deborah, load, Aim(accuracy=accuracy))
+            found = solve(line, None, deborah, load, Request(accuracy=accuracy))
             rows.append(ratios(found, truth_of(line, deborah, load)))
     return np.array(rows)
 
@@ -89,7 +89,7 @@ def general(cases, seed, oversampling):
     rows = []
     for family in (*FAMILIES, "plane", "indenter"):
         for line, *numbers in general_cases(family, cases, seed):
-            (exact, _), found = (solve(line, *numbers, Aim(oversampling=grid)) for grid in (FINEST, oversampling))
+            (exact, _), found = (solve(line, *numbers, Request(oversampling=grid)) for grid in (FINEST, oversampling))
             if exact.status[0] == Outcome.CONVERGED == found[0].status[0]:
                 rows.append(ratios(found, exact))
     return np.array(rows)

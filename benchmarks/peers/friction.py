@@ -14,7 +14,7 @@ from benchmarks.accuracy import sliding
 from benchmarks.accuracy.points import Point
 from benchmarks.peers.beside import OURS, in_turns, single_threaded
 from benchmarks.peers.page import tell
-from mdr_dask.physics.sliding.problem import Aim, solve
+from mdr_dask.physics.sliding.problem import Request, solve
 
 GRIDS = (1, 2, 4, 8, 16, 32, 64, 128)
 GOALS = (0.1, 0.03, 0.01)
@@ -58,7 +58,7 @@ def compared() -> Iterator[Point]:
         truth = sliding.exact(reference, depth, sliding.slow.Body(np.empty(0), np.empty(0), deborah), True, False)
 
         def ours(accuracy, line=line, deborah=deborah, truth=truth):
-            aim = Aim(("drag",), accuracy, "auto", "hermite")
+            aim = Request(accuracy, "auto", "hermite")
             steady, _ = solve(line, None, np.array([deborah]), np.array([truth.load]), aim)
             return steady.drag[0] / truth.load
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
@@ -38,7 +38,7 @@ class Solution(NamedTuple):
         Values of `Outcome`.
     """
 
-    values: Sequence[FloatArray]
+    values: Sequence[FloatArray] | FloatArray
     outcome: NDArray[np.int8]
 
 
@@ -75,7 +75,7 @@ def refine(
     order: float,
     *,
     safety: float = SAFETY,
-    floors: float | Sequence[float] = 0.0,
+    floors: ArrayLike = 0.0,
     shared: bool = True,
 ) -> Refined:
     """Solve every case on the coarsest grid on which all outputs meet an accuracy.
@@ -97,7 +97,7 @@ def refine(
         Order of convergence p of the solver, at least where most of the error arises.
     safety : float
         Safety factor of the estimate.
-    floors : float or sequence of float
+    floors : float or array, shape (outputs,)
         Absolute size, for all outputs or for each, below which an error is not measured relative to the value. It is
         needed by outputs of which zero is a normal value, such as a probability.
     shared : bool
@@ -136,7 +136,7 @@ def refine(
     outcome, level, met = coarse.outcome.copy(), np.full(cases, levels[0]), np.zeros(cases, np.bool_)
     before = np.zeros((len(values), cases))
     for finer in levels[1:]:
-        going_on = ~met[left] & ~_is_impossible(outcome[left])
+        going_on = ~met[left] & ~IMPOSSIBLE[outcome[left]]
         left, before, coarse = left[going_on], before[:, going_on], _only(coarse, going_on)
         if not left.size:
             break
@@ -153,7 +153,8 @@ def refine(
         for value, found in zip(values, fine.values, strict=True):
             value[kept] = found[better]
         outcome[kept], level[kept] = fine.outcome[better], finer
-        errors[:, kept] = np.where(solved, relative * _sizes(fine.values, floor), np.inf)[:, better]
+        with np.errstate(invalid="ignore"):
+            errors[:, kept] = np.where(solved, relative * _sizes(fine.values, floor), np.inf)[:, better]
         met[left] = solved & np.all(relative <= accuracy, axis=0)
         coarse, before = fine, change
     for value in values:
@@ -167,30 +168,28 @@ def relative_changes(coarse: Solution, fine: Solution, floors: FloatArray) -> Fl
     Of a profile it is the largest change over the largest value. It is infinite where either grid has no solution.
     """
     solved = (coarse.outcome == Outcome.CONVERGED) & (fine.outcome == Outcome.CONVERGED)
-    changes = []
-    for one, other, size in zip(coarse.values, fine.values, _sizes(fine.values, floors), strict=True):
-        nowhere = np.isnan(one) & np.isnan(other) & solved.reshape(-1, *(1,) * (other.ndim - 1))
-        with np.errstate(invalid="ignore"):
-            difference = np.where(nowhere, 0.0, np.abs(other - one)).reshape(solved.size, -1)
-        changes.append(_ratio(np.max(difference, axis=1, initial=0.0), size))
+    changes = np.empty((len(fine.values), solved.size))
+    with np.errstate(all="ignore"):
+        for change, one, other in zip(changes, coarse.values, fine.values, strict=True):
+            difference = np.abs(other - one)
+            difference[np.isnan(one) & np.isnan(other)] = 0.0
+            change[:] = _largest(difference)
+        changes = np.where(changes == 0, 0.0, changes / _sizes(fine.values, floors))
     return np.where(solved & ~np.isnan(changes), changes, np.inf)
 
 
-def _sizes(values: Sequence[FloatArray], floors: FloatArray) -> FloatArray:
+def _sizes(values: Sequence[FloatArray] | FloatArray, floors: FloatArray) -> FloatArray:
     """Return the largest absolute value of every output and case, or the floor, shape (outputs, cases)."""
-    largest = [np.max(np.abs(np.nan_to_num(value)).reshape(len(value), -1), axis=1, initial=0.0) for value in values]
-    return np.maximum(largest, floors[:, None])
+    return np.maximum([_largest(np.fmax(np.abs(value), 0.0)) for value in values], floors[:, None])
 
 
-def _ratio(change: FloatArray, size: FloatArray) -> FloatArray:
-    """Return change over size, 0 where nothing changes."""
-    with np.errstate(all="ignore"):
-        return np.where(change == 0, 0.0, change / size)
+def _largest(sizes: FloatArray) -> FloatArray:
+    """Return the largest of the positive numbers of every case."""
+    return sizes if sizes.ndim == 1 else sizes.reshape(len(sizes), -1).max(axis=1, initial=0.0)
 
 
 def _only(solution: Solution, cases: NDArray[np.bool_]) -> Solution:
     return Solution([value[cases] for value in solution.values], solution.outcome[cases])
 
 
-def _is_impossible(outcome: NDArray[np.int8]) -> NDArray[np.bool_]:
-    return np.isin(outcome, [each for each in Outcome if each.is_impossible])
+IMPOSSIBLE = np.array([outcome.is_impossible for outcome in Outcome])

@@ -71,7 +71,7 @@ def contact_of(case: xr.Dataset) -> Contact:
     from mdr_dask.physics.sliding.displacement import displacement
 
     problems, setting = _line(case)
-    if setting.arms is not None:
+    if setting.terms is not None:
         raise DataError("expected a Kelvin body, whose surface follows from the depth alone")
     depth = float(case[DEPTH]) / problems.height[0]
     if not np.isfinite(depth):

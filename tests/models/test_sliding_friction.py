@@ -184,19 +184,11 @@ def test_friction_below_zero_lies_within_an_error_that_is_not():
     assert coarse < 0 < fine < coarse + error
 
 
-@pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
-def test_time_is_estimated_by_what_is_done(scheme):
-    """Finer grids, more cases, more lines, errors and a grid that has to be found take longer; steps the least."""
-
+def test_time_is_estimated_from_the_nodes():
     def seconds(columns, **more):
-        how = {"scheme": scheme, "oversampling": 4, "outputs": ("friction_coefficient",)}
-        return MODEL.seconds(make(columns, **(how | more)))
+        options = {"oversampling": 4, "outputs": ("friction_coefficient",)}
+        return MODEL.seconds(make(columns, **(options | more)))
 
     many = grid()
-    usual = seconds(many)
-    assert seconds({"velocity": [0.1]}) < usual < seconds(many, oversampling=16)
-    assert usual < seconds(many, realisations=range(4))
-    assert usual < seconds(many, outputs=("friction_coefficient", "friction_coefficient_error"))
-    assert seconds(many, oversampling=1) < seconds(many, oversampling="auto", accuracy=1e-5)
-    long = [seconds(many, scheme=name, points=20000) for name in ("backward_euler", "piecewise_linear", "hermite")]
-    assert long == sorted(long)
+    assert seconds({"velocity": [0.1]}) < seconds(many) < seconds(many, oversampling=16)
+    assert seconds(many) < seconds(many, realisations=range(4))

@@ -9,7 +9,7 @@ import pytest
 from mdr_dask.models.base import Block, Status
 from mdr_dask.models.sliding_friction import MODEL, SlidingFriction
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.problem import Aim, Arms, solve
+from mdr_dask.physics.sliding.problem import PronyTerms, Request, solve
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import PowerLaw
@@ -139,12 +139,12 @@ class Wedge:
         return Wedge(self.steepness * length / height, self.flat / length)
 
 
-@pytest.mark.parametrize("arms", [None, Arms((4.0,), (0.01,))], ids=["kelvin", "arms"])
+@pytest.mark.parametrize("arms", [None, PronyTerms((4.0,), (0.01,))], ids=["kelvin", "arms"])
 def test_a_new_shape_is_height_and_slopes(arms):
     """A flat of no width is the cone that the power laws have; a wide one carries the load at less depth."""
     line = roughness.amplitudes(50, 0.7) * 0.5 * np.exp(1j * roughness.phases(1, 0, 50))
     numbers = np.array([0.02]), np.array([1.0])
-    aim = Aim(accuracy=1e-3)
+    aim = Request(accuracy=1e-3)
     cone, wedge, flat = (
         solve(RoughLine(Waves(line, 100), body), arms, *numbers, aim)[0]
         for body in (PowerLaw(40.0, 1.0), Wedge(40.0, 0.0), Wedge(40.0, 0.125))

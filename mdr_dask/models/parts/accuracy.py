@@ -1,4 +1,8 @@
-"""Errors over what they belong to, and the sentence of all models about outputs that miss an accuracy."""
+"""Whether results meet the accuracy of a campaign, and the message where they do not. One rule for all models.
+
+The error of an output is relative to its value; of a profile or a history the largest error counts, relative to the
+largest value. Where zero is a normal value, the model gives an absolute size (a floor) that counts instead.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,59 @@ from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import distinguishable
 
 
-def share(error: ArrayLike, value: ArrayLike, whole: ArrayLike = 0.0) -> FloatArray:
-    """Return errors over the size of their values; no error is none of anything.
+def relative_errors(
+    values: Mapping[str, ArrayLike], errors: Mapping[str, ArrayLike], floors: Mapping[str, ArrayLike] | None = None
+) -> dict[str, FloatArray]:
+    """Return the relative error of every output of every case, shape (cases,).
 
-    A value that is zero within its error has no relative one: that counts beside the whole it is a part of.
+    Parameters
+    ----------
+    values, errors : mapping of str to array, shape (cases, ...)
+        Results and their absolute errors by output; entries that are NaN in either do not count.
+    floors : mapping of str to array, shape (cases,), or float
+        Absolute size by output that counts where the value is smaller.
+    """
+    found = {}
+    for name, value in values.items():
+        size, error = (np.abs(np.atleast_1d(np.asarray(each, dtype=np.float64))) for each in (value, errors[name]))
+        known = ~(np.isnan(size) | np.isnan(error))
+        largest_error, largest = (
+            np.where(known, each, 0.0).reshape(len(each), -1).max(axis=1, initial=0.0) for each in (error, size)
+        )
+        floor = np.asarray((floors or {}).get(name, 0.0), dtype=np.float64)
+        with np.errstate(all="ignore"):
+            share = largest_error / np.maximum(largest, floor)
+        found[name] = np.where(largest_error == 0, 0.0, share)
+    return found
+
+
+def missed_accuracy(
+    values: Mapping[str, ArrayLike],
+    errors: Mapping[str, ArrayLike],
+    accuracy: float,
+    floors: Mapping[str, ArrayLike] | None = None,
+    where: str = "",
+) -> dict[int, str]:
+    """Return a message for every case whose outputs miss the accuracy, by the index of the case.
+
+    Parameters
+    ----------
+    values, errors, floors
+        As of :func:`relative_errors`.
+    accuracy : float
+        Relative error allowed for every output.
+    where : str
+        Added to the message, such as ``" on the finest grid"``.
+    """
+    shares = relative_errors(values, errors, floors)
+    late = np.flatnonzero(np.any([~(share <= accuracy) for share in shares.values()], axis=0)) if shares else ()
+    return {int(k): missed({name: float(share[k]) for name, share in shares.items()}, accuracy, where) for k in late}
+
+
+def share(error: ArrayLike, value: ArrayLike, whole: ArrayLike = 0.0) -> FloatArray:
+    """Return errors relative to their values, 0 where there is no error.
+
+    A value that is zero within its error has no relative error: it counts relative to ``whole``.
     """
     errors, size = np.asarray(error, dtype=np.float64), np.abs(np.asarray(value, dtype=np.float64))
     with np.errstate(all="ignore"):
@@ -23,7 +76,7 @@ def share(error: ArrayLike, value: ArrayLike, whole: ArrayLike = 0.0) -> FloatAr
 
 
 def missed(shares: Mapping[str, float], accuracy: float, where: str = "") -> str:
-    """Say which outputs miss an accuracy and by how much; an empty string if none does."""
+    """Return the message about the outputs that miss an accuracy; an empty string if none does."""
     named = [f"{name} by {_amount(share, accuracy)}" for name, share in shares.items() if share > accuracy]
     return f"an accuracy of {accuracy:.12g} is missed{where}: {', '.join(named)} (estimated)" if named else ""
 

@@ -1,4 +1,4 @@
-"""Sliding bodies as dimensionless numbers: the one place where loads, speeds, lines and solids lose their units."""
+"""Sliding bodies as dimensionless numbers: the one place where loads, velocities, lines and solids lose their units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mdr_dask.models.parts.surface import Surface
 from mdr_dask.physics.outcome import Outcome
 
 if TYPE_CHECKING:
-    from mdr_dask.physics.sliding.problem import Arms
+    from mdr_dask.physics.sliding.problem import PronyTerms
     from mdr_dask.physics.surfaces.shapes import Shape
 
 STATUS = np.array(
@@ -33,27 +33,27 @@ STATUS = np.array(
     ],
     dtype=np.int8,
 )
-"""What a store calls each outcome of a solver."""
-LEAST = 1e-100  # dimensionless numbers from here to its reciprocal have squares and products
+"""The status in a store for each outcome of a solver."""
+LEAST = 1e-100  # squares and products of dimensionless numbers from here to its reciprocal can be represented
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What cases share that are solved together: the line and the arms of the solid (None of Kelvin), without units."""
+    """Line and Prony terms of the solid (None for a Kelvin solid), without units: shared by cases solved together."""
 
     roughness: Roughness
     body: Shape | None
-    arms: Arms | None
+    terms: PronyTerms | None
 
 
 @dataclass(frozen=True)
 class SlidingProblems:
-    """The cases of a block as dimensionless numbers; only these decide a solution.
+    """The cases of a block as dimensionless numbers: a solution depends on nothing else.
 
     Parameters
     ----------
     settings : list of Setting
-        Line and arms of every case.
+        Line and solid of every case.
     loads : array, shape (cases,)
         F_N / (4 G_inf L h).
     deborah : array, shape (cases,)
@@ -61,7 +61,7 @@ class SlidingProblems:
     length, height : array, shape (cases,)
         L and h, m: the units of length and height. h is the rms height, or L where there is no roughness.
     faults : dict of int to str
-        Why a case has no numbers.
+        Messages about cases that cannot be solved.
     """
 
     settings: list[Setting]
@@ -72,7 +72,7 @@ class SlidingProblems:
     faults: dict[int, str]
 
     def groups(self, *columns: list[Any]) -> Iterator[tuple[Setting, tuple[Any, ...], IntArray]]:
-        """Yield the cases that share a setting, and what else the columns hold."""
+        """Yield the cases that share a setting and the values of some columns."""
         members: dict[Any, list[int]] = {}
         for j, key in enumerate(zip(map(id, self.settings), *columns, strict=True)):  # equal settings are one object
             members.setdefault(key, []).append(j)
@@ -82,7 +82,7 @@ class SlidingProblems:
                 yield self.settings[sound[0]], tuple(others), np.array(sound)
 
     def different(self, members: IntArray) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the different Deborah numbers and loads among some cases, and which of them each case has."""
+        """Return the different pairs of Deborah number and load among some cases, and the pair of each case."""
         pairs = list(zip(self.deborah[members].tolist(), self.loads[members].tolist(), strict=True))
         places = {pair: k for k, pair in enumerate(sorted(set(pairs)))}
         deborah, loads = np.array(list(places)).T.copy()
@@ -93,7 +93,7 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     """Return the cases of a block of any `SlidingBody` without units."""
     faults: dict[int, str] = {}
     roughness, length, height = _lines(block, faults)
-    static, viscosity, arms = _solids(block, faults)
+    static, viscosity, terms = _solids(block, faults)
     velocity, force = (np.asarray(block.column(name), dtype=np.float64) for name in ("velocity", "normal_force"))
     with np.errstate(all="ignore"):
         loads = canonical(force / (4 * static * length * height))
@@ -105,12 +105,12 @@ def sliding_problems(block: Block[Any]) -> SlidingProblems:
     with np.errstate(all="ignore"):
         slope = height / length
     refuse_immense({"h / L": slope, "F_N / (4 G L h)": loads, "v tau / L": np.where(deborah == 0, 1, deborah)}, faults)
-    settings = _settings(block, roughness, arms, length, height, velocity, faults)
+    settings = _settings(block, roughness, terms, length, height, velocity, faults)
     return SlidingProblems(settings, loads, deborah, length, height, faults)
 
 
 def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> None:
-    """Note every case whose dimensionless numbers, or their squares, are no numbers of a computer."""
+    """Add a message for every case whose dimensionless numbers, or their squares, overflow or underflow."""
     for name, column in numbers.items():
         for j in np.flatnonzero(~((column > LEAST) & (column < 1 / LEAST))):
             number, least, most = distinguishable(column[j], LEAST, 1 / LEAST, digits=6)
@@ -118,14 +118,14 @@ def refuse_immense(numbers: dict[str, FloatArray], faults: dict[int, str]) -> No
 
 
 def each(block: Block[Any], name: str) -> list[Any]:
-    """Return a structured parameter of every case, whichever part of it varies."""
+    """Return a nested parameter of every case, whichever part of it varies."""
     if any(path.partition(".")[0] == name for path in block.columns):
         return [getattr(block.case(j), name) for j in range(block.cases)]
     return [getattr(block.parameters, name)] * block.cases
 
 
 def _numbers(block: Block[Any], name: str) -> FloatArray:
-    """Return a number of every case, NaN where there is none."""
+    """Return a number of every case, NaN where it is not given."""
     return np.array([np.nan if value is None else value for value in block.column(name).tolist()], dtype=np.float64)
 
 
@@ -166,9 +166,12 @@ def _measured(surface: Surface, points: int, length: float) -> OfSurface | Measu
 
 
 def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArray, FloatArray, list[Any]]:
-    """Return static modulus, viscosity over it, and the arms (moduli over it, times) of every case, None of Kelvin."""
+    """Return static modulus, viscosity and Prony terms of every case; the last are None for a Kelvin solid.
+
+    Viscosity and moduli of the terms are divided by the static modulus.
+    """
     static, viscosity = _numbers(block, "shear_modulus"), _numbers(block, "relaxation_time")
-    arms: list[Any] = [None] * block.cases
+    terms: list[Any] = [None] * block.cases
     for j, material in enumerate(each(block, "material")):
         if material is not None:
             try:
@@ -178,38 +181,40 @@ def _solids(block: Block[SlidingBody], faults: dict[int, str]) -> tuple[FloatArr
                 continue
             static[j], viscosity[j] = solid.static_modulus, solid.viscosity / solid.static_modulus
             is_kelvin = solid.times.size == 0 and solid.viscosity > 0
-            arms[j] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
-    return static, viscosity, arms
+            terms[j] = None if is_kelvin else (solid.moduli / solid.static_modulus, solid.times)
+    return static, viscosity, terms
 
 
 def _settings(
     block: Block[Any],
     roughness: list[Roughness],
-    arms: list[Any],
+    terms: list[Any],
     length: FloatArray,
     height: FloatArray,
     velocity: FloatArray,
     faults: dict[int, str],
 ) -> list[Setting]:
-    """Return what the cases share, in units of length and height; equal settings are one object."""
-    from mdr_dask.physics.sliding.problem import Arms
+    """Return line and solid of every case in units of length and height; equal settings are one object."""
+    from mdr_dask.physics.sliding.problem import PronyTerms
 
     indenters = each(block, "indenter")
     bodies = {id(indenter): indenter.line() for indenter in {id(one): one for one in indenters}.values()}
     known: dict[Any, Setting] = {}
     equal: dict[Setting, Setting] = {}
     settings = []
-    columns = roughness, indenters, arms, length.tolist(), height.tolist(), velocity.tolist()
-    for j, (line, indenter, arm, unit, rms, pace) in enumerate(zip(*columns, strict=True)):
-        key = (id(line), id(indenter), unit, rms) if arm is None else (id(line), id(indenter), unit, rms, id(arm), pace)
+    columns = roughness, indenters, terms, length.tolist(), height.tolist(), velocity.tolist()
+    for j, (line, indenter, term, unit, rms, pace) in enumerate(zip(*columns, strict=True)):
+        key: tuple[Any, ...] = (id(line), id(indenter), unit, rms)
+        if term is not None:
+            key += (id(term), pace)
         if key not in known:
             body, travelling = bodies[id(indenter)], None
             if body is not None and j not in faults:
                 body = body.scaled(unit, rms)
                 body = replace(body, **{name: float(canonical(number)) for name, number in vars(body).items()})
-            if arm is not None and j not in faults:
-                numbers = canonical(arm[0]), canonical(arm[1] * pace / unit)
-                travelling = Arms(*(tuple(column.tolist()) for column in numbers))
+            if term is not None and j not in faults:
+                numbers = canonical(term[0]), canonical(term[1] * pace / unit)
+                travelling = PronyTerms(*(tuple(column.tolist()) for column in numbers))
             setting = Setting(line, body, travelling)
             known[key] = equal.setdefault(setting, setting)
         settings.append(known[key])

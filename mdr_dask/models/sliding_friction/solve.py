@@ -10,32 +10,24 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.models.base import Block, Result, Status
-from mdr_dask.models.parts.accuracy import missed
+from mdr_dask.models.parts.accuracy import missed_accuracy
 from mdr_dask.models.parts.material import fit_error
 from mdr_dask.models.parts.sliding_problem import STATUS, Setting, SlidingProblems, each, sliding_problems
 from mdr_dask.models.sliding_friction.declaration import SlidingFriction
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.accuracy import SETTINGS, Errors, goes_from_node_to_node, relative
-from mdr_dask.physics.sliding.cases import Steady
-from mdr_dask.physics.sliding.problem import COARSEST, FINEST, Aim, solve
+from mdr_dask.physics.sliding.cases import COLUMNS, Steady
+from mdr_dask.physics.sliding.problem import Request, solve
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 
-ACCURACY = 0.01  # where the campaign does not say
-NODE_LINE, NODE_SWEPT = 2.5e-8, 1.3e-8  # seconds for every node of a line and of a solution
-AUTO = {"backward_euler": 512, "piecewise_linear": 4, "hermite": 4}  # the grid that estimates count with
-TIMES = {"piecewise_linear": (2.0, 25.0), "hermite": (3.5, 3.5)}  # how many times as many, on a given grid and on that
-STEPPED, STEPPED_LINE, NODE_STEPPED = 2.5e-4, 4e-8, 7e-10  # of the papers' steps: to begin with, a line, a solution
-POINT_LINE, POINT_SAMPLED = 2e-7, 8e-9  # and for every Nyquist point gone along from node to node
-NODE_ARM, NODE_GENERAL, GENERAL = 4e-9, 4.5e-8, 3e-4  # for every node and arm of a general solid, and to begin with
-ARRAYS, ARRAYS_GENERAL = 30, 12  # arrays of the length of the line that a solution holds
+ACCURACY = 0.01  # where the campaign does not give one
+USUAL_ON_PLANES, USUAL = 2, 16  # nodes per Nyquist point of the finest grid that cases usually need
+BYTES_A_NODE = 500  # peak memory of a line and a case on it, measured
+SECONDS_A_NODE = 1e-8  # of a line, or of a case on it, with all grids: an order of magnitude
 
 #: Outputs that have errors, and the column of a steady state that each is.
-COLUMNS = {
-    "friction_coefficient": "drag",
-    "indentation_depth": "depth",
-    "contact_fraction": "contact_fraction",
-    "contact_slope": "contact_slope",
-}
+OUTPUTS = dict(
+    zip(("friction_coefficient", "indentation_depth", "contact_fraction", "contact_slope"), COLUMNS, strict=True)
+)
 
 
 def compute(block: Block[SlidingFriction]) -> Result:
@@ -44,12 +36,14 @@ def compute(block: Block[SlidingFriction]) -> Result:
     values = {name: np.full(shape, np.nan) for name in block.outputs}
     result = Result(values, np.full(shape, Status.FAILED, np.int8))
     problems = sliding_problems(block)
-    materials = each(block, "material") if "material_error" in block.outputs else [None] * block.cases
     solves = 0
     groups = [_Group.of(block, problems, *group) for group in _groups(block, problems)]
-    for r, realisation in enumerate(block.realisations):  # outside: every line of one has the same phases
+    for r, realisation in enumerate(block.realisations):  # outermost: all lines of a realisation have the same phases
         for group in groups:
-            solves += group.solve(result, materials, r, realisation)
+            solves += group.solve(result, r, realisation)
+    if "material_error" in block.outputs:
+        errors = np.array([fit_error(material) for material in each(block, "material")])
+        values["material_error"][:] = np.where(result.status == Status.DONE, errors[:, None], np.nan)
     result.messages.update({(j, r): fault for j, fault in problems.faults.items() for r in range(shape[1])})
     return replace(result, solves=solves)
 
@@ -66,136 +60,119 @@ class _Group:
     block: Block[SlidingFriction]
     problems: SlidingProblems
     setting: Setting
-    aim: Aim
+    request: Request
     members: IntArray
     deborah: FloatArray
     loads: FloatArray
     which: IntArray  # the entry of `deborah` and `loads` of every member
-    solved: dict[str, FloatArray] | None = None  # of a line that is the same in every realisation
 
     @classmethod
     def of(
-        cls, block: Block[SlidingFriction], problems: SlidingProblems, setting: Setting, how: Any, members: IntArray
+        cls, block: Block[SlidingFriction], problems: SlidingProblems, setting: Setting, grid: Any, members: IntArray
     ) -> _Group:
         """Collect the different cases among the members."""
         deborah, loads, which = problems.different(members)
-        wanted = {name.removesuffix("_error") for name in block.outputs}
-        columns = [column for output, column in COLUMNS.items() if output in wanted]
-        with_errors = any(f"{output}_error" in block.outputs for output in COLUMNS)
+        with_errors = any(f"{output}_error" in block.outputs for output in OUTPUTS)
+        contact = not {"contact_fraction", "contact_slope"}.isdisjoint(block.outputs)
         accuracy = ACCURACY if block.accuracy is None else block.accuracy
-        oversampling, scheme = how
-        aim = Aim(columns, accuracy, oversampling, scheme, with_errors)
-        return cls(block, problems, setting, aim, members, deborah, loads, which)
+        oversampling, scheme = grid
+        request = Request(accuracy, oversampling, scheme, with_errors, contact)
+        return cls(block, problems, setting, request, members, deborah, loads, which)
 
-    def solve(self, result: Result, materials: list[Any], r: int, realisation: int) -> int:
+    def solve(self, result: Result, r: int, realisation: int) -> int:
         """Write the cases of one realisation, the r-th of the block; return how many were solved."""
         roughness = self.setting.roughness
         if r and not roughness.is_random:
-            for array in result.values.values():
-                array[self.members, r] = array[self.members, 0]
-            result.status[self.members, r] = result.status[self.members, 0]
-            result.messages.update(
-                {(int(j), r): result.messages[j, 0] for j in self.members if (j, 0) in result.messages}
-            )
+            self._repeat(result, r)
             return 0
         try:
             line = RoughLine(roughness.waves(self.block.seed, realisation), self.setting.body)
-            steady, errors = solve(line, self.setting.arms, self.deborah, self.loads, self.aim)
+            steady, errors = solve(line, self.setting.terms, self.deborah, self.loads, self.request)
         except ValueError as problem:
             result.messages.update({(int(j), r): str(problem) for j in self.members})
             return 0
-        found = self._outputs(steady, errors, realisation)
-        if "material_error" in self.block.outputs:
-            found["material_error"] = np.array([fit_error(materials[j]) for j in self.members])
-        status = steady.status[self.which]
-        converged = status == CONVERGED
-        result.status[self.members, r] = STATUS[status]
-        for name in self.block.outputs:
-            result.values[name][self.members, r] = np.where(converged, found[name], np.nan)
-        for k, sentence in self._sentences(steady, errors):
-            result.messages.update({(int(j), r): sentence for j in self.members[self.which == k]})
+        values, absolute = self._outputs(steady.columns), self._outputs(errors)
+        result.status[self.members, r] = STATUS[steady.status[self.which]]
+        if "rms_slope" in result.values:
+            slope = roughness.slope(realisation) * self._height / self._length
+            result.values["rms_slope"][self.members, r] = np.where(np.isnan(values["contact_slope"]), np.nan, slope)
+        for output in OUTPUTS:
+            for name, found in ((output, values[output]), (f"{output}_error", absolute[output])):
+                if name in result.values:
+                    result.values[name][self.members, r] = np.where(np.isnan(values[output]), np.nan, found)
+        for k, message in self._messages(steady, values, absolute):
+            result.messages[int(self.members[k]), r] = message
         return int(self.loads.size)
 
-    def _outputs(self, steady: Steady, errors: Errors, realisation: int) -> dict[str, FloatArray]:
-        """Return the outputs of the members and their errors, in units."""
-        height = self.problems.height[self.members]
-        slope = height / self.problems.length[self.members]
-        units = {"friction_coefficient": slope, "indentation_depth": height, "contact_slope": slope}
-        found: dict[str, FloatArray] = {}
-        for name in self.block.outputs:
-            output = name.removesuffix("_error")
-            if output == "rms_slope":
-                found[name] = self.setting.roughness.slope(realisation) * slope
-            elif output in COLUMNS:
-                column = getattr(steady if name == output else errors, COLUMNS[output])
-                per = self.loads if output == "friction_coefficient" else 1.0
-                found[name] = (column / per)[self.which] * units.get(output, 1.0)
-        return found
+    def _repeat(self, result: Result, r: int) -> None:
+        """Copy the results of the first realisation: the line is the same in all."""
+        for array in result.values.values():
+            array[self.members, r] = array[self.members, 0]
+        result.status[self.members, r] = result.status[self.members, 0]
+        first = {int(j): result.messages[j, 0] for j in self.members if (j, 0) in result.messages}
+        result.messages.update({(j, r): message for j, message in first.items()})
 
-    def _sentences(self, steady: Steady, errors: Errors) -> Iterator[tuple[int, str]]:
-        """Yield why a case failed, or which outputs miss the accuracy and by how much."""
-        failed = steady.status != CONVERGED
-        for k in np.flatnonzero(failed):
-            yield int(k), Outcome(int(steady.status[k])).sentence
-        if self.aim.oversampling != "auto":
-            return
-        shares = relative(steady, errors, self.aim.columns)
-        late = np.any(~(shares <= self.aim.accuracy), axis=0)
-        outputs = [output for output, column in COLUMNS.items() if column in self.aim.columns]
-        for k in np.flatnonzero(late & ~failed):
-            of_case = dict(zip(outputs, shares[:, k].tolist(), strict=True))
-            yield int(k), missed(of_case, self.aim.accuracy, " on the finest grid")
+    @property
+    def _height(self) -> FloatArray:
+        return self.problems.height[self.members]
 
+    @property
+    def _length(self) -> FloatArray:
+        return self.problems.length[self.members]
 
-CONVERGED = np.int8(Outcome.CONVERGED)  # many times faster to compare with than the name
+    def _outputs(self, columns: FloatArray) -> dict[str, FloatArray]:
+        """Return the outputs of the members, or their errors, in SI units."""
+        drag, depth, fraction, contact_slope = columns
+        slope = self._height / self._length
+        in_units = (drag / self.loads)[self.which] * slope, depth[self.which] * self._height, fraction[self.which]
+        return dict(zip(OUTPUTS, (*in_units, contact_slope[self.which] * slope), strict=True))
+
+    def _messages(
+        self, steady: Steady, values: dict[str, FloatArray], errors: dict[str, FloatArray]
+    ) -> Iterator[tuple[int, str]]:
+        """Yield why a member failed, or which of its outputs miss the accuracy and by how much."""
+        status = steady.status[self.which]
+        for k in np.flatnonzero(status != Outcome.CONVERGED):
+            yield int(k), Outcome(int(status[k])).sentence
+        if self.request.oversampling == "auto":
+            asked = [name for name in OUTPUTS if name in self.block.outputs]
+            values, errors = ({name: found[name] for name in asked} for found in (values, errors))
+            floors = {"indentation_depth": self._height}
+            yield from missed_accuracy(values, errors, self.request.accuracy, floors, " on the finest grid").items()
 
 
 def distinct(block: Block[SlidingFriction]) -> int:
     """Return how many different cases a block holds, over all realisations."""
     problems, total = sliding_problems(block), 0
     for setting, _, members in _groups(block, problems):
-        total += problems.different(members)[0].size * (len(block.realisations) if setting.roughness.is_random else 1)
+        total += problems.different(members)[0].size * _lines(block, setting)
     return total
+
+
+def _lines(block: Block[SlidingFriction], setting: Setting) -> int:
+    """Return how many different lines the realisations have."""
+    return len(block.realisations) if setting.roughness.is_random else 1
 
 
 def seconds(block: Block[SlidingFriction]) -> float:
-    """Estimate the time of a block: a line for every group and realisation, and sweeps for every different case."""
-    problems, total = sliding_problems(block), 1e-4
-    for setting, (oversampling, scheme), members in _groups(block, problems):
+    """Estimate the time of a block from its nodes, to an order of magnitude."""
+    problems, nodes = sliding_problems(block), 0.0
+    for setting, (oversampling, _), members in _groups(block, problems):
         solves = problems.different(members)[0].size
-        lines = len(block.realisations) if setting.roughness.is_random else 1
-        total += lines * _seconds_of_line(block, setting, oversampling, scheme, solves)
-    return total
-
-
-def _seconds_of_line(
-    block: Block[SlidingFriction], setting: Setting, oversampling: int | str, scheme: str, solves: int
-) -> float:
-    """Estimate the time of some cases on one line."""
-    points, auto = setting.roughness.points, oversampling == "auto"
-    if setting.arms is not None:
-        grid = 2 * COARSEST if auto else int(oversampling)
-        return solves * (GENERAL + (NODE_ARM * (len(setting.arms.moduli) + 1) + NODE_GENERAL) * points * grid)
-    harder = 1 + 2.5 * (1 - getattr(setting.roughness, "hurst", 1.0)) ** 8  # more cases need cubic cells
-    from_node_to_node = float(points * (POINT_LINE + solves * POINT_SAMPLED) * harder)
-    if auto and scheme == "hermite" and goes_from_node_to_node(setting.body, block.accuracy or ACCURACY):
-        return from_node_to_node
-    grid = AUTO[scheme] if auto else int(oversampling)
-    if scheme == "backward_euler":
-        own = STEPPED + points * grid * (STEPPED_LINE + solves * NODE_STEPPED)
-    else:
-        own = TIMES[scheme][auto] * points * (NODE_LINE * grid + solves * NODE_SWEPT * grid**0.25)
-    has_errors = not auto and any(f"{output}_error" in block.outputs for output in COLUMNS)
-    return own + has_errors * from_node_to_node
+        visits = 1 if setting.terms is None else 4 * (4 + len(setting.terms.moduli))
+        grid = 2 if oversampling == "auto" else int(oversampling)
+        # a line takes as long as ten cases; on the first grids cases visit few of the nodes
+        nodes += _lines(block, setting) * setting.roughness.points * grid * (10 + 0.5 * solves * visits)
+    return 1e-4 + SECONDS_A_NODE * nodes
 
 
 def memory(block: Block[SlidingFriction]) -> float:
-    """Estimate the peak memory of a block: the arrays of one line on its finest grid."""
-    largest = 0.0
-    for setting, oversampling in zip(
-        sliding_problems(block).settings, block.column("oversampling").tolist(), strict=True
-    ):
-        kelvin = setting.arms is None
-        grid = oversampling if oversampling != "auto" else SETTINGS.finest if kelvin else FINEST
-        largest = max(largest, setting.roughness.points * grid * (2 * ARRAYS if kelvin else ARRAYS_GENERAL))
-    return 8 * largest
+    """Estimate the peak memory of a block: one line on the grid that its cases usually need."""
+    problems, nodes = sliding_problems(block), 0.0
+    for setting, (oversampling, _), _ in _groups(block, problems):
+        grid = oversampling
+        if oversampling == "auto":
+            is_plane = setting.terms is None and setting.body is None
+            grid = USUAL_ON_PLANES if is_plane else USUAL
+        nodes = max(nodes, setting.roughness.points * float(grid))
+    return BYTES_A_NODE * nodes

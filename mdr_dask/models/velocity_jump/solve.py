@@ -83,7 +83,7 @@ def compute(block: Block[VelocityJump]) -> Result:
 def _groups(block: Block[VelocityJump], problems: SlidingProblems) -> Iterator[_Group]:
     """Yield the cases that are solved together: marched on one grid of a line, or each followed alone."""
     alone = [
-        j if setting.arms is not None or setting.body is not None or protocol.shape != "jump" else None
+        j if setting.terms is not None or setting.body is not None or protocol.shape != "jump" else None
         for j, (setting, protocol) in enumerate(zip(problems.settings, each(block, "protocol"), strict=True))
     ]
     grids = block.column("oversampling").tolist(), block.column("steps_per_decade").tolist()

@@ -1,4 +1,4 @@
-"""Cases of one line, and their steady states: what every solver of a Kelvin solid takes and gives."""
+"""Cases of steady sliding on one line, and their steady states: the input and output of every solver."""
 
 from __future__ import annotations
 
@@ -13,9 +13,12 @@ from mdr_dask.physics.outcome import Outcome
 
 Scheme = Literal["hermite", "piecewise_linear", "backward_euler"]
 
+COLUMNS = ("drag", "depth", "contact_fraction", "contact_slope")
+"""The results of a case, in this order wherever they are rows of one array."""
+
 
 class Cases(NamedTuple):
-    """Deborah numbers and loads of cases on a line, one entry for each."""
+    """Deborah numbers and loads of cases on a line, one entry per case."""
 
     deborah: FloatArray
     loads: FloatArray
@@ -23,7 +26,7 @@ class Cases(NamedTuple):
 
 @dataclass(frozen=True)
 class Steady:
-    """Steady states, one entry for every case.
+    """Steady states, one entry per case.
 
     Parameters
     ----------
@@ -45,25 +48,23 @@ class Steady:
     contact_slope: FloatArray
     status: NDArray[np.int8]
 
+    @property
+    def columns(self) -> FloatArray:
+        """The results as rows of one array, shape (4, cases)."""
+        return np.array([self.drag, self.depth, self.contact_fraction, self.contact_slope])
+
+    @classmethod
+    def of(cls, columns: FloatArray, status: NDArray[np.int8]) -> Steady:
+        """Return steady states from the rows of an array, NaN where a case has not converged."""
+        drag, depth, fraction, slope = np.where(status == Outcome.CONVERGED, columns, np.nan)
+        return cls(drag, depth, fraction, slope, status)
+
     def only(self, cases: NDArray[Any]) -> Steady:
         """Return some of the cases."""
         return Steady(**{name: column[cases] for name, column in vars(self).items()})
 
-    def replaced(self, cases: NDArray[Any], other: Steady) -> Steady:
-        """Return all cases, some of them from another solution."""
-        columns = {name: column.copy() for name, column in vars(self).items()}
-        for name, column in columns.items():
-            column[cases] = vars(other)[name]
-        return Steady(**columns)
-
-
-def unsolved(cases: int) -> Steady:
-    """Return what is known of cases before they are solved."""
-    nothing = np.full(cases, np.nan)
-    return Steady(nothing, nothing, nothing, nothing, np.full(cases, Outcome.INVALID, np.int8))
-
 
 def valid(deborah: FloatArray, loads: FloatArray) -> NDArray[np.bool_]:
-    """Return which cases are numbers above zero."""
+    """Return which cases have a positive, finite Deborah number and load."""
     good: NDArray[np.bool_] = np.isfinite(deborah) & np.isfinite(loads) & (deborah > 0) & (loads > 0)
     return good

@@ -14,10 +14,10 @@ import numpy as np
 
 from mdr_dask.arrays import FloatArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.cases import Steady, unsolved
+from mdr_dask.physics.sliding.cases import Steady
 from mdr_dask.physics.surfaces.waves import Waves, series
 
-SEEN = 2  # nodes for every Nyquist point, so that what lies between them is known to 41 %
+OVERSAMPLING = 2  # nodes per Nyquist point: the pressure between them is bounded to 41 %
 DEEP = 4.0  # load over the rms of the pressure of the waves, below which contact is hardly ever that full
 ROUNDING = 1e-12  # relative error of sums over a spectrum
 
@@ -73,7 +73,6 @@ def steady_full_contact(
     full[full] = highest[which] < loads[full] * np.cos(np.pi * waves.coefficients.size / height.size)
     if not np.any(full):
         return None
-    steady = unsolved(loads.size)
-    steady.status[full] = Outcome.CONVERGED
-    drag, depth, slopes = (np.where(full, column, np.nan) for column in (drag, loads, np.sqrt(stretch)))
-    return Steady(drag, depth, np.where(full, 1.0, np.nan), slopes, steady.status)
+    status = np.where(full, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
+    slopes, ones = np.full(loads.size, np.sqrt(stretch)), np.ones(loads.size)
+    return Steady.of(np.array([drag, loads, ones, slopes]), status)

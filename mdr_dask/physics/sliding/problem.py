@@ -1,153 +1,158 @@
-"""Steady sliding without units: a solid, a line and cases of speed and load; the solver is picked by the solid.
+"""Steady sliding without units: a solid, a line and cases of speed and load. The solid decides the solver.
 
-A Kelvin solid goes to the sweep of `kelvin`, by the ladder of grids of `accuracy`; a smooth indenter of it to its
-closed form; any other solid to `viscoelastic`.
+A Kelvin solid goes to `kelvin_refinement`, a smooth indenter of a Kelvin solid to its closed form, any other solid to
+`viscoelastic`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.outcome import Outcome
-from mdr_dask.physics.sliding.accuracy import COLUMNS, Errors, Ladder, in_full_contact, relative
-from mdr_dask.physics.sliding.cases import Scheme, Steady, unsolved, valid
-from mdr_dask.physics.sliding.full_contact import SEEN
+from mdr_dask.physics.refine import Solution, refine
+from mdr_dask.physics.sliding import full_contact
+from mdr_dask.physics.sliding.cases import Scheme, Steady, valid
+from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases, nodes_of
 from mdr_dask.physics.surfaces.rough_line import RoughLine
 from mdr_dask.physics.surfaces.shapes import COLUMNS as CLOSED_COLUMNS
 from mdr_dask.physics.surfaces.shapes import PowerLaw, smooth
 
-COARSEST, FINEST = 4, 256  # points for every Nyquist point that `auto` begins and ends with for a general solid
-ROUGHLY = 0.05  # accuracy that the coarsest mostly meets; stated errors fall with the third power of the points
-CELLS = 4  # the general solver compares grids of every, every second and every fourth node
+GENERAL_LEVELS = tuple(2**k for k in range(1, 9))  # nodes per Nyquist point of a general solid
 CLOSED_FORM = 1e-12  # relative error of a smooth indenter: rounding
 
 
 @dataclass(frozen=True)
-class Arms:
-    """The relaxing arms of a solid as a line passes: G_m / G_inf and tau_m v / L."""
+class PronyTerms:
+    """The Prony terms of a solid in units of the line: G_m / G_inf and tau_m v / L."""
 
     moduli: tuple[float, ...] = ()
     deborah: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
-class Aim:
-    """What is wanted of a solution.
+class Request:
+    """The accuracy, or the grid, that a caller asks for.
 
     Parameters
     ----------
-    columns : collection of str
-        Columns of a `Steady`: what an accuracy is asked of.
     accuracy : float
-        Relative error allowed for each of them.
+        Relative error allowed for drag, contact fraction and contact slope; that of the depth is relative to the rms
+        height where the depth is smaller.
     oversampling : int or "auto"
-        Nodes for every Nyquist point; "auto" for the fewest that meet the accuracy.
+        Nodes per Nyquist point; "auto" for the fewest that meet the accuracy.
     scheme : {"hermite", "piecewise_linear", "backward_euler"}
-        Of a Kelvin solid.
+        Scheme of a Kelvin solid.
     with_errors : bool
         Whether errors are wanted on a grid that is given.
+    contact : bool
+        Whether fraction and slope of the contact are wanted.
     """
 
-    columns: Collection[str] = COLUMNS
     accuracy: float = 0.01
     oversampling: int | Literal["auto"] = "auto"
     scheme: Scheme = "hermite"
     with_errors: bool = True
+    contact: bool = True
 
 
 def solve(
-    line: RoughLine, arms: Arms | None, deborah: FloatArray, loads: FloatArray, aim: Aim
-) -> tuple[Steady, Errors]:
-    """Return the steady states of a solid that slides over a line, and their absolute discretisation errors.
+    line: RoughLine, terms: PronyTerms | None, deborah: FloatArray, loads: FloatArray, request: Request
+) -> tuple[Steady, FloatArray]:
+    """Return the steady states of a solid that slides over a line, and their errors.
 
     Parameters
     ----------
     line : RoughLine
-        What it slides over.
-    arms : Arms or None
-        Of the solid; None for a Kelvin solid.
+        The line, in units of its length and of one height.
+    terms : PronyTerms or None
+        Prony terms of the solid; None for a Kelvin solid.
     deborah : array, shape (cases,)
         eta v / (G_inf L) of the dashpot: the Deborah number v tau / L of a Kelvin solid.
     loads : array, shape (cases,)
         F_N / (4 G_inf L), in the unit of height.
-    aim : Aim
-        What is wanted.
+    request : Request
+        Accuracy or grid.
+
+    Returns
+    -------
+    Steady
+    array, shape (4, cases)
+        Estimated absolute discretisation errors of the columns of the steady states.
     """
-    if arms is not None:
-        return _general(line, arms, deborah, loads, aim)
+    if terms is not None:
+        return _general(line, terms, deborah, loads, request)
     is_smooth = not np.any(line.roughness.coefficients)
     if is_smooth and (line.body is None or isinstance(line.body, PowerLaw)):
         return _closed_form(line.body, deborah, loads)
-    ladder = Ladder(line, aim.scheme, deborah, loads, aim.columns)
-    if aim.oversampling == "auto":
-        return ladder.to_accuracy(aim.accuracy)
-    if aim.with_errors:
-        return ladder.with_errors(aim.oversampling)
-    return ladder.on_grid(aim.oversampling), Errors.unknown(loads.size)
+    cases = KelvinCases(line, request.scheme, deborah, loads, request.contact)
+    if request.oversampling == "auto":
+        return cases.to_accuracy(request.accuracy)
+    if request.with_errors:
+        return cases.with_errors(request.oversampling)
+    return cases.on_grid(request.oversampling), np.full((4, loads.size), np.inf)
 
 
-def _general(line: RoughLine, arms: Arms, deborah: FloatArray, loads: FloatArray, aim: Aim) -> tuple[Steady, Errors]:
-    """Solve cases of any linear solid one by one, each on the coarsest grid that meets the accuracy."""
-    from mdr_dask.physics.sliding.viscoelastic import ViscoelasticLadder  # kernels that few studies need
+def _general(
+    line: RoughLine, terms: PronyTerms, deborah: FloatArray, loads: FloatArray, request: Request
+) -> tuple[Steady, FloatArray]:
+    """Solve cases of any linear solid."""
+    from mdr_dask.physics.sliding import viscoelastic  # kernels that few studies need
     from mdr_dask.physics.solids import prony
 
-    steady, errors = unsolved(loads.size), Errors.unknown(loads.size)
-    if line.body is None and aim.oversampling == "auto":
-        nodes = line.points * SEEN
-        pairs = tuple(zip(arms.moduli, arms.deborah, strict=True))
-        on_nodes = line.heights(nodes), line.slopes(nodes)
-        steady, errors = in_full_contact(line, pairs, on_nodes, deborah, loads) or (steady, errors)
-    left = (
-        (steady.status != Outcome.CONVERGED) & np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
-    )
-    finer = max(0, int(np.ceil(np.log2(ROUGHLY / aim.accuracy) / 3)))
-    first = min(COARSEST * 2**finer, FINEST) if aim.oversampling == "auto" else aim.oversampling
+    columns, errors = np.full((4, loads.size), np.nan), np.full((4, loads.size), np.inf)
+    status = np.full(loads.size, Outcome.INVALID, np.int8)
+    if line.body is None and request.oversampling == "auto":
+        pairs = tuple(zip(terms.moduli, terms.deborah, strict=True))
+        steady = full_contact.steady_full_contact(line.roughness, pairs, nodes_of(line), deborah, loads)
+        if steady is not None:
+            columns, status = steady.columns, steady.status
+            errors = full_contact.ROUNDING * np.abs(columns)
+    good = np.isfinite(deborah) & (deborah >= 0) & np.isfinite(loads) & (loads > 0)
+    left = np.flatnonzero((status != Outcome.CONVERGED) & good)
+    if not left.size:
+        return Steady.of(columns, status), errors
     turned = line.from_summit()
-    straight = cache(lambda oversampling: turned.straight(-(-line.points * oversampling // CELLS) * CELLS))
-    for k in np.flatnonzero(left):
-        ladder = ViscoelasticLadder(prony(1.0, arms.moduli, arms.deborah, deborah[k]), float(loads[k]))
-        oversampling = first
-        while True:
-            found = ladder.on(straight(oversampling))
-            one = _columns(found.values[:, None], np.array([found.status], np.int8))
-            known = Errors(*found.errors[:, None])
-            met = np.all(relative(one, known, aim.columns) <= aim.accuracy)
-            if aim.oversampling != "auto" or met or found.status.is_impossible or oversampling >= FINEST:
-                break
-            oversampling *= 2
-        steady, errors = steady.replaced(np.array([k]), one), errors.replaced(np.array([k]), known)
-    return steady, errors
+    # cells of the coarsest grid; the results on each grid are extrapolated with the grid before
+    coarsest = line.points if request.oversampling == "auto" else -(-line.points * request.oversampling // 4)
+    levels = GENERAL_LEVELS if request.oversampling == "auto" else GENERAL_LEVELS[:2]
+    accuracy = request.accuracy if request.oversampling == "auto" else np.inf
+    lines: dict[int, FloatArray] = {}
+    for k in left:
+        solid = prony(1.0, terms.moduli, terms.deborah, deborah[k])
+        case = viscoelastic.ViscoelasticCase(solid, float(loads[k]))
+
+        def on_grid(level: int, _: IntArray | None, case: viscoelastic.ViscoelasticCase = case) -> Solution:
+            if level not in lines:
+                lines[level] = turned.straight(coarsest * level).height
+            return case.on(lines[level], line.body is None)
+
+        on_grid(1, None)
+        found = refine(on_grid, 1, levels, accuracy, viscoelastic.ORDER, floors=FLOORS)
+        status[k], columns[:, k], errors[:, k] = found.outcome[0], np.concatenate(found.values), found.errors[:, 0]
+    # stresses are known to the tolerance of the depth, and the drag of very fast or slow sliding is their small sum
+    rounding = viscoelastic.TOLERANCE * loads[left] * columns[3, left]
+    errors[0, left] += np.where(np.isnan(rounding), 0.0, rounding)
+    return Steady.of(columns, status), errors
 
 
-def _columns(values: FloatArray, status: NDArray[np.int8]) -> Steady:
-    """Return steady states from the rows of their columns."""
-    drag, depth, fraction, slope = values
-    return Steady(drag, depth, fraction, slope, status)
-
-
-def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) -> tuple[Steady, Errors]:
-    """Solve a Kelvin solid without roughness: a plane has no friction, an indenter is known in closed form."""
-    steady = unsolved(loads.size)
+def _closed_form(body: PowerLaw | None, deborah: FloatArray, loads: FloatArray) -> tuple[Steady, FloatArray]:
+    """Solve a Kelvin solid without roughness: a plane has no friction, an indenter has a closed form."""
     good = valid(deborah, loads)
-    steady.status[good] = Outcome.CONVERGED
+    status = np.where(good, np.int8(Outcome.CONVERGED), np.int8(Outcome.INVALID))
+    columns = np.full((4, loads.size), np.nan)
     if body is None:
-        nothing, whole = np.where(good, 0.0, np.nan), np.where(good, 1.0, np.nan)
-        steady = Steady(nothing, np.where(good, loads, np.nan), whole, nothing, steady.status)
+        columns[:, good] = np.array([np.zeros(loads.size), loads, np.ones(loads.size), np.zeros(loads.size)])[:, good]
     elif np.any(good):
         found = np.empty((int(good.sum()), CLOSED_COLUMNS))
         coefficient, exponent = (np.full(len(found), number) for number in (body.coefficient, body.exponent))
         smooth(loads[good], deborah[good], coefficient, exponent, found)
         depth, drag, lead, trail, stretch = found.T
-        status = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
-        status = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, status).astype(np.int8)
-        columns = np.stack([drag, depth, lead + trail, np.sqrt(stretch / (lead + trail))])
-        columns[:, status != Outcome.CONVERGED] = np.nan
-        steady = steady.replaced(good, _columns(columns, status))
-    return steady, Errors(*(CLOSED_FORM * np.abs(getattr(steady, name)) for name in COLUMNS))
+        columns[:, good] = np.stack([drag, depth, lead + trail, np.sqrt(stretch / (lead + trail))])
+        outcome = np.where(np.isnan(depth), Outcome.DEPTH_NOT_FOUND, Outcome.CONVERGED)
+        status[good] = np.where(np.maximum(lead, trail) > 0.5, Outcome.OUTSIDE_LINE, outcome)
+    steady = Steady.of(columns, status)
+    return steady, CLOSED_FORM * np.abs(steady.columns)

@@ -3,8 +3,9 @@ import pytest
 
 from mdr_dask.physics.sliding import nodes as line_nodes
 from mdr_dask.physics.sliding import steady as sliding
-from mdr_dask.physics.sliding import vectorised
-from mdr_dask.physics.sliding.accuracy import COLUMNS, Ladder, relative
+from mdr_dask.physics.sliding.cases import Cases
+from mdr_dask.physics.sliding.kelvin_refinement import FLOORS, KelvinCases
+from mdr_dask.physics.sliding.node_to_node import NodeToNode
 from mdr_dask.physics.sliding.nodes import ends_of, nodes, refine, weights
 from mdr_dask.physics.surfaces import roughness
 from mdr_dask.physics.surfaces.cubic_line import periodic_line
@@ -27,11 +28,12 @@ def cases():
     return deborah.ravel(), loads.ravel()
 
 
-def settled(refinement, deborah, loads, height, slope, trusted=1e-9):
-    whole, *states = vectorised.begin(height, slope, deborah, loads, trusted)
-    for grid in 2 ** np.arange(1, np.log2(refinement) + 1, dtype=int):
-        states = states[-1], vectorised.settle(whole, int(grid), deborah, loads, tuple(states), trusted)
-    return states[-1]
+def settled(refinement, deborah, loads, height, slope, error=1e-9):
+    """Return drag, depth, contact fraction and slope on a grid of 2 * refinement nodes per Nyquist point."""
+    search, every = NodeToNode(height, slope, Cases(deborah, loads), error), np.arange(loads.size)
+    for level in 2 ** np.arange(int(np.log2(refinement)) + 2):
+        found = search.solve(int(level), every)
+    return np.array(found.values)
 
 
 def exact_states(deborah, loads, hurst=0.7, oversampling=64):
@@ -47,11 +49,12 @@ def test_grids_converge_to_the_exact_sweep(hurst):
     typical = []
     for refinement, most in ((1, 0.04), (2, 3e-3), (4, 5e-4)):
         state = settled(refinement, deborah, loads, height, slope)
-        error = np.abs(state.drag / exact.drag - 1)[many]
+        drag, depth, fraction, _ = state
+        error = np.abs(drag / exact.drag - 1)[many]
         typical.append(np.mean(error[error > 1e-9]))
         assert np.max(error) < most
-        assert state.contact_fraction[many] == pytest.approx(exact.contact_fraction[many], rel=20 * most)
-        assert state.depth[many] == pytest.approx(exact.depth[many], abs=most, rel=most)
+        assert fraction[many] == pytest.approx(exact.contact_fraction[many], rel=20 * most)
+        assert depth[many] == pytest.approx(exact.depth[many], abs=most, rel=most)
     # about fourth order, down to what the sums over whole blocks leave
     assert typical[1] < typical[0] / 6
     assert typical[2] < 5e-5
@@ -60,11 +63,11 @@ def test_grids_converge_to_the_exact_sweep(hurst):
 def test_full_contact_is_exact_on_any_grid():
     height, slope, rms = line()
     deborah, loads = np.array([1e-4, 1e-3]), np.array([50.0, 300.0])
-    _, _, state = vectorised.begin(height, slope, deborah, loads, 5e-3)
-    assert state.drag == pytest.approx(deborah * rms**2, rel=1e-11)
-    assert state.contact_fraction == pytest.approx(1.0)
-    assert state.contact_slope == pytest.approx(rms, rel=1e-11)
-    assert state.depth == pytest.approx(loads, rel=1e-11)
+    drag, depth, fraction, contact_slope = settled(1, deborah, loads, height, slope, 5e-3)
+    assert drag == pytest.approx(deborah * rms**2, rel=1e-11)
+    assert fraction == pytest.approx(1.0)
+    assert contact_slope == pytest.approx(rms, rel=1e-11)
+    assert depth == pytest.approx(loads, rel=1e-11)
 
 
 @pytest.mark.parametrize(("hurst", "refinement"), [(0.0, 2), (0.7, 2), (0.7, 8)])
@@ -112,9 +115,7 @@ def test_a_case_is_the_same_among_any_others(count):
 
     everything = solve(np.arange(loads.size))
     some = np.random.default_rng(count).permutation(loads.size)[:count]
-    alone = solve(some)
-    for column, same in zip(alone, everything.only(some), strict=True):
-        assert column.tobytes() == same.tobytes()
+    assert solve(some).tobytes() == everything[:, some].tobytes()
 
 
 def test_a_line_that_does_not_divide_by_the_blocks():
@@ -124,7 +125,7 @@ def test_a_line_that_does_not_divide_by_the_blocks():
     fine = periodic_line(*(roughness.line(amplitude, phase, 52 * 64, order) for order in (0, 1)))
     deborah, loads = np.array([1e-3, 1e-2]), np.array([0.3, 1.0])
     state = settled(8, deborah, loads, height, slope)
-    assert state.drag == pytest.approx(sliding.steady_sliding(fine, deborah, loads).drag, rel=0.002)
+    assert state[0] == pytest.approx(sliding.steady_sliding(fine, deborah, loads).drag, rel=0.002)
 
 
 def random_line(generator, points, hurst):
@@ -132,46 +133,59 @@ def random_line(generator, points, hurst):
     return RoughLine(Waves(share * np.exp(2j * np.pi * generator.uniform(size=points // 2)), points), None)
 
 
+def truth(surface, deborah, loads, oversampling=64):
+    return KelvinCases(surface, "hermite", deborah, loads).on_grid(oversampling)
+
+
 def test_planes_are_solved_from_node_to_node(monkeypatch):
-    """An ordinary plane is not swept through, which takes several times as long, and finds what sweeps find."""
+    """Most planes are not swept through cell by cell, which takes several times as long."""
     surface, deborah, loads = random_line(np.random.default_rng(4), 400, 0.7), *np.array([[1e-2, 0.1], [0.3, 3.0]])
     swept = truth(surface, deborah, loads)
     monkeypatch.setattr(sliding, "steady_sliding", None)
-    steady, errors = Ladder(surface, "hermite", deborah, loads, COLUMNS).to_accuracy(0.01)
-    assert np.all(np.abs(steady.drag - swept.drag) <= errors.drag)
-    assert np.all(errors.drag <= 0.01 * steady.drag)
+    steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(0.01)
+    assert np.all(np.abs(steady.drag - swept.drag) <= errors[0])
+    assert np.all(errors[0] <= 0.01 * steady.drag)
 
 
-def truth(surface, deborah, loads, oversampling=128):
-    count = surface.points * oversampling
-    line = periodic_line(surface.heights(count), surface.slopes(count))
-    return sliding.steady_sliding(line, deborah, loads)
-
-
-def light_and_slow(generator, cases):
-    """Yield random planes that hardly touch and move slowly: v tau far below the length of a cell."""
-    for _ in range(cases):
-        points = 2 * int(10 ** generator.uniform(1.5, 2.8) / 2)
-        hurst = generator.uniform()
+def drawn(seed, lines):
+    """Yield random planes, from few nodes in contact to all, from slow to fast, six cases each."""
+    random = np.random.default_rng(seed)
+    for _ in range(lines):
+        points, hurst = 2 * int(10 ** random.uniform(1.5, 3) / 2), random.choice([0.0, random.uniform()])
         slope = roughness.spectral_slope(roughness.amplitudes(points // 2, hurst))
-        loads = 10 ** generator.uniform(-6, 0, 3) / 4
-        deborah = 10 ** generator.uniform(-6, np.log10(0.3), 3) / slope
-        yield random_line(generator, points, hurst), deborah, loads
+        deborah, loads = 10 ** random.uniform(-4, 3, 6) / slope, 10 ** random.uniform(-5.5, 0.5, 6)
+        yield random_line(random, points, hurst), deborah, loads
 
 
-@pytest.mark.parametrize("accuracy", [0.05, 0.01, 0.002])
-def test_light_and_slow_planes_know_their_error(accuracy):
-    generator = np.random.default_rng(7)
-    ratios, missed, total = [], 0, 0
-    for surface, deborah, loads in light_and_slow(generator, 20):
-        steady, errors = Ladder(surface, "hermite", deborah, loads, ["drag"]).to_accuracy(accuracy)
-        exact = truth(surface, deborah, loads)
-        ratios.extend(np.abs(steady.drag - exact.drag) / errors.drag)
-        missed += np.sum(np.abs(steady.drag / exact.drag - 1) > accuracy)
-        total += loads.size
-    assert np.mean(np.array(ratios) <= 1) >= 0.95
-    assert np.max(ratios) < 3
-    assert missed == 0
+def judged(seed, lines, accuracy):
+    """Return errors over estimates and over the accuracy for drag, contact fraction and slope, shape (3, cases)."""
+    ratios, shares = [], []
+    for surface, deborah, loads in drawn(seed, lines):
+        steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(accuracy)
+        exact = truth(surface, deborah, loads).columns
+        off = np.abs(steady.columns - exact)
+        floors = np.array(FLOORS)[:, None]
+        assert np.all(off[1] <= errors[1] + 1e-6)  # the depth converges fastest
+        ratios.append((off / (errors + 1e-6 * np.maximum(exact, floors)))[[0, 2, 3]])
+        met = errors <= 1.0001 * accuracy * np.maximum(np.abs(steady.columns), floors)
+        shares.append(np.where(met, off / np.maximum(np.abs(exact), floors), 0.0)[[0, 2, 3]])
+    return np.hstack(ratios), np.hstack(shares)
+
+
+@pytest.mark.parametrize("accuracy", [0.05, 0.01])
+def test_errors_are_below_their_estimates(accuracy):
+    ratios, shares = judged(7, 15, accuracy)
+    assert np.mean(ratios <= 1) >= 0.93
+    assert np.mean(shares > accuracy) <= 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("accuracy", [0.05, 0.01, 0.002, 2e-4])
+def test_nineteen_errors_of_twenty_are_below_their_estimates(accuracy):
+    ratios, shares = judged(11, 120, accuracy)
+    assert np.mean(ratios <= 1) >= 0.95
+    assert np.mean(ratios > 10) <= 0.005
+    assert np.mean(shares > accuracy) <= 0.01
 
 
 @pytest.mark.parametrize(
@@ -182,32 +196,26 @@ def test_light_and_slow_planes_know_their_error(accuracy):
     ],
 )
 def test_edges_of_the_contact_in_slow_sliding(points, hurst, force, velocity):
-    # all grids agreed on friction 23 % too small, and 4 % too large
+    """Lines on which coarse grids agree on friction that is 23 % too small and 4 % too large."""
     deborah, loads = np.array([velocity * 1e-3 / 0.02]), np.array([force / (4 * 1e7 * 0.02 * 0.5e-6)])
-    turned = roughness.phase_factors(31337, 0, points // 2)
-    surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * turned, points), None)
+    factors = roughness.phase_factors(31337, 0, points // 2)
+    surface = RoughLine(Waves(0.5 * roughness.amplitudes(points // 2, hurst) * factors, points), None)
     exact = truth(surface, deborah, loads)
     for accuracy in (0.05, 0.01, 0.002):
-        steady, errors = Ladder(surface, "hermite", deborah, loads, COLUMNS).to_accuracy(accuracy)
-        for name in COLUMNS:
-            assert np.abs(getattr(steady, name) - getattr(exact, name)) <= getattr(errors, name)
-        assert np.all(relative(steady, errors) <= accuracy)
+        steady, errors = KelvinCases(surface, "hermite", deborah, loads).to_accuracy(accuracy)
+        assert np.all(np.abs(steady.columns - exact.columns) <= errors)
+        assert np.all(errors <= accuracy * np.maximum(np.abs(steady.columns), np.array(FLOORS)[:, None]))
 
 
-@pytest.mark.parametrize("accuracy", [0.05, 0.01, 0.002, 2e-4])
-def test_every_column_knows_its_error(accuracy):
-    generator = np.random.default_rng(11)
-    held, ratios = [], []
-    for _ in range(12):
-        surface = random_line(generator, int(generator.choice([100, 400, 1000])), generator.uniform())
-        deborah, loads = 10 ** generator.uniform(-5, 0, 4), 10 ** generator.uniform(-3, 1.5, 4)
-        steady, errors = Ladder(surface, "hermite", deborah, loads, COLUMNS).to_accuracy(accuracy)
-        exact = truth(surface, deborah, loads)
-        for name in COLUMNS:
-            error = np.abs(getattr(steady, name) - getattr(exact, name))
-            held.extend(error <= getattr(errors, name) + 1e-7 * np.abs(getattr(exact, name)))
-            if name == "drag":
-                ratios.extend(error / getattr(errors, name))
-        assert np.all(relative(steady, errors) <= accuracy)
-    assert np.mean(held) >= 0.95
-    assert np.max(ratios) < 3
+@pytest.mark.parametrize("scheme", ["hermite", "piecewise_linear", "backward_euler"])
+@pytest.mark.parametrize("oversampling", [1, 8])
+def test_errors_on_a_given_grid(scheme, oversampling):
+    ratios = []
+    for surface, deborah, loads in drawn(3, 8):
+        cases = KelvinCases(surface, scheme, deborah, loads)
+        steady, errors = cases.with_errors(oversampling)
+        assert np.array_equal(steady.drag, cases.on_grid(oversampling).drag, equal_nan=True)
+        ratios.append(np.abs(steady.drag - truth(surface, deborah, loads).drag) / errors[0])
+    known = np.concatenate(ratios)
+    assert np.mean(known[np.isfinite(known)] <= 1.01) >= 0.9
+    assert np.mean(np.isfinite(known)) > 0.6

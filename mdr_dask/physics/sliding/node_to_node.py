@@ -1,12 +1,15 @@
-"""Cases of a Kelvin foundation that go along a periodic line together, from node to node.
+"""Steady sliding of a Kelvin foundation from node to node of a periodic line, for many cases at once.
 
-In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De its Deborah number
-v tau in cells. An element leaves where the force w + De w' falls to 0 and touches where the gap closes. A cell that is
-partly in contact adds positive terms only, so that nothing cancels in slow sliding: of the piece in contact the
-integrals of w and of De w'^2, of a flight those of u and u^2 / De. Cells wholly in contact are integrated exactly, so
-that full contact is exact on any grid. Everything is measured in cells, as in `kelvin`. The cases of a line pass a tile
-of it together: by closed sums, in vector instructions over the cases, or one after the other from event to event, past
-the cells that they touch all along or cannot reach. Each does the same arithmetic whatever runs beside it.
+In a cell the line is a cubic through heights and slopes at its ends, w = d + h + s x + ..., and De is the Deborah
+number v tau in cells. An element leaves contact where the force w + De w' falls to 0 and touches where the gap closes.
+A cell that is partly in contact adds positive terms only, so that nothing cancels in slow sliding: over the piece in
+contact the integrals of w and of De w'^2, over a free piece those of u and u^2 / De. Cells wholly in contact are
+integrated exactly, so that full contact is exact on any grid. Everything is measured in cells, as in `kelvin`.
+
+The cases pass the line together, block by block. Whether a block is wholly in contact or wholly free is decided for
+all cases at once by vector instructions, and its integrals are closed sums. Through the other blocks each case goes
+from cell to cell. Every case does the same arithmetic whichever cases run beside it. The depth that carries the load
+is found by Newton's method, on finer and finer grids, each from the depth on the grid before.
 """
 
 from __future__ import annotations
@@ -17,16 +20,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mdr_dask.arrays import FloatArray
+from mdr_dask.arrays import FloatArray, IntArray
 from mdr_dask.physics.jit import jit, jit_inline
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import Solution
+from mdr_dask.physics.sliding.cases import Cases
 from mdr_dask.physics.sliding.nodes import (
     AFTER,
     BEFORE,
     BLOCK,
     HEIGHT,
     HEIGHTS,
+    IN_A_TILE,
     LOWEST,
     MEAN,
+    NO_ENDS,
     PEAK,
     SLOPE,
     SQUARE,
@@ -34,17 +42,34 @@ from mdr_dask.physics.sliding.nodes import (
     STEEPEST,
     TOP,
     Nodes,
+    ends_of,
     fill,
+    nodes,
+    weights,
+    with_summit,
 )
+from mdr_dask.physics.surfaces.cubic_line import highest_point
 
-LANES = 64  # cases that go along the line together
+LANES = 64  # cases that pass the line together
 SMALL, LARGE = 1e-300, 1e12
-CLOSED = 1e-9  # relative difference of the displacement before and after a turn
+CLOSED = 1e-9  # relative difference of the displacement before and after a period that counts as a closed period
+RESOLVED = 5  # cells in contact below which a grid does not resolve the contact
+
+ITERATIONS = 25
+COARSENING, COARSEST = 4, 64  # the search starts on a grid of at most so many times so many nodes
+LAST_STEP = 0.03  # relative step of the depth that may be the last: its results are extrapolated along their secants
+SECANT_ERROR = 0.1  # relative error of such an extrapolation
+FIRST_STEP, FIRST_ERROR = 0.1, 0.03  # the last step on a grid that only starts the next one, and its error of the drag
+ROUNDING = 1e-12  # relative step of the depth that is rounding
+AHEAD = 1 / 16  # of the last change of the depth between grids, expected of the next one: fourth order
 
 ROWS = 15
-# Where what a sweep holds of its cases begins, in this order: their state, sums, and what does not change
+# Where each quantity of the cases begins in the workspace of a sweep: state, sums, and constants of a case
 U, FADE, CONTACT, LOAD, RATE, LOSS, LENGTH, STRETCH = range(0, 8 * LANES, LANES)
 DEPTH, DEBORAH, DECAY, INVERSE, THROUGH, BEGAN, CALM = range(8 * LANES, ROWS * LANES, LANES)
+# Results of a case that are extrapolated along secants
+DRAG, FRACTION, CONTACT_SLOPE = range(3)
+SECANTS = 3
 
 
 @jit_inline
@@ -301,3 +326,177 @@ def load_case(workspace: FloatArray, k: int, depth: float, deborah: float, cells
     workspace[DEPTH + k], workspace[DEBORAH + k] = depth, deborah
     workspace[INVERSE + k] = min(1 / deborah, LARGE)
     workspace[DECAY + k], workspace[THROUGH + k] = math.exp(-1 / deborah), math.exp(-cells / deborah)
+
+
+class _Workspace(NamedTuple):
+    """Arrays of a search: a tile of the line, the state of the cases, and the results of the last sweep."""
+
+    tile: FloatArray
+    states: FloatArray
+    queue: NDArray[np.int64]
+    lanes: NDArray[np.int64]
+    last_step: FloatArray
+    last: FloatArray
+    now: FloatArray
+    rate: FloatArray
+
+    @classmethod
+    def on(cls, refinement: int) -> _Workspace:
+        """Return the arrays for a grid."""
+        tile, (queue, lanes) = np.empty((IN_A_TILE, BLOCK * refinement + 3)), np.empty((2, LANES), np.int64)
+        last_step, last, (now, rate) = np.empty(LANES), np.empty((LANES, SECANTS)), np.empty((2, SECANTS))
+        return cls(tile, np.empty(ROWS * LANES), queue, lanes, last_step, last, now, rate)
+
+
+@jit
+def _search(
+    line: Nodes,
+    weights: FloatArray,
+    cases: Cases,
+    last_step: float,
+    error: float,
+    depths: FloatArray,
+    rates: FloatArray,
+    results: FloatArray,
+    place: _Workspace,
+) -> None:
+    """Find the depths of cases on a grid by Newton's method; the last step is taken without another sweep.
+
+    Parameters
+    ----------
+    line : Nodes
+        The line on a grid.
+    weights : array, shape (2, refinement, 4 WING)
+        From `weights`.
+    cases : Cases
+        v tau / L, and F_N / (4 G L) in the unit of height.
+    last_step, error : float
+        Largest relative last step of the depth, and the error of the drag that it may leave.
+    depths : array, shape (cases,)
+        Penetration of the summit: the start on entry, the solution on return.
+    rates : array, shape (cases, SECANTS)
+        Relative changes of the results with the depth, NaN where they are not known; updated.
+    results : array, shape (cases, SECANTS)
+        Written where a depth is found.
+    place : _Workspace
+        On this grid.
+    """
+    (deborah, loads), rise = cases, line.rise
+    refinement = weights.shape[1]
+    n, cells = (line.height.size - BEFORE - AFTER) * refinement, BLOCK * refinement
+    workspace, lanes = place.states, place.lanes
+    step_before, last, now, rate = place.last_step, place.last, place.now, place.rate
+    for begin in range(0, loads.size, LANES):
+        rest = loads.size - begin
+        count = LANES if rest > LANES else rest
+        for k in range(count):
+            lanes[k] = begin + k
+            step_before[k] = np.nan
+            load_case(workspace, k, depths[begin + k] - rise, deborah[begin + k] * n, cells)
+        for _ in range(ITERATIONS):
+            if count == 0:
+                break
+            sweep(line, weights, place.tile, workspace, place.queue, count)
+            kept = 0
+            for k in range(count):
+                case = lanes[k]
+                depth = workspace[DEPTH + k] + rise
+                step = (loads[case] * n - workspace[LOAD + k]) / workspace[RATE + k]
+                size = abs(step) / depth
+                length, stretch = workspace[LENGTH + k], workspace[STRETCH + k]
+                now[DRAG], now[FRACTION] = workspace[LOSS + k], length / n
+                now[CONTACT_SLOPE] = n * math.sqrt(stretch / length) if length > 0 else 0.0
+                for j in range(SECANTS):
+                    rate[j] = (1 - last[k, j] / now[j]) / step_before[k]
+                    rate[j] = rate[j] if math.isfinite(rate[j]) else rates[case, j]
+                    if size < ROUNDING and not math.isfinite(rate[j]):
+                        rate[j] = 0.0
+                closes = abs(workspace[U + k] - workspace[BEGAN + k]) <= CLOSED * workspace[U + k]
+                if size <= last_step and SECANT_ERROR * abs(rate[DRAG] * step) <= error and closes:
+                    depths[case] = depth + step
+                    for j in range(SECANTS):
+                        rates[case, j] = rate[j]
+                        results[case, j] = now[j] * (1 + rate[j] * step)
+                    continue
+                ahead = depth + step if step > -0.7 * depth else 0.3 * depth
+                step_before[kept], lanes[kept] = ahead - depth, case
+                for j in range(SECANTS):
+                    last[kept, j] = now[j]
+                load_case(workspace, kept, ahead - rise, workspace[DEBORAH + k], cells)
+                kept += 1
+            count = kept
+
+
+class NodeToNode:
+    """Cases on one line, solved on one grid after the other.
+
+    Parameters
+    ----------
+    height, slope : array, shape (nodes,)
+        Heights of a periodic line and their derivative by position over its length, at two nodes per Nyquist point.
+    cases : Cases
+        v tau / L and F_N / (4 G L), positive and finite.
+    error : float
+        Relative error of the drag that the search for the depth may leave.
+    """
+
+    def __init__(self, height: FloatArray, slope: FloatArray, cases: Cases, error: float) -> None:
+        self._height, self._slope, self._cases, self._error = height, slope, cases, error
+        loads = cases.loads
+        self._rates = np.full((loads.size, SECANTS), np.nan)
+        self._depth, self._change = np.full((2, loads.size), np.nan)  # of the mean line, and from the grid before
+
+    def solve(self, level: int, cases: IntArray) -> Solution:
+        """Solve cases on a grid of so many nodes per Nyquist point: 1 for all, then 2, 4, 8, ... for any.
+
+        Beyond 2 the grid is finer only in blocks where contact begins or ends; it follows from the heights and slopes
+        of the grid of 2.
+        """
+        if level == 1:
+            return self._start()
+        if level == 2:
+            cell, _, _ = highest_point(self._height, self._slope)
+            ends, first = ends_of(self._height, self._slope), (cell + 1) % self._height.size
+            self._line = with_summit(nodes(self._height, self._slope, first, 1, True, ends))
+        some, top = Cases(*(column[cases] for column in self._cases)), self._line.top + self._line.rise
+        depth, ahead = self._depth[cases] + top, AHEAD * self._change[cases]
+        depth += np.where(np.abs(ahead) < depth, ahead, 0.0)
+        start = np.where(depth > 0, depth, _shallow(some.loads))
+        rates, results = self._rates[cases], np.full((cases.size, SECANTS), np.nan)
+        refinement = level // 2
+        _search(
+            self._line, weights(refinement), some, LAST_STEP, self._error, start, rates, results,
+            _Workspace.on(refinement),
+        )  # fmt: skip
+        self._change[cases] = start - top - self._depth[cases] if level > 2 else np.nan
+        self._depth[cases], self._rates[cases] = start - top, rates
+        return self._solution(results, start - top, level)
+
+    def _start(self) -> Solution:
+        """Solve all cases on coarser and coarser grids from the coarsest on; return the results on the last."""
+        height, loads = self._height, self._cases.loads
+        strides = [2]
+        while height.size > COARSENING * COARSEST * strides[-1]:
+            strides.append(strides[-1] * COARSENING)
+        depths, results = _shallow(loads), np.empty((loads.size, SECANTS))
+        highest = int(np.argmax(height))
+        for stride in reversed(strides):
+            results.fill(np.nan)
+            line = nodes(height, self._slope, highest, stride, stride == strides[0], NO_ENDS)
+            _search(
+                line, weights(1), self._cases, FIRST_STEP, FIRST_ERROR, depths, self._rates, results, _Workspace.on(1)
+            )
+        self._depth = depths - line.top
+        return self._solution(results, self._depth, 1)
+
+    def _solution(self, results: FloatArray, depth: FloatArray, level: int) -> Solution:
+        drag, fraction, slope = results.T
+        with np.errstate(invalid="ignore"):
+            resolved = (drag > 0) & (fraction * (self._height.size // 2 * level) >= RESOLVED)
+        outcome = np.where(resolved, np.int8(Outcome.CONVERGED), np.int8(Outcome.DEPTH_NOT_FOUND))
+        return Solution([drag, depth, fraction, slope], outcome)
+
+
+def _shallow(loads: FloatArray) -> FloatArray:
+    """Return a penetration of the summit from which a search can start."""
+    return np.maximum(loads, loads ** (2 / 3))

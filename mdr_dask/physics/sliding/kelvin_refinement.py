@@ -1,0 +1,161 @@
+"""Steady states of a Kelvin solid to an accuracy: the grids on which each case is solved.
+
+Cases on a plane go from node to node first (`node_to_node`), because that is the fastest. Cubic cells (`steady`) take
+the cases that this leaves, all cases under an indenter, and accuracies below what the arithmetic from node to node
+allows. Both are refined by :func:`mdr_dask.physics.refine.refine`, which estimates the errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdr_dask.arrays import FloatArray, IntArray
+from mdr_dask.physics.outcome import Outcome
+from mdr_dask.physics.refine import Refined, Solution, refine
+from mdr_dask.physics.sliding import full_contact
+from mdr_dask.physics.sliding import steady as sliding
+from mdr_dask.physics.sliding.cases import Cases, Scheme, Steady, valid
+from mdr_dask.physics.sliding.node_to_node import NodeToNode
+from mdr_dask.physics.surfaces.rough_line import RoughLine
+
+FLOORS = (0.0, 1.0, 0.0, 0.0)
+"""Errors of the depth are relative to the unit of height (the rms height) where the depth itself is smaller."""
+ORDER = 3.0  # cubic cells are of fourth order, edges of contacts of lower order; measured 3.3 in the median
+SAFETY = 4.0  # instead of the default 3, because contacts on few cells converge irregularly
+ORDER_OF_STEPS = 1.0  # backward Euler, and edges of contacts on straight cells
+SEARCH = 0.1  # error that the search for the depth may leave, relative to the accuracy: small beside it
+NODE_ERROR = 5e-5  # error of the arithmetic from node to node, whatever the grid
+NODE_LEVELS = tuple(2**k for k in range(11))  # nodes per Nyquist point, beyond 2 only where the line is in contact
+CELL_LEVELS = tuple(2**k for k in range(1, 7))
+REFERENCE = 0.01  # accuracy of the results that time steps on a given grid are compared with
+
+
+@dataclass(frozen=True)
+class KelvinCases:
+    """Cases of a Kelvin solid on one line.
+
+    Parameters
+    ----------
+    line : RoughLine
+        The line.
+    scheme : {"hermite", "piecewise_linear", "backward_euler"}
+        Cubic cells, straight cells, or the papers' time steps.
+    deborah, loads : array, shape (cases,)
+        v tau / L and F_N / (4 G L), in the unit of height.
+    contact : bool
+        Whether fraction and slope of the contact are wanted. They cost extra with time steps only.
+    """
+
+    line: RoughLine
+    scheme: Scheme
+    deborah: FloatArray
+    loads: FloatArray
+    contact: bool = True
+
+    def only(self, cases: NDArray[Any]) -> KelvinCases:
+        """Return some of the cases."""
+        return replace(self, deborah=self.deborah[cases], loads=self.loads[cases])
+
+    def on_grid(self, oversampling: int) -> Steady:
+        """Solve the cases on a grid of so many nodes per Nyquist point, without an estimate of their errors."""
+        return self._on_grid(oversampling, None)
+
+    def _on_grid(self, oversampling: int, depths: FloatArray | None) -> Steady:
+        """Solve the cases, starting the search from depths on another grid."""
+        nodes = self.line.points * oversampling
+        if self.scheme == "hermite":
+            return sliding.steady_sliding(self.line.cubic(nodes), self.deborah, self.loads, depths)
+        line = self.line.straight(nodes)
+        if self.scheme == "backward_euler":
+            return sliding.stepped_sliding(line, self.deborah, self.loads, self.contact)
+        return sliding.steady_sliding(line, self.deborah, self.loads, depths)
+
+    def with_errors(self, oversampling: int) -> tuple[Steady, FloatArray]:
+        """Solve the cases on a grid and estimate their errors.
+
+        Cells are compared with cells of twice the length. Time steps, and the coarsest grid, are compared with the
+        default scheme to an accuracy of 1 %: their own convergence is too slow to estimate an error from.
+
+        Returns
+        -------
+        Steady
+        array, shape (4, cases)
+            Estimated absolute errors of the columns of the steady states.
+        """
+        if self.scheme != "backward_euler" and oversampling > 1:
+            found = self._swept((oversampling // 2, oversampling), np.inf)
+            return Steady.of(np.array(found.values), found.outcome), found.errors
+        steady = self.on_grid(oversampling)
+        exact, errors = replace(self, scheme="hermite").to_accuracy(REFERENCE)
+        errors = np.abs(steady.columns - exact.columns) + errors
+        return steady, np.where(np.isnan(errors), np.inf, errors)
+
+    def to_accuracy(self, accuracy: float) -> tuple[Steady, FloatArray]:
+        """Solve every case on the coarsest grid that meets a relative accuracy.
+
+        The accuracy holds for drag, contact fraction and contact slope together: two grids may agree by chance in one
+        of them. That of the depth is relative to the rms height.
+
+        Returns
+        -------
+        Steady, array
+            As of `with_errors`. A case that misses the accuracy on the finest grid keeps its results and errors.
+        """
+        cases = self.loads.size
+        columns, errors = np.full((4, cases), np.nan), np.full((4, cases), np.inf)
+        status = np.full(cases, Outcome.INVALID, np.int8)
+        left = np.arange(cases)
+        on_plane = self.scheme == "hermite" and self.line.body is None
+        if on_plane:
+            nodes = nodes_of(self.line)
+            steady = full_contact.steady_full_contact(self.line.roughness, (), nodes, self.deborah, self.loads)
+            if steady is not None:
+                columns, status = steady.columns, steady.status
+                errors = full_contact.ROUNDING * np.abs(columns)
+            left = np.flatnonzero((status != Outcome.CONVERGED) & valid(self.deborah, self.loads))
+        levels = CELL_LEVELS if self.scheme == "hermite" else (1, *CELL_LEVELS)
+        if on_plane and left.size and accuracy > 2 * NODE_ERROR:
+            search = NodeToNode(*nodes, Cases(self.deborah[left], self.loads[left]), SEARCH * accuracy)
+            allowed = accuracy - NODE_ERROR
+            found = refine(search.solve, left.size, NODE_LEVELS, allowed, ORDER, safety=SAFETY, floors=FLOORS)
+            _write((columns, errors, status), left, found, NODE_ERROR)
+            left = left[~found.met]
+        if left.size:
+            found = self.only(left)._swept(levels, accuracy)
+            _write((columns, errors, status), left, found, 0.0)
+        return Steady.of(columns, status), errors
+
+    def _swept(self, levels: tuple[int, ...], accuracy: float) -> Refined:
+        """Solve the cases by sweeps over whole lines, each search for a depth starting from the grid before."""
+        depths = np.full(self.loads.size, np.nan)
+
+        def solve(level: int, cases: IntArray) -> Solution:
+            found = self.only(cases)._on_grid(level, depths[cases])
+            depths[cases] = found.depth
+            return Solution(found.columns, found.status)
+
+        order = ORDER if self.scheme == "hermite" else ORDER_OF_STEPS
+        return refine(solve, self.loads.size, levels, accuracy, order, safety=SAFETY, floors=FLOORS)
+
+
+def _write(
+    results: tuple[FloatArray, FloatArray, NDArray[np.int8]], cases: IntArray, found: Refined, least: float
+) -> None:
+    """Write refined results of some cases, unless what is there has smaller errors."""
+    columns, errors, status = results
+    values = np.array(found.values)
+    known = found.errors + least * np.maximum(np.abs(values), np.array(FLOORS)[:, None])
+    known[np.isnan(known)] = np.inf
+    better = (status[cases] != Outcome.CONVERGED) | (known[0] < errors[0, cases])
+    some = cases[better]
+    columns[:, some], errors[:, some], status[some] = values[:, better], known[:, better], found.outcome[better]
+
+
+def nodes_of(line: RoughLine) -> tuple[FloatArray, FloatArray]:
+    """Return heights and slopes at two nodes per Nyquist point, as full contact and `NodeToNode` take them."""
+    nodes = full_contact.OVERSAMPLING * line.points
+    return line.heights(nodes), line.slopes(nodes)
