@@ -1,4 +1,8 @@
-"""What a claim of the thesis is, the studies it is judged on, and the page that lists all of them."""
+"""What a claim of the thesis is, the studies on which it is judged, and the page that lists all claims.
+
+Every verdict is a sentence that begins with one of `WORDS`. The first four are those of the fits
+(`mdr_dask.fits.base.law_holds`), and where a claim is a law that can be fitted, the sentence is the fit's own.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -17,31 +19,16 @@ import xarray as xr
 from mdr_dask.campaign import loads
 from mdr_dask.execute import Resources, run
 from mdr_dask.fits import available
+from mdr_dask.fits.base import law_holds
 from mdr_dask.store import datasets
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
-
-
-class Verdict(StrEnum):
-    """What came of a claim."""
-
-    HOLDS = "holds"
-    WITHIN = "holds within"
-    FAILS = "does not hold"
-    NO_DATA = "no data"
-    NOT_MODELLED = "not modelled"
-
-
-class Found(NamedTuple):
-    """Our figure for a claim, as the page shows it, and the verdict."""
-
-    figure: str
-    verdict: Verdict
+WORDS = ("yes", "approximately", "no", "not tested", "no data", "not modelled")
 
 
 @dataclass(frozen=True)
 class Studies:
-    """Stores of campaigns, each run once when it is first asked for.
+    """Stores of campaigns; each is computed when it is first needed.
 
     Parameters
     ----------
@@ -58,9 +45,9 @@ class Studies:
     folder: str = field(default_factory=tempfile.mkdtemp)
 
     def __call__(self, name: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
-        """Return the series of a campaign, all or those named, with some of its lines `key: value` replaced.
+        """Return the series of a campaign, all or those named, with some of its lines ``key: value`` replaced.
 
-        A key `series_NAME` stands for the line of a series.
+        A key ``series_NAME`` stands for the line of a series.
         """
         text = (CAMPAIGNS / f"{name}.yaml").read_text()
         if self.points:
@@ -82,16 +69,13 @@ class Studies:
         run(campaign, url, Resources(), lambda _: None)
         return datasets(url)
 
-    def fit(self, name: str, law: str, series: Sequence[str] = (), **replaced: str) -> dict[str, xr.Dataset]:
-        """Return the constants that a law has on a campaign, by series."""
-        groups = self(name, series, **replaced)
-        model = next(iter(groups.values())).attrs["model"]
-        return available(model)[law].results(groups)
-
 
 def _with_line(text: str, key: str, value: str) -> tuple[str, int]:
-    """Return a text with the value of its first line `key: value` replaced, and whether there was one."""
+    """Return a text with the value of its first line ``key: value`` replaced, and whether there was one."""
     return re.subn(rf"^(\s*){key}: [^#\n]*", rf"\g<1>{key}: {value} ", text, count=1, flags=re.M)
+
+
+Judge = Callable[[Studies], str]
 
 
 @dataclass(frozen=True)
@@ -105,53 +89,132 @@ class Claim:
     claim : str
         What it says.
     command : str
-        How a user sees our figure again.
-    judge : callable, Studies -> Found
-        Measures and judges it.
+        How a user gets our result.
+    judge : callable, Studies -> str, or str
+        The verdict, a sentence that begins with one of `WORDS`, or how it is found.
     why : str
-        One sentence.
+        What explains the verdict.
     """
 
     item: str
     claim: str
     command: str
-    judge: Callable[[Studies], Found]
-    why: str
+    judge: Judge | str
+    why: str = ""
+
+    def verdict(self, studies: Studies) -> str:
+        """Return the sentence."""
+        return self.judge if isinstance(self.judge, str) else self.judge(studies)
 
 
-def told(verdict: Verdict, figure: str = "") -> Callable[[Studies], Found]:
-    """Return the judge of a claim that needs no measurement."""
-    return lambda _: Found(figure, verdict)
+def word(sentence: str) -> str:
+    """Return the word with which a verdict begins."""
+    return sentence.partition(":")[0]
 
 
-def judged(figure: str, miss: float, holds: float, within: float) -> Found:
-    """Judge by how far a figure misses the claim: it holds up to `holds`, and holds within the miss up to `within`."""
-    if miss <= holds:
-        return Found(figure, Verdict.HOLDS)
-    return Found(figure, Verdict.WITHIN if miss <= within else Verdict.FAILS)
+def compared(figure: str, *departures: float) -> str:
+    """Return the verdict on relative departures of exact numbers, with a figure."""
+    return f"{law_holds(np.array(departures), None)}; {figure}"
 
 
-def power(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the exponent of y over x by least squares in logarithms."""
-    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+@dataclass(frozen=True)
+class FromFit:
+    """The verdict of a fit: its own sentence, of the worst case where there are several.
+
+    Parameters
+    ----------
+    campaign, law, series : str
+        As in ``mdr-dask fit results/CAMPAIGN.zarr LAW --series SERIES``.
+    sentence : str
+        Name of the sentence.
+    constants : tuple of str
+        Constants to print with their intervals.
+    within : dict
+        Cases that the claim is about, by label along dimensions.
+    shown : dict
+        Cases whose constants are printed.
+    replaced : dict
+        Lines of the campaign to replace, as in `Studies`.
+    """
+
+    campaign: str
+    law: str
+    series: str = ""
+    sentence: str = "law_holds"
+    constants: tuple[str, ...] = ()
+    within: dict[str, object] = field(default_factory=dict)
+    shown: dict[str, object] = field(default_factory=dict)
+    replaced: dict[str, str] = field(default_factory=dict)
+
+    def __call__(self, studies: Studies) -> str:
+        """Return the sentence, with the constants."""
+        groups = studies(self.campaign, (self.series,) if self.series else (), **self.replaced)
+        model = next(iter(groups.values())).attrs["model"]
+        found = next(iter(available(model)[self.law].results(groups).values()))
+        judged = found[self.sentence].sel(_present(self.within, found))
+        cases = [_case(judged, index) for index in np.ndindex(judged.shape)]
+        case, worst = max(cases, key=lambda each: _RANK.get(word(each[1]), -1))
+        if case:
+            worst = f"{worst} (at {case})"
+        if not self.constants:
+            return worst
+        part = found.sel(_present(self.shown or self.within, found)).squeeze()
+        shown = [_shown(part, name) for name in self.constants]
+        return f"{worst}; {'; '.join(shown)}"
 
 
-def interval(fitted: xr.Dataset, name: str, digits: int = 3) -> str:
-    """Return a constant with its interval: ``0.41 (0.40, 0.42)``."""
-    value, low, high = (float(fitted[name + end]) for end in ("", "_low", "_high"))
-    known = np.isfinite(low) and np.isfinite(high)
-    return f"{value:.{digits}g} ({low:.{digits}g}, {high:.{digits}g})" if known else f"{value:.{digits}g}"
+_RANK = {"not tested": 0, "yes": 1, "approximately": 2, "no": 3}
+
+
+def _present(selection: dict[str, object], found: xr.Dataset) -> dict[str, object]:
+    return {dim: label for dim, label in selection.items() if dim in found.dims}
+
+
+def _case(judged: xr.DataArray, index: tuple[int, ...]) -> tuple[str, str]:
+    """Return a description of one case of an array of sentences, and the sentence."""
+    one = judged.isel(dict(zip(judged.dims, index, strict=True)))
+    labels = [f"{dim} = {_number(one[dim].item())}" for dim in judged.dims if dim in one.coords]
+    return ", ".join(labels), str(one.item())
+
+
+def _number(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+def _shown(part: xr.Dataset, name: str) -> str:
+    """Return a constant with its interval, of every case."""
+    ends = [part[name], part.get(f"{name}_low", part[name]), part.get(f"{name}_high", part[name])]
+    if part[name].ndim == 0:
+        return f"{name} = {_interval(*(float(end) for end in ends))}"
+    dim = str(part[name].dims[0])
+    each = [
+        f"{_interval(*(float(end[k]) for end in ends))} at {dim} = {_number(part[dim].values[k].item())}"
+        for k in range(part.sizes[dim])
+        if np.isfinite(float(part[name][k]))
+    ]
+    return f"{name} = {', '.join(each)}"
+
+
+def _interval(value: float, low: float, high: float) -> str:
+    known = np.isfinite(low) and np.isfinite(high) and low < high
+    return f"{value:.3g} ({low:.3g}, {high:.3g})" if known else f"{value:.3g}"
 
 
 def page(chapters: Iterable[tuple[str, Iterable[Claim]]], studies: Studies) -> str:
-    """Return the ledger as Markdown."""
+    """Return the claims as Markdown."""
     parts = []
     for title, claims in chapters:
-        parts.append(f"## {title}\n\n| item | claim | our figure | verdict | why | command |\n|{'---|' * 6}")
+        parts.append(f"## {title}\n\n| item | claim | holds? | why | command |\n|{'---|' * 5}")
         for claim in claims:
-            found = claim.judge(studies)
+            sentence = claim.verdict(studies)
+            head = word(sentence)
             command = f"`{claim.command}`" if claim.command else ""
-            cells = (claim.item, claim.claim, found.figure, f"**{found.verdict}**", claim.why, command)
-            parts.append(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |")
+            cells = (claim.item, claim.claim, f"**{head}**{sentence[len(head) :]}", claim.why, command)
+            parts.append(row(cells))
         parts.append("")
     return "\n".join(parts)
+
+
+def row(cells: Iterable[str]) -> str:
+    """Return a row of a Markdown table."""
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"

@@ -1,4 +1,4 @@
-"""The command that says which input matters."""
+"""The command that computes Sobol indices."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def sensitivity(
 ) -> None:
     """Say which input matters: Sobol indices of an output of a sampled study, with 95 % intervals.
 
-    First order is the share of the variance that an input explains alone, total with all its interactions. Total
+    First order: the share of the variance that an input explains alone; total: with all its interactions. Total
     indices need the design of a campaign with `sampling: {saltelli: n}`; first-order ones take any sampled design.
 
     \b

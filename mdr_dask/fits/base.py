@@ -176,15 +176,16 @@ def verdict(residuals: FloatArray, count: int, constants: int = 0, where: Callab
     return law_holds(residuals[0], bootstrap.chance(residuals, count), constants, place)
 
 
-def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: str = "") -> str:
+def law_holds(departures: FloatArray, chance: float | None, constants: int = 0, where: str = "") -> str:
     """Say whether a law holds.
 
     Parameters
     ----------
     departures : array
         Relative departures of the data from the law.
-    chance : float
-        Probability that scatter and errors alone cause as large departures; NaN if unknown.
+    chance : float or None
+        Probability that scatter and errors alone cause as large departures; NaN if unknown, None for data without
+        scatter.
     constants : int
         Number of constants fitted to these data.
     where : str
@@ -203,10 +204,12 @@ def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: 
         limits = f"limits {of_mean} % and {of_most} %"
     if max(rms, largest / 2) <= 100 * WITHIN:
         return f"yes: {departs}; {limits}"
-    if chance >= DOUBTFUL:
+    if chance is not None and chance >= DOUBTFUL:
         return f"yes: {departs}, which scatter explains (probability {chance:.2g})"
     if max(rms, largest / 2) <= limit:
         return f"approximately: {departs}; {limits}"
+    if chance is None:
+        return f"no: {departs}; {limits}"
     if np.isnan(chance):
         return f"not tested: too few realisations to know the scatter; {departs}"
     likely = f"{chance:.2g}" if chance else f"below {1 / bootstrap.RESAMPLES:g}"
@@ -214,5 +217,7 @@ def law_holds(departures: FloatArray, chance: float, constants: int = 0, where: 
 
 
 def _plain(number: str) -> str:
-    """Return a number without an exponent."""
+    """Return a percentage without an exponent; less than 1e-4 % is 0."""
+    if "e-" in number:
+        return "0"
     return f"{float(number):.0f}" if "e+" in number else number

@@ -1,4 +1,4 @@
-"""Unknown parameters from measured points: the posterior over the grid of a study, and what the data leave open."""
+"""Calibration: unknown parameters from measured points, by the posterior over the grid of a study."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from scipy.stats import chi2
 from mdr_dask.arrays import FloatArray
 from mdr_dask.campaign.measured import Measured, read_measured, unknowns
 from mdr_dask.errors import DataError, FitError
-from mdr_dask.fits import determined
+from mdr_dask.fits import identifiability
 from mdr_dask.fits.base import DOUBTFUL, Fit
 from mdr_dask.fits.misfit import Residuals, law_holds
 from mdr_dask.fits.posterior import DEVIATIONS, Likelihood, Noise, Posterior, distance, posterior
 from mdr_dask.fits.prediction import Prediction, prediction
 
-#: Share of the residuals below which the measurement is not held to be better.
+#: Least error of measurement that is considered, as a share of the residuals of the best prediction.
 LEAST = 0.2
-#: Fewest numbers that a sum of squares can be told from rounding in.
+#: Relative size of residuals that rounding may cause.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What measured points say of the unknowns of a study.
+    """The posterior of the unknowns of a study.
 
     Parameters
     ----------
@@ -40,11 +40,12 @@ class Calibration:
         What the study predicts at the measured points.
     posterior : Posterior
     noises : list of Noise
-        Errors of measurement that were held possible.
+        Errors of measurement that were considered.
     units : dict of str to str
         Of unknowns, conditions and the output.
     contradicted : Residuals or None
-        What the errors of the table do not explain, and the intervals therefore hold as errors of measurement.
+        Residuals that the errors of the table do not explain. The errors of measurement were then enlarged until they
+        explain them, so the intervals include the misfit.
     """
 
     measured: Measured
@@ -65,33 +66,33 @@ class Calibration:
         return self.prediction.values(self.posterior.places)
 
     @cached_property
-    def ends(self) -> list[determined.Ends]:
-        """At which ends of its axis each unknown is open."""
-        return determined.open_ends(self.posterior)
+    def ends(self) -> list[identifiability.Ends]:
+        """Which ends of the axis of each unknown the data leave open."""
+        return identifiability.open_ends(self.posterior)
 
     @cached_property
     def free(self) -> list[int]:
-        """Places of the unknowns that the data do not determine."""
-        return determined.undetermined(self.posterior, self.ends)
+        """Indices of the unknowns that the data do not determine."""
+        return identifiability.undetermined(self.posterior, self.ends)
 
     @cached_property
-    def products(self) -> list[determined.Product]:
-        """What they determine of those."""
-        return determined.products(self.posterior, self.values, self.free)
+    def products(self) -> list[identifiability.Product]:
+        """Products of these unknowns that the data determine."""
+        return identifiability.products(self.posterior, self.values, self.free)
 
     @cached_property
     def residuals(self) -> Residuals:
-        """What the best prediction leaves."""
+        """Residuals of the best prediction."""
         return self.contradicted or _residuals(self)
 
     @property
     def law_holds(self) -> str:
-        """Whether the model explains the points, in words."""
+        """Whether the model explains the measured points."""
         return law_holds(self.residuals, self.measured.conditions)
 
     @cached_property
     def noise(self) -> tuple[FloatArray, bool]:
-        """Standard deviations of the measured points at the best cell, and whether they are shares of the values."""
+        """Standard deviations of the measured points, and whether they are shares of the values."""
         shares = self.posterior.weights @ self.posterior.noise
         cuts = np.cumsum([noise.sizes.size for noise in self.noises])[:-1]
         parts = np.split(shares, cuts)
@@ -116,7 +117,7 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
     ----------
     dataset : Dataset
         A group of a study that is a grid. Its axes that are not among the conditions measured are the unknowns, one to
-        four; each is held to be evenly likely over its axis beforehand, on its natural scale.
+        four. The prior of each is uniform over its axis, in the logarithm if its values are spaced that way.
     measured : Measured
 
     Raises
@@ -126,10 +127,10 @@ def calibrate(dataset: xr.Dataset, measured: Measured) -> Calibration:
 
     Notes
     -----
-    The likelihood is normal. Its covariance is the sum of errors of measurement, of the scatter of the lines, which all
-    cases share, and of half of the estimated errors of grid and interpolation, once for all points with one sign and
-    once for each alone. Errors of measurement that are not given are equal, or equal shares of the values, of a size
-    that is evenly likely in its logarithm.
+    The likelihood is normal. Its covariance has four parts: the errors of measurement; the scatter of the lines, which
+    all cases share; half of the estimated errors of grid and interpolation, common to all points; and the same half,
+    independent for each point. Errors of measurement that are not given are either equal or equal shares of the values,
+    with a uniform prior for the logarithm of their size.
     """
     predicted = prediction(dataset, measured)
     named = (*predicted.unknowns, *measured.conditions, measured.output)
@@ -152,12 +153,12 @@ def _posterior(predicted: Prediction, measured: Measured, noises: list[Noise]) -
 
 
 def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
-    """Return errors of measurement of about the size of the residuals, equal ones and equal shares of the values."""
+    """Return errors of measurement of about the size of the residuals: equal ones, and equal shares of the values."""
     values, count = measured.values, measured.values.size
     unknowns = len(predicted.unknowns)
     if count <= unknowns:
         raise FitError(
-            f"{count} measured points without errors cannot tell {unknowns} unknowns; add points, or a column "
+            f"{count} measured points without errors cannot determine {unknowns} unknowns; add points, or a column "
             "standard_error"
         )
     shares = bool(np.all(values > 0))
@@ -179,14 +180,14 @@ def _unknown_noises(predicted: Prediction, measured: Measured) -> list[Noise]:
 
 
 def _sizes(residual: float, count: int, unknowns: int) -> FloatArray:
-    """Return standard deviations around that of residuals, up to those that leave so little once in 1000 times."""
+    """Return standard deviations around that of the residuals, up to that with a probability of 0.001."""
     spare = max(1, count - unknowns)
     most = min(100.0, float(np.sqrt(count / chi2.ppf(0.001, spare))))
     return np.asarray(residual * np.geomspace(LEAST, most, DEVIATIONS))
 
 
 def _residuals(found: Calibration) -> Residuals:
-    """Return what the best prediction leaves of measured points."""
+    """Return the residuals of the best prediction."""
     place = found.posterior.places[found.posterior.best]
     predicted = found.prediction(place[None])
     noise, _ = found.noise
@@ -200,12 +201,12 @@ def _residuals(found: Calibration) -> Residuals:
 
 
 def measured_of(dataset: xr.Dataset) -> Measured:
-    """Return the table that a study carries, or that was given to it.
+    """Return the table of measured points in a study.
 
     Raises
     ------
     FitError, DataError
-        If there is none, or it is of no output of the study.
+        If there is none, or if it has no output of the study.
     """
     table = dataset.attrs.get("measured")
     if not table:
@@ -233,7 +234,7 @@ def with_table(groups: Mapping[str, xr.Dataset], table: Any) -> dict[str, xr.Dat
 
 
 def read_file(path: str | Path) -> dict[str, str]:
-    """Return the table of a file as a study carries it."""
+    """Return the table of a file in the form in which a study contains it."""
     path = Path(path)
     try:
         return {"name": path.name, "text": path.read_text(encoding="utf-8-sig")}
@@ -244,13 +245,13 @@ def read_file(path: str | Path) -> dict[str, str]:
 
 
 def calibration(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return values, intervals and correlations of the unknowns of a series, and what its data do not determine."""
+    """Return values, intervals and correlations of the unknowns of a series."""
     (dataset,) = groups.values()
     return summary(calibrate(dataset, measured_of(dataset)))
 
 
 def summary(found: Calibration) -> xr.Dataset:
-    """Return what was found as a Dataset without dimensions."""
+    """Return a calibration as a Dataset without dimensions."""
     variables: dict[str, tuple[tuple[()], object, dict[str, str]]] = {}
     for k, name in enumerate(found.unknowns):
         attributes = {"units": found.units[name], "long_name": name.replace("_", " ")}
@@ -259,8 +260,8 @@ def summary(found: Calibration) -> xr.Dataset:
             ends = dict.fromkeys(ends, np.nan) | _bound(found, k)
         variables |= {name + end: ((), value, attributes) for end, value in ends.items()}
     for product in found.products:
-        name = determined.written(found.unknowns, product.exponents)
-        unit = determined.unit_of([found.units[each] for each in found.unknowns], product.exponents)
+        name = identifiability.written(found.unknowns, product.exponents)
+        unit = identifiability.unit_of([found.units[each] for each in found.unknowns], product.exponents)
         ends = _intervals(product.values, found.posterior.weights)
         variables |= {name + end: ((), value, {"units": unit, "long_name": name}) for end, value in ends.items()}
     pure = {"units": "1"}
@@ -288,15 +289,21 @@ def summary(found: Calibration) -> xr.Dataset:
 
 def _intervals(values: FloatArray, weights: FloatArray) -> dict[str, float]:
     """Return the median and the ends of the intervals."""
-    return dict(zip(determined.ENDS, determined.quantiles(values, weights, determined.SHARES).tolist(), strict=True))
+    return dict(
+        zip(
+            identifiability.ENDS,
+            identifiability.quantiles(values, weights, identifiability.SHARES).tolist(),
+            strict=True,
+        )
+    )
 
 
 def _bound(found: Calibration, k: int) -> dict[str, float]:
-    """Return the interval of an unknown that is bounded on one side, where no other is free."""
+    """Return the interval of an unknown that is bounded on one side, if all others are determined."""
     low, high = found.ends[k]
     if found.free != [k] or low == high:
         return {}
-    likely = found.values[found.posterior.density > found.posterior.density.max() - determined.OPEN, k]
+    likely = found.values[found.posterior.density > found.posterior.density.max() - identifiability.OPEN, k]
     return {"_low": float(likely.min()), "_high": np.inf} if high else {"_low": -np.inf, "_high": float(likely.max())}
 
 
@@ -306,14 +313,21 @@ def _correlation(found: Calibration, one: int, other: int) -> float:
 
 
 def sentence(found: Calibration) -> str:
-    """Say what the data determine, and what they do not."""
+    """Say what the data determine, after the verdict if the model does not explain the data."""
+    if found.law_holds.startswith("no:"):
+        return f"the model does not explain the measured points; with errors that would explain them, {_known(found)}"
+    return _known(found)
+
+
+def _known(found: Calibration) -> str:
+    """Say which unknowns the data determine, and which they do not."""
     free = [found.unknowns[k] for k in found.free]
     if not free:
         return "every unknown is determined"
     known = [name for name in found.unknowns if name not in free]
     for product in found.products:
-        name = determined.written(found.unknowns, product.exponents)
-        unit = determined.unit_of([found.units[each] for each in found.unknowns], product.exponents)
+        name = identifiability.written(found.unknowns, product.exponents)
+        unit = identifiability.unit_of([found.units[each] for each in found.unknowns], product.exponents)
         ends = _intervals(product.values, found.posterior.weights)
         half = (ends["_high"] - ends["_low"]) / 2 / ends[""]
         known.append(f"{name} ({ends['']:.3g}{'' if unit == '1' else ' ' + unit} +- {half:.2g} of it)")
@@ -324,17 +338,17 @@ def sentence(found: Calibration) -> str:
                 f"from below, at {bound['_low']:.4g}" if found.ends[k].high else f"from above, at {bound['_high']:.4g}"
             )
             return " and ".join([*known, f"{free[0]} is bounded {side}, only"])
-    lost = f"no number is given for {' and '.join(free)}"
+    no_number = f"no number is given for {' and '.join(free)}"
     if not known:
-        return f"nothing is determined within the ranges of the study; {lost}"
-    return f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; {lost}"
+        return f"nothing is determined within the ranges of the study; {no_number}"
+    return f"only {' and '.join(known)} {'is' if len(known) == 1 else 'are'} determined; {no_number}"
 
 
 FITS: tuple[Fit, ...] = (
     Fit(
         "calibration",
         (),
-        "axes that the table `measured` does not name, from the measured points: values, intervals, what is open",
+        "axes of a study that are not columns of the table `measured`, from its points: values, intervals, law_holds",
         calibration,
         apart=True,
         constants=unknowns,

@@ -110,8 +110,8 @@ def film_exponents(groups: Mapping[str, xr.Dataset]) -> xr.Dataset:
             problem = str(error)
             continue
         results[name] = constants
-        stated_sentences.append(law_holds(np.concatenate(of_stated), 0.0))
-        sentences.append(law_holds(np.concatenate(departures), 0.0))
+        stated_sentences.append(law_holds(np.concatenate(of_stated), None))
+        sentences.append(law_holds(np.concatenate(departures), None))
     if not results:
         raise FitError(problem)
     variables = sorted({key for constants in results.values() for key in constants})

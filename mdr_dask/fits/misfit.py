@@ -1,4 +1,4 @@
-"""Whether measured points contradict a model: chi squared where errors are known, else a trend of the residuals."""
+"""Whether measured points contradict a model: by chi squared if errors are known, else by a trend of the residuals."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from scipy.stats import f as fisher
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.base import DOUBTFUL, WITHIN
 
-#: Probability of a trend of the residuals by chance, below which the model is doubted.
+#: A trend of the residuals that chance alone causes with a smaller probability counts against the model.
 TREND = 0.005
-#: Fewest points whose residuals can show a trend.
+#: Least number of points whose residuals can show a trend.
 FEWEST = 6
 
 
 class Residuals(NamedTuple):
-    """What the best prediction leaves.
+    """Residuals of the best prediction.
 
     Attributes
     ----------
     scaled : array, shape (points,)
-        Measured less predicted, over the standard deviation of both.
+        Measured minus predicted value over the standard deviation of both.
     relative : float
-        Root mean square of measured less predicted, over that of the whole.
+        Root mean square of measured minus predicted values over that of the measured values.
     chi_squared : float
-        With the correlations of the errors; NaN where the errors of measurement are unknown.
+        With the correlations of the errors; NaN if the errors of measurement are unknown.
     freedom : int
-        Points less directions that are determined.
+        Degrees of freedom: points minus determined combinations of unknowns.
     """
 
     scaled: FloatArray
@@ -40,35 +40,33 @@ class Residuals(NamedTuple):
 
     @property
     def chance(self) -> float:
-        """How often errors alone leave as much; NaN where they are unknown."""
+        """Probability that errors alone cause as large residuals; NaN if the errors are unknown."""
         return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else np.nan
 
 
-def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray], whole: str = "the measured values") -> str:
-    """Say in words whether the model explains the points; residuals are told as shares of the whole."""
-    told = f"residuals of {residuals.relative:.2g} of {whole}, rms"
+def law_holds(residuals: Residuals, conditions: Mapping[str, FloatArray]) -> str:
+    """Say whether the model explains the measured points."""
+    size = f"residuals are {100 * residuals.relative:.2g} % of the measured values, rms"
     if residuals.freedom < 1:
-        return "not tested: as many constants as points leave nothing to compare"
+        return "not tested: there are no more points than constants"
     if np.isfinite(residuals.chi_squared):
-        compared = f"{told}, chi squared {residuals.chi_squared:.3g} of {residuals.freedom}"
-        known = f"{compared} (probability {residuals.chance:.2g})"
-        return (
-            f"yes: the errors explain {known}"
-            if residuals.chance >= DOUBTFUL
-            else f"no: the errors do not explain {known}"
-        )
+        test = f"chi squared {residuals.chi_squared:.3g}, {residuals.freedom} degrees of freedom"
+        about = f"({test}, probability {residuals.chance:.2g}); {size}"
+        if residuals.chance >= DOUBTFUL:
+            return f"yes: the errors explain the residuals {about}"
+        return f"no: the errors do not explain the residuals {about}"
     if residuals.scaled.size < FEWEST:
-        return f"not tested: {residuals.scaled.size} points without errors of their own leave too little; {told}"
+        return f"not tested: {residuals.scaled.size} points without known errors are too few; {size}"
     probability, along = trend(residuals.scaled, conditions)
     if probability < TREND and residuals.relative > WITHIN:
-        return f"no: {told}, follow a trend along {along} (by chance with probability {probability:.1g})"
-    return f"yes: {told}, follow no trend (probability {probability:.2g})" if probability >= TREND else f"yes: {told}"
+        return f"no: the residuals have a trend along {along} (by chance with probability {probability:.1g}); {size}"
+    return f"yes: the residuals have no trend that counts (by chance with probability {probability:.2g}); {size}"
 
 
 def trend(scaled: FloatArray, conditions: Mapping[str, FloatArray]) -> tuple[float, str]:
-    """Return how often chance alone makes residuals follow a parabola along a condition so well, and which one.
+    """Return the probability that chance alone makes residuals follow a parabola so well, and along which condition.
 
-    The condition is taken by rank; the probability is that of the worst of all conditions.
+    Conditions enter by rank. The probability is that of the worst condition, times their number.
     """
     worst, along = 1.0, ""
     for name, values in conditions.items():

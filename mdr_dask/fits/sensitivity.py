@@ -1,37 +1,36 @@
 """Sobol indices: the share of the variance of an output that each input of a study explains.
 
-The output is the mean over realisations. Every index is a quotient of bilinear forms of it, and a form of means over R
-realisations holds their scatter too: what one realisation gives with itself is taken out, so that only products of two
-different realisations count, which know nothing of their scatter.
+The output is the mean over realisations. Each index is a quotient of products of two means, and such a product
+contains the scatter of the realisations. The product of each realisation with itself is therefore left out.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
-from scipy.sparse import csr_array
+from scipy.stats import t
 
 from mdr_dask import bootstrap
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError, distinguishable
 
-#: Half width of an interval that is narrow enough to tell inputs apart.
+#: Half width of an interval that is narrow enough to compare inputs.
 NARROW = 0.1
-#: Fewest points from which an index is computed.
+#: Least number of points from which an index is computed.
 FEWEST = 16
+#: Groups of points for the jackknife.
+GROUPS = 20
 
 
 def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     """Return the Sobol indices of an output for every varied input of a sampled study.
 
     From Saltelli's design: first-order indices after Saltelli et al. (2010), total ones after Jansen (1999). From any
-    other sampled design first-order ones alone: the variance of a local linear regression on each input, every point
-    left out of its own neighbourhood.
+    other sampled design first-order ones only, by the products of the outputs of neighbours when the cases are sorted
+    by an input (Gamboa et al., 2022, with several neighbours).
 
     Parameters
     ----------
@@ -44,35 +43,41 @@ def sobol_indices(dataset: xr.Dataset, output: str) -> xr.Dataset:
     -------
     Dataset
         Over ``parameter``: ``first`` and ``total`` with the ends of their 95 % intervals, ``<index>_low`` and
-        ``<index>_high``; NaN for what a design does not hold. ``attrs`` tell cases, failed cases, realisations, and
-        ``advice``: whether there were enough points.
+        ``<index>_high``; NaN for an index that the design does not give. ``attrs`` contain the numbers of cases, cases
+        without a value, and realisations, and ``advice``: whether there are enough points.
 
     Raises
     ------
     FitError
-        If the study is a grid, holds too few points, or the output does not vary or has dimensions of its own.
+        If the study is a grid, has too few points, or the output does not vary or has dimensions of its own.
 
     Notes
     -----
-    Failed cases are left out: of Saltelli's design, for each input, the pairs that need them. The intervals are those
-    of a bootstrap over points, and over realisations, whose spread is widened for few of them. The points of a Sobol
-    sequence fill space more evenly than random ones, so that the intervals are rather too wide.
+    Failed cases are left out; in Saltelli's design, for each input, the pairs that need them. The intervals are those
+    of a jackknife over groups of points and over realisations. Points of a Sobol sequence are more even than random
+    ones, so the intervals are rather too wide.
 
     References
     ----------
     Saltelli et al., Comput. Phys. Commun. 181, 259 (2010), doi:10.1016/j.cpc.2009.09.018.
+    Gamboa et al., Bernoulli 28, 2345 (2022), doi:10.3150/21-BEJ1421.
     """
     inputs = _inputs(dataset)
     values, left_out = _values(dataset, output)
-    variances = _exchanged(inputs, values) or _smoothed(inputs, values)
-    found = np.array([_with_interval(one, values.shape[0]) for one in variances])
-    if found.shape[2] == 1:
-        found = np.concatenate([found, np.full_like(found, np.nan)], axis=2)
+    values = values - np.nanmean(values)
+    columns = np.array(list(inputs.values()))
+    if _is_saltelli(columns):
+        blocks = values.reshape(len(values), -1, len(inputs) + 2)
+        found = [_with_interval(blocks[:, :, [0, 1, k + 2]], _exchanged) for k in range(len(inputs))]
+    else:
+        known = np.isfinite(values[0])
+        sorted_values = (values[:, known][:, np.argsort(column[known], kind="stable")] for column in columns)
+        found = [_of_neighbours(each) for each in sorted_values]
     result = xr.Dataset(coords={"parameter": np.array(list(inputs), dtype=object)})
     for (k, name), (row, suffix) in product(enumerate(("first", "total")), enumerate(("", "_low", "_high"))):
-        result[f"{name}{suffix}"] = ("parameter", found[:, row, k], {"units": "1"})
+        result[f"{name}{suffix}"] = ("parameter", [one[row, k] for one in found], {"units": "1"})
     result.attrs |= {"output": output, "cases": dataset.sizes["case"], "left_out": left_out}
-    result.attrs |= {"realisations": values.shape[0]}
+    result.attrs |= {"realisations": len(values)}
     result.attrs["advice"] = _advice(result)
     return result
 
@@ -115,157 +120,86 @@ def _values(dataset: xr.Dataset, output: str) -> tuple[FloatArray, int]:
     return values, int((~known).sum())
 
 
-class _Variances(NamedTuple):
-    """What each point adds to the variances of an index.
-
-    Attributes
-    ----------
-    parts : array, shape (indices, points)
-        Their mean over points is the variance that an input explains.
-    responses : array, shape (indices, points)
-        How that goes with the weight of a point.
-    squares, centres : array, shape (points,)
-        The mean of the squares less the square of the mean is the whole variance.
-    missed : float
-        Part of the variance not explained that may be counted as explained, or the other way round.
-    """
-
-    parts: FloatArray
-    responses: FloatArray
-    squares: FloatArray
-    centres: FloatArray
-    missed: float = 0.0
+def _is_saltelli(columns: FloatArray) -> bool:
+    """Return whether the cases are points a, b, and a with each input in turn taken from b."""
+    inputs, cases = columns.shape
+    if cases % (inputs + 2):
+        return False
+    points = columns.reshape(inputs, -1, inputs + 2)
+    mixed = points[:, :, :1].repeat(inputs, axis=2)
+    mixed[range(inputs), :, range(inputs)] = points[:, :, 1]
+    return bool(np.array_equal(mixed, points[:, :, 2:]))
 
 
-#: From weights of the realisations to what each point adds.
-_Weighted = Callable[[FloatArray], _Variances]
+def _product(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the mean product over pairs of different realisations, for each point; one realisation has no pairs."""
+    count = len(left)
+    if count == 1:
+        return np.asarray(left[0] * right[0])
+    both = left.sum(axis=0) * right.sum(axis=0) - (left * right).sum(axis=0)
+    return np.asarray(both / (count * (count - 1)))
 
 
-def _between(left: FloatArray, right: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the mean over pairs of different realisations of left times right, at each point."""
-    total = weights.sum()
-    both: FloatArray = (weights @ left) * (weights @ right)
-    pairs = total**2 - (weights**2).sum()
-    if pairs < 0.5:  # one realisation: its scatter cannot be told from the rest
-        return np.asarray(both / total**2)
-    apart: FloatArray = (both - weights**2 @ (left * right)) / pairs
-    return apart
-
-
-def _exchanged(inputs: dict[str, FloatArray], values: FloatArray) -> list[_Weighted]:
-    """Return the variances of Saltelli's design for each input; none where the cases are another design."""
-    columns, period = np.array(list(inputs.values())), len(inputs) + 2
-    if columns.shape[1] % period:
-        return []
-    points = columns.reshape(len(inputs), -1, period)
-    mixed = points[:, :, :1].repeat(len(inputs), axis=2)
-    for index in range(len(inputs)):
-        mixed[index, :, index] = points[index, :, 1]
-    if not np.array_equal(mixed, points[:, :, 2:]):
-        return []
-    centred = (values - np.nanmean(values)).reshape(values.shape[0], -1, period)
-    return [_of_exchange(centred[:, :, [0, 1, index + 2]]) for index in range(len(inputs))]
-
-
-def _of_exchange(three: FloatArray) -> _Weighted:
-    """Return the variances of one input from outputs at a, b, and a with that input of b."""
-    a, b, mixed = np.moveaxis(three[:, np.isfinite(three).all(axis=(0, 2))], 2, 0)
+def _exchanged(values: FloatArray) -> FloatArray:
+    """Return first-order and total index from outputs at a, b and a with one input of b, shape (lines, points, 3)."""
+    a, b, mixed = np.moveaxis(values[:, np.isfinite(values).all(axis=(0, 2))], 2, 0)
     if a.shape[1] < FEWEST:
         raise FitError(f"expected at least {FEWEST} base points without a failed case, got {a.shape[1]}")
-
-    def variances(weights: FloatArray) -> _Variances:
-        first = _between(b, mixed - a, weights)
-        total = _between(a - mixed, a - mixed, weights) / 2
-        parts = np.array([first, total])
-        squares = (_between(a, a, weights) + _between(b, b, weights)) / 2
-        return _Variances(parts, parts, squares, weights @ (a + b) / (2 * weights.sum()))
-
-    return variances
+    variance = (_product(a, a) + _product(b, b)).mean() / 2 - ((a.mean() + b.mean()) / 2) ** 2
+    first, total = _product(b, mixed - a).mean(), _product(a - mixed, a - mixed).mean() / 2
+    found: FloatArray = np.array([first, total]) / variance
+    return found
 
 
-def _smoothed(inputs: dict[str, FloatArray], values: FloatArray) -> list[_Weighted]:
-    """Return the variances of first order of any design, by regression on each input for itself."""
-    known = np.isfinite(values[0])
-    centred = values[:, known] - values[:, known].mean()
-    return [_of_regression(centred, column[known]) for column in inputs.values()]
+def _of_neighbours(values: FloatArray) -> FloatArray:
+    """Return the first-order index and the ends of its interval, and NaN for the total one, shape (3, 2).
 
-
-def _of_regression(values: FloatArray, column: FloatArray) -> _Weighted:
-    """Return the variance of a local linear regression.
-
-    Neighbours of random points know nothing of the point left out. Neighbours in a design that fills space evenly make
-    up for it: there the mean with the point is right. The value is taken half way, and the interval holds both.
+    Products with neighbours are right for random points. If the points fill space evenly, as those of a Sobol sequence,
+    the other inputs of neighbours differ systematically, and the mean with the product of each point with itself is
+    right. The index is the middle of both, and the interval contains both.
     """
-    matrix = _regression(column)
-    missed = 0.8 / (1 + matrix.nnz / column.size)
-    smooth, back = (matrix @ values.T).T, (matrix.T @ values.T).T
-
-    def variances(weights: FloatArray) -> _Variances:
-        part = _between(values, smooth, weights)
-        response = part + _between(values, back, weights) - matrix.T @ part
-        squares = _between(values, values, weights)
-        centres = weights @ values / weights.sum()
-        return _Variances(part[np.newaxis], response[np.newaxis], squares, centres, missed)
-
-    return variances
+    (without, with_itself), (low, _), (_, high) = _with_interval(values, _neighbours)
+    first = [(without + with_itself) / 2, low, high]
+    return np.stack([first, np.full(3, np.nan)], axis=1)
 
 
-def _regression(column: FloatArray) -> csr_array:
-    """Return the matrix of a local linear regression on the rank of an input, every point left out of its own."""
-    size = column.size
-    reach = min(max(4, int(np.sqrt(size) / 2)), (size - 1) // 2)
-    order = np.argsort(column, kind="stable")
-    start = np.clip(np.arange(size) - reach, 0, size - 2 * reach - 1)
-    window = start[:, np.newaxis] + np.arange(2 * reach + 1)
-    away = (window - np.arange(size)[:, np.newaxis]) / (2 * reach)
-    near = (away != 0) / (2 * reach)
-    tilt = (near * away).sum(axis=1, keepdims=True)
-    spread = (near * away**2).sum(axis=1, keepdims=True) - tilt**2
-    weight = near * (1 - (away - tilt) * tilt / spread)
-    rows = np.repeat(order, 2 * reach + 1)
-    return csr_array((weight.ravel(), (rows, order[window].ravel())), shape=(size, size))
+def _neighbours(values: FloatArray) -> FloatArray:
+    """Return the first-order index from outputs sorted by an input, without and with the products of a point itself."""
+    most = max(1, int(np.sqrt(values.shape[1]) / 2))
+    own, square = _product(values, values).mean(), values.mean() ** 2
+    near = np.mean([_product(values[:, k:], values[:, :-k]).mean() for k in range(1, most + 1)])
+    both = (own + 2 * most * near) / (1 + 2 * most)
+    found: FloatArray = np.array([near - square, both - square]) / (own - square)
+    return found
 
 
-def _with_interval(variances: _Weighted, realisations: int) -> FloatArray:
-    """Return indices and the ends of their intervals, shape (3, indices)."""
-    found = variances(np.ones(realisations))
-    points = found.squares.size
-    value = _of_means(found)
-    draws = _draws(points)
-    by_points = _quotient(
-        found.parts.mean(axis=1) + (draws - 1) @ found.responses.T / points,
-        draws @ found.squares / points,
-        draws @ found.centres / points,
-    )
-    spread = (np.quantile(by_points, bootstrap.TAILS, axis=0) - value) ** 2
-    if realisations > 1:
-        by_lines = np.array([_of_means(variances(weights)) for weights in bootstrap.weights(realisations)[1:]])
-        away = bootstrap.widening(realisations) * (np.nanquantile(by_lines, bootstrap.TAILS, axis=0) - value)
-        spread = spread + away**2
-    missed = found.missed * np.clip(1 - value, 0.0, 1.0)
-    middle = value + missed
-    return np.array([middle, value - np.sqrt(spread[0]), middle + missed + np.sqrt(spread[1])])
+def _with_interval(values: FloatArray, indices: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return indices and the ends of their intervals by jackknife, shape (3, indices).
+
+    Parameters
+    ----------
+    values : array, shape (lines, points, ...)
+    indices : callable
+        From values to indices.
+    """
+    middle, lines = indices(values), len(values)
+    group = np.random.Generator(np.random.Philox(0)).permutation(values.shape[1]) % GROUPS
+    half = _jackknife([indices(values[:, group != k]) for k in range(GROUPS)])
+    if lines > 1:
+        half = np.hypot(half, _jackknife([indices(np.delete(values, k, axis=0)) for k in range(lines)]))
+    return np.array([middle, middle - half, middle + half])
 
 
-def _of_means(found: _Variances) -> FloatArray:
-    return _quotient(found.parts.mean(axis=1), np.mean(found.squares), np.mean(found.centres))
-
-
-def _draws(points: int) -> FloatArray:
-    generator = np.random.Generator(np.random.Philox(0))
-    drawn: FloatArray = generator.multinomial(points, np.full(points, 1 / points), bootstrap.RESAMPLES).astype(float)
-    return drawn
-
-
-def _quotient(parts: FloatArray, squares: ArrayLike, centres: ArrayLike) -> FloatArray:
-    """Return indices from the means of parts, shape (..., indices), of squares and of centres, shape (...)."""
-    whole: FloatArray = np.asarray(squares) - np.asarray(centres) ** 2
-    indices: FloatArray = parts / whole[..., np.newaxis]
-    return indices
+def _jackknife(parts: list[FloatArray]) -> FloatArray:
+    """Return the half width of the interval from the indices without each part."""
+    count = len(parts)
+    error = np.sqrt((count - 1) / count * np.sum((np.array(parts) - np.mean(parts, axis=0)) ** 2, axis=0))
+    half: FloatArray = t.ppf(bootstrap.TAILS[1], count - 1) * error
+    return half
 
 
 def _advice(result: xr.Dataset) -> str:
-    """Say whether the intervals are narrow enough, and what would make them so."""
+    """Say whether the intervals are narrow enough, and how many cases would make them so."""
     halves = [((result[f"{name}_high"] - result[f"{name}_low"]) / 2).max().item() for name in ("first", "total")]
     widest = np.nanmax(halves)
     cases = result.attrs["cases"]

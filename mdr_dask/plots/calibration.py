@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mdr_dask.arrays import FloatArray
 from mdr_dask.errors import FitError
 from mdr_dask.fits import calibration as room
-from mdr_dask.fits import determined
+from mdr_dask.fits import identifiability
 from mdr_dask.plots import drawing, style
 from mdr_dask.plots.base import Plot
 from mdr_dask.plots.drawing import Mean
@@ -71,10 +71,10 @@ def _first(groups: Mapping[str, xr.Dataset]) -> tuple[room.Calibration, str]:
     raise FitError("; ".join(dict.fromkeys(reasons)))
 
 
-def _named(found: room.Calibration, product: determined.Product) -> tuple[str, FloatArray, str]:
+def _named(found: room.Calibration, product: identifiability.Product) -> tuple[str, FloatArray, str]:
     units = [found.units[name] for name in found.unknowns]
-    name = determined.written(found.unknowns, product.exponents)
-    return name, product.values, determined.unit_of(units, product.exponents)
+    name = identifiability.written(found.unknowns, product.exponents)
+    return name, product.values, identifiability.unit_of(units, product.exponents)
 
 
 def _axis(found: room.Calibration, name: str, values: Any) -> xr.DataArray:
@@ -162,7 +162,7 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     geometric = bool(np.all(shown > 0)) and (not known or _is_geometric(found, name))
     weights = found.posterior.weights
     across = np.log(shown) if geometric else shown
-    ends = determined.quantiles(across, weights, [1e-4, 1 - 1e-4])
+    ends = identifiability.quantiles(across, weights, [1e-4, 1 - 1e-4])
     if known and is_free:
         ends = np.array([across.min(), across.max()])
     margin = 1e-9 * np.abs(ends).max()
@@ -179,7 +179,7 @@ def _marginal(axes: Axes, found: room.Calibration, name: str, values: FloatArray
     drawing.law(axes, x, height, "-", color=colour, name=f"density of {name}")
     if not is_free:
         for level, alpha in ((0.95, 0.2), (0.6827, 0.35)):
-            low, high = determined.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
+            low, high = identifiability.quantiles(across, weights, [0.5 - level / 2, 0.5 + level / 2])
             inside, shaded = between(centres, height, low, high)
             inside = np.exp(inside) if geometric else inside
             axes.fill_between(inside, shaded, color=colour, alpha=alpha, linewidth=0, gid=style.LAW)

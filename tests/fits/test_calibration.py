@@ -16,7 +16,7 @@ from mdr_dask.cli import main
 from mdr_dask.errors import DataError, FitError
 from mdr_dask.fits import available
 from mdr_dask.fits.calibration import LEAST, _bound, calibrate, calibration, summary
-from mdr_dask.fits.determined import OPEN, Ends, written
+from mdr_dask.fits.identifiability import OPEN, Ends, written
 from mdr_dask.fits.posterior import Likelihood, Noise
 from mdr_dask.fits.prediction import prediction
 from mdr_dask.plots.calibration import PARTS, _of_whole_cells
@@ -59,6 +59,7 @@ def table(rng, points=12, noise=0.03, given=True, function=friction, velocities=
     return Measured("rig.csv", "mu", values, noise * exact if given else None, conditions, tuple(range(2, points + 2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lines", "scatter", "given", "tables"),
     [(1, 0.0, True, 60), (5, 0.1, True, 60), (1, 0.0, False, 12)],
@@ -148,6 +149,8 @@ def test_data_that_the_model_cannot_have_are_told_and_widen_the_interval():
     assert [one["law_holds"].item()[:3] for one in told] == ["yes", "no:"]
     widths = [float(np.log(one["rms_roughness_high"] / one["rms_roughness_low"])) for one in told]
     assert widths[1] > 2 * widths[0]
+    assert told[0]["determined"].item() == "every unknown is determined"
+    assert told[1]["determined"].item().startswith("the model does not explain the measured points")
 
 
 def test_constants_of_wlf_from_friction_against_velocity_and_temperature():
@@ -222,7 +225,7 @@ RIG = "normal_force [N], velocity [m/s], mu, standard_error\n1, 0.01, 0.05, 0.00
         (
             RIG.replace(", standard_error", "").replace(", 0.001", ""),
             {},
-            "2 measured points without errors cannot tell 2",
+            "2 measured points without errors cannot determine 2",
         ),
     ],
 )

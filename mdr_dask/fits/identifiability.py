@@ -1,4 +1,4 @@
-"""What data determine: which unknowns, and of those that they do not, which products."""
+"""Which unknowns the data determine, and which products of powers of the others."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ import numpy as np
 from mdr_dask.arrays import FloatArray
 from mdr_dask.fits.posterior import Posterior
 
-#: An end of an axis is open where the logarithmic density there is lower than the highest by less.
+#: The data leave an end of an axis open if ln(density) there is less than this below its maximum: two standard errors.
 OPEN = 2.0
-#: Share of the variance of an unknown that comes from others that are open, above which it is not determined itself.
+#: An unknown is not determined if unknowns with an open end explain more than this share of its variance.
 LINKED = 0.25
-#: Spread of a product over what it would be without data, below which it is determined.
+#: A product is determined if its spread is less than this share of its spread without data.
 NARROW = 0.25
-#: Exponents are written as halves and thirds where that makes the product no wider than by this factor.
+#: Exponents are rounded to halves or thirds if the spread of the product grows by at most this factor.
 ROUNDED = 1.15
-#: Probabilities of the ends of intervals.
+#: Probabilities of the intervals.
 LEVELS = {"": 0.95, "_68": 0.6827}
-#: Names of what is told of an unknown, the median and the ends of intervals, and their shares of the posterior.
+#: Suffixes of the median and the ends of the intervals, and their quantiles.
 ENDS = ("", *(f"_{end}{kind}" for kind in LEVELS for end in ("low", "high")))
 SHARES = (0.5, *(0.5 + sign * level / 2 for level in LEVELS.values() for sign in (-1, 1)))
 
 
 class Ends(NamedTuple):
-    """At which ends of its axis an unknown is open."""
+    """Whether the data leave the lower and the upper end of the axis of an unknown open."""
 
     low: bool
     high: bool
 
 
 def open_ends(found: Posterior) -> list[Ends]:
-    """Return for each unknown whether the data leave it free to go on beyond the ends of its axis."""
+    """Return for each unknown which ends of its axis the data leave open."""
     highest = found.density.max()
     ends = []
     for place in found.places.T:
@@ -44,7 +44,7 @@ def open_ends(found: Posterior) -> list[Ends]:
 
 
 def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
-    """Return the unknowns that the data do not determine: those with an open end, and those that hang on them."""
+    """Return the unknowns that the data do not determine: those with an open end, and those that depend on them."""
     free = [k for k, end in enumerate(ends) if any(end)]
     if not free:
         return []
@@ -54,7 +54,7 @@ def undetermined(found: Posterior, ends: Sequence[Ends]) -> list[int]:
 
 
 def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) -> float:
-    """Return the share of the variance of an unknown that a quadratic of others explains."""
+    """Return the share of the variance of an unknown that a quadratic function of others explains."""
     columns = centred[:, by]
     terms = np.concatenate([np.ones((len(centred), 1)), columns, columns**2], axis=1)
     root = np.sqrt(weights)
@@ -65,14 +65,14 @@ def _explained(centred: FloatArray, weights: FloatArray, k: int, by: list[int]) 
 
 
 class Product(NamedTuple):
-    """A product of powers of unknowns that is determined though they are not.
+    """A product of powers of unknowns that is determined although the unknowns are not.
 
     Attributes
     ----------
     exponents : array, shape (unknowns,)
-        Zero for those that are no part of it.
+        Powers; zero for unknowns that are not part of the product.
     values : array, shape (cells,)
-        Its value in each cell.
+        Value of the product in each cell of the posterior.
     """
 
     exponents: FloatArray
@@ -80,7 +80,7 @@ class Product(NamedTuple):
 
 
 def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[Product]:
-    """Return the products that the data determine of unknowns that they do not determine.
+    """Return the products of undetermined unknowns that the data determine.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def products(found: Posterior, values: FloatArray, free: Sequence[int]) -> list[
 
 
 def _reduced(rows: FloatArray) -> FloatArray:
-    """Return combinations that span the same, each with a leading 1 and as few other terms as can be."""
+    """Return rows with the same span, each with a leading 1 and as few other terms as possible."""
     rows = rows.copy()
     done: list[int] = []
     for i in range(len(rows)):
@@ -119,7 +119,7 @@ def _reduced(rows: FloatArray) -> FloatArray:
 
 
 def _product(found: Posterior, logarithms: FloatArray, free: Sequence[int], row: FloatArray, unknowns: int) -> Product:
-    """Return a product with plain exponents where they do as well."""
+    """Return a product, with simple exponents if they are as good."""
     best = _spread(logarithms @ row, found.weights)
     for denominator in (1, 2, 3):
         plain = np.round(row * denominator) / denominator
@@ -137,7 +137,7 @@ def _spread(values: FloatArray, weights: FloatArray) -> float:
 
 
 def written(names: Sequence[str], exponents: FloatArray) -> str:
-    """Return a product in words: ``relaxation_time x rms_roughness^2``."""
+    """Return a product as text: ``relaxation_time x rms_roughness^2``."""
     parts = [name + _power(power) for name, power in zip(names, exponents, strict=True) if power]
     return " x ".join(parts)
 
@@ -152,7 +152,7 @@ def _power(power: float) -> str:
 
 
 def unit_of(units: Sequence[str], exponents: FloatArray) -> str:
-    """Return the unit of a product, ``s m^2``; 1 of pure numbers."""
+    """Return the unit of a product, such as ``s m^2``; ``1`` for pure numbers."""
     parts = [
         f"({unit}){_power(power)}" if " " in unit or "/" in unit else unit + _power(power)
         for unit, power in zip(units, exponents, strict=True)
@@ -162,7 +162,7 @@ def unit_of(units: Sequence[str], exponents: FloatArray) -> str:
 
 
 def quantiles(values: FloatArray, weights: FloatArray, shares: Sequence[float]) -> FloatArray:
-    """Return quantiles of weighted values; between two of them the distribution is a straight line."""
+    """Return quantiles of weighted values, interpolated linearly."""
     places, which = np.unique(values, return_inverse=True)
     mass: FloatArray = np.bincount(which.ravel(), weights).astype(np.float64)
     below = np.cumsum(mass) - mass / 2

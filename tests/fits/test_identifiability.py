@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mdr_dask.fits.determined import products
+from mdr_dask.fits.identifiability import products
 from mdr_dask.fits.posterior import Posterior
 
 
